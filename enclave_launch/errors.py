@@ -1,0 +1,55 @@
+"""All errors that a user of enclave-launch can meet, cut by who must act.
+
+    EnclaveLaunchError
+    ├── UsageError              the person at the command line
+    ├── LaunchFileError         the author of the launch file (carries file:line, element, include chain)
+    ├── ManifestError           the author of the package: no NoDL, bad NoDL, conflicting NoDL
+    ├── ProvisionError          the operator of the keystore
+    └── RuntimeFailure          a process could not be started or ended badly
+
+``str(error)`` is one message for a person: what, where, and what to do next. Errors of lxml, yaml,
+cryptography and the operating system are translated where they enter.
+"""
+
+from __future__ import annotations
+
+from enclave_launch.source_location import SourceLocation
+
+
+class EnclaveLaunchError(Exception):
+    """Root of the tree. ``exit_status`` is what the command line returns."""
+
+    exit_status = 1
+
+
+class UsageError(EnclaveLaunchError):
+    exit_status = 2
+
+
+class LaunchFileError(EnclaveLaunchError):
+    """``cause`` is the exception that real launch would have raised, where it has one."""
+
+    def __init__(self, message: str, location: SourceLocation | None = None, cause: BaseException | None = None):
+        self.message = message
+        self.location = location
+        self.cause = cause
+        super().__init__(message)
+
+    def __str__(self) -> str:
+        if self.location is None:
+            return self.message
+        element = f" <{self.location.element}>" if self.location.element else ""
+        chain = "".join(f"\n  included from {place}" for place in reversed(self.location.includes))
+        return f"{self.location}:{element} {self.message}{chain}"
+
+
+class ManifestError(EnclaveLaunchError):
+    pass
+
+
+class ProvisionError(EnclaveLaunchError):
+    pass
+
+
+class RuntimeFailure(EnclaveLaunchError):
+    pass

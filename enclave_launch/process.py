@@ -1,0 +1,115 @@
+"""Processes and composable nodes as launch would start them: the result of evaluation.
+
+Comes out of ``evaluation``; goes into enclave assignment, policy derivation, reports and the runtime.
+Plain frozen values: nothing here touches the world.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from enclave_launch.source_location import SourceLocation
+
+UNSPECIFIED_NODE_NAME = "<node_name_unspecified>"
+UNSPECIFIED_NODE_NAMESPACE = "<node_namespace_unspecified>"
+
+ParameterValue = bool | int | float | str | bytes | tuple[bool | int | float | str | bytes, ...]
+ProcessKind = Literal["node", "lifecycle_node", "container", "executable"]
+
+
+@dataclass(frozen=True, slots=True)
+class EnclaveRequest:
+    """What the launch file says about the enclave of one process.
+
+    ``attribute``: the performed text of ``enclave=``; ``None`` when absent.
+    ``scope``: the enclave scope in force (absolute), ``None`` when nothing was pushed.
+    ``argument``: the last ``--enclave`` already present in the user's own ROS arguments.
+    """
+
+    attribute: str | None = None
+    scope: str | None = None
+    argument: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RemapRule:
+    """``source:=target`` as passed to rcl, with the place it was written."""
+
+    source: str
+    target: str
+    location: SourceLocation | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class ResolvedProcess:
+    """One process. ``cmd`` is what would be executed, prefix included, without ``--enclave``."""
+
+    index: int  # N of the process name NAME-N
+    kind: ProcessKind
+    package: str | None
+    executable: str
+    process_name: str  # NAME-N
+    name: str | None  # node name; a placeholder when launch does not know; None for executables
+    namespace: str | None
+    fqn: str | None
+    cmd: tuple[str, ...]
+    remaps: tuple[RemapRule, ...]
+    parameters: Mapping[str, ParameterValue]  # resolved, as the node will see them
+    environment: Mapping[str, str]  # added or changed by the launch file
+    enclave: EnclaveRequest
+    location: SourceLocation
+    on_event: str | None = None
+    cwd: str | None = None
+    shell: bool = False
+    parameter_files: Mapping[str, str] = field(default_factory=dict)  # "<params:N>" -> YAML text
+
+
+@dataclass(frozen=True, slots=True)
+class ResolvedComponent:
+    """One composable node, loaded into ``container`` (text as launch uses it)."""
+
+    container: str
+    package: str
+    plugin: str
+    name: str  # empty: the plugin's own default
+    namespace: str  # empty: not given
+    remaps: tuple[RemapRule, ...]
+    parameters: Mapping[str, ParameterValue]
+    extra_arguments: Mapping[str, ParameterValue]
+    location: SourceLocation
+    on_event: str | None = None
+
+    @property
+    def fqn(self) -> str:
+        name = self.name or UNSPECIFIED_NODE_NAME
+        return f"{self.namespace.rstrip('/')}/{name}"
+
+
+@dataclass(frozen=True, slots=True)
+class LauncherCall:
+    """A ROS service that the launcher itself must call: loading a component, changing a state."""
+
+    service: str  # final name as launch uses it
+    type: str
+    location: SourceLocation
+
+
+@dataclass(frozen=True, slots=True)
+class Unforeseeable:
+    """An action that only exists once a callback has run; a dry run cannot know it."""
+
+    what: str
+    location: SourceLocation
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Everything a launch file starts, in launch order: first what the visit starts, then what events start."""
+
+    processes: tuple[ResolvedProcess, ...]
+    components: tuple[ResolvedComponent, ...]
+    launcher_calls: tuple[LauncherCall, ...] = ()
+    unforeseeable: tuple[Unforeseeable, ...] = ()
+    warnings: tuple[str, ...] = ()

@@ -1,0 +1,18 @@
+"""Where in which launch file an action was written, and through which includes we came there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class SourceLocation:
+    """``line`` counts from 1, 0 when unknown. ``element`` is the launch element (``node``) or class."""
+
+    file: str
+    line: int = 0
+    element: str = ""
+    includes: tuple[str, ...] = ()  # "file:line" of each include on the way, outermost first
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}" if self.line else self.file

@@ -1,0 +1,1 @@
+"""SROS2 keystores: certificates, governance, permissions, and the policy they follow."""

@@ -1,0 +1,60 @@
+"""An SROS2 access-control policy (version 0.2.0) as plain values.
+
+Source of the format: ros2/design articles/ros2_access_control_policies, and the schema
+sros2/policy/schemas/policy.xsd. Reading and writing the XML is ``keystore.policy_xml``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+
+class Operation(str, Enum):
+    """What a rule is about; the value is the attribute of the policy XML."""
+
+    PUBLISH = "publish"
+    SUBSCRIBE = "subscribe"
+    REPLY = "reply"  # serve a service
+    REQUEST = "request"  # call a service
+    EXECUTE = "execute"  # serve an action
+    CALL = "call"  # call an action
+
+
+class Qualifier(str, Enum):
+    ALLOW = "ALLOW"
+    DENY = "DENY"
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Rule:
+    """``expression`` is absolute (``/a/b``), relative or private to the profile; it may hold wildcards
+    only where a policy file had them."""
+
+    operation: Operation
+    qualifier: Qualifier
+    expression: str
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Profile:
+    """The rules of one node: ``ns`` is an absolute namespace, ``node`` a node name."""
+
+    ns: str
+    node: str
+    rules: tuple[Rule, ...]
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class EnclavePolicy:
+    """All that one enclave may do: the union of its profiles; DENY of any beats ALLOW of any."""
+
+    path: str
+    profiles: tuple[Profile, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Policy:
+    """Enclaves sorted by path, each path once."""
+
+    enclaves: tuple[EnclavePolicy, ...]

@@ -1,0 +1,1 @@
+"""NoDL: what a node talks to, from manifests or from its source."""

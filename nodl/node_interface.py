@@ -1,0 +1,86 @@
+"""What one node talks to, before any launch file renames it.
+
+Every source of knowledge (NoDL v1, NoDL v2, inference from Python or C++) ends in these values;
+whoever derives permissions from them no longer asks where they came from, but can always tell
+(``source``). Pure data: nothing here touches the world.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+from nodl.name_template import NameTemplate
+from nodl.source_ref import SourceRef
+
+
+class EndpointKind(str, Enum):
+    """The six ways in which a ROS 2 node takes part in communication."""
+
+    PUBLISHER = "publisher"
+    SUBSCRIPTION = "subscription"
+    SERVICE_SERVER = "service_server"
+    SERVICE_CLIENT = "service_client"
+    ACTION_SERVER = "action_server"
+    ACTION_CLIENT = "action_client"
+
+
+class Certainty(str, Enum):
+    """How far a name can be trusted."""
+
+    EXACT = "exact"  # a manifest says so, or the source has one constant
+    FROM_DEFAULT = "from default"  # a parameter's default, used because the launch file sets no value
+    PATTERN = "pattern"  # only a part of the name is known
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Endpoint:
+    """One publisher, subscription, server or client, under the name the node's code uses.
+
+    ``name`` is absolute (``/x``), relative (``x``) or private (``~/x``); nothing is expanded yet.
+    ``type`` is a ROS interface type such as ``std_msgs/msg/String``; empty when not known.
+    """
+
+    kind: EndpointKind
+    name: NameTemplate
+    type: str
+    source: SourceRef
+    certainty: Certainty = Certainty.EXACT
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """Something about the node that could not be found out, and why. Never silently dropped."""
+
+    source: SourceRef
+    why: str
+
+
+class ClientLibrary(str, Enum):
+    """Which ROS client library a node is written with; decides its built-in interfaces."""
+
+    RCLCPP = "rclcpp"
+    RCLPY = "rclpy"
+    UNKNOWN = "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class NodeInterface:
+    """One node of an executable or component.
+
+    ``name`` and ``namespace`` are the program's own defaults (what applies when launch gives none);
+    ``None`` when unknown. ``executable`` or ``plugin`` is the key under which launch starts the node.
+    """
+
+    package: str | None
+    executable: str | None
+    plugin: str | None
+    name: str | None
+    namespace: str | None
+    endpoints: tuple[Endpoint, ...]
+    source: SourceRef
+    library: ClientLibrary = ClientLibrary.UNKNOWN
+    lifecycle: bool = False
+    parameters: tuple[str, ...] = ()
+    gaps: tuple[Gap, ...] = ()

@@ -1,0 +1,16 @@
+"""Where a statement about a node was read: the evidence behind every permission."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class SourceRef:
+    """A place in a file. ``line`` counts from 1; 0 when the whole file (or no line) is meant."""
+
+    file: str
+    line: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}" if self.line else self.file
