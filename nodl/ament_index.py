@@ -1,0 +1,202 @@
+"""The ament resource index: which installed package lies where, and what it registered.
+
+An install prefix (``/opt/ros/jazzy``, ``~/ws/install/pkg``) holds one marker file per resource below
+``share/ament_index/resource_index/<type>/<name>``. Every function takes the prefixes to search, first
+hit wins, and reads the disk at that moment: nothing is cached, nothing is global.
+``search_prefixes`` makes the list from ``--prefix`` options and ``AMENT_PREFIX_PATH``.
+
+Rules as in ament_index_cpp/ament_index_python (ament/ament_index, ``packages.py``, ``resources.py``) and,
+for launch files of a package, ``ros2launch/api/api.py``.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
+INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
+_PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
+
+
+class PackageNotFoundError(KeyError):
+    """No searched prefix holds the package. ``package`` and ``prefixes`` say which and where."""
+
+    def __init__(self, package: str, prefixes: Sequence[str]):
+        self.package = package
+        self.prefixes = tuple(prefixes)
+        super().__init__(f"package '{package}' not found, searching: {list(prefixes)}")
+
+    def __str__(self) -> str:
+        return str(self.args[0])  # a KeyError would show the repr
+
+
+class ExecutableNotFoundError(LookupError):
+    """The package is installed, but not this executable of it."""
+
+
+class LaunchFileNotFoundError(FileNotFoundError):
+    """No file of that name below the package's share directory."""
+
+
+class MultipleLaunchFilesError(LookupError):
+    """Several files of that name below the package's share directory; ``paths`` lists them."""
+
+    def __init__(self, message: str, paths: Sequence[str]):
+        self.paths = tuple(paths)
+        super().__init__(message)
+
+
+class InvalidResourceTypeNameError(ValueError):
+    """A resource type is a folder: it may not contain a path separator."""
+
+
+class InvalidResourceNameError(ValueError):
+    """A resource is a file: its name may not contain a path separator."""
+
+
+@dataclass(frozen=True, slots=True)
+class Resource:
+    """The text of one marker file and the prefix that holds it."""
+
+    text: str
+    prefix: str
+
+
+def search_prefixes(
+    extra: Iterable[str] = (), environment: Mapping[str, str] | None = None
+) -> tuple[str, ...]:
+    """``extra`` (made absolute), then the entries of ``AMENT_PREFIX_PATH``; those that exist, each once."""
+    variables = os.environ if environment is None else environment
+    listed = variables.get(PREFIX_VARIABLE, "").split(os.pathsep)
+    candidates = [*(os.path.abspath(os.path.expanduser(prefix)) for prefix in extra), *listed]
+    return tuple(dict.fromkeys(prefix for prefix in candidates if prefix and os.path.exists(prefix)))
+
+
+def package_prefix(package: str, prefixes: Sequence[str]) -> str:
+    """The first prefix in which ``package`` is installed.
+
+    Raises ``ValueError`` for what cannot be a package name, else ``PackageNotFoundError``.
+    """
+    if _PACKAGE_NAME.fullmatch(package) is None:
+        raise ValueError(f"'{package}' is not a valid package name")
+    prefix = find_resource("packages", package, prefixes)
+    if prefix is None:
+        raise PackageNotFoundError(package, prefixes)
+    return prefix
+
+
+def package_share_directory(package: str, prefixes: Sequence[str]) -> str:
+    """``<prefix>/share/<package>``, which need not exist. Raises as ``package_prefix``."""
+    return os.path.join(package_prefix(package, prefixes), "share", package)
+
+
+def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> str:
+    """The file ``<prefix>/lib/<package>/<executable>``.
+
+    ``executable`` with a slash is taken as a path, as upstream's ``which`` does. Raises as
+    ``package_prefix``, and ``ExecutableNotFoundError`` in the words of ``exec-in-pkg``.
+    """
+    prefix = package_prefix(package, prefixes)
+    folder = os.path.join(prefix, "lib", package)
+    if not os.path.exists(folder):
+        raise ExecutableNotFoundError(
+            f"package '{package}' found at '{prefix}', but libexec directory '{folder}' does not exist"
+        )
+    found = shutil.which(executable, path=folder)
+    if found is None:
+        raise ExecutableNotFoundError(
+            f"executable '{executable}' not found on the libexec directory '{folder}' "
+        )
+    return found
+
+
+def launch_file_path(package: str, file_name: str, prefixes: Sequence[str]) -> str:
+    """The one file with exactly this base name anywhere below the package's share directory.
+
+    Raises as ``package_prefix``; ``LaunchFileNotFoundError``; ``MultipleLaunchFilesError``.
+    """
+    share = package_share_directory(package, prefixes)
+    hits = sorted(
+        os.path.join(folder, file_name) for folder, _, files in os.walk(share) if file_name in files
+    )
+    if not hits:
+        raise LaunchFileNotFoundError(
+            f"file '{file_name}' was not found in the share directory of package '{package}' "
+            f"which is at '{share}'"
+        )
+    if len(hits) > 1:
+        listing = ", ".join(f"'{hit}'" for hit in hits)
+        raise MultipleLaunchFilesError(
+            f"file '{file_name}' was found more than once in the share directory of package '{package}': "
+            f"[{listing}]",
+            hits,
+        )
+    return hits[0]
+
+
+def find_resource(resource_type: str, name: str, prefixes: Sequence[str]) -> str | None:
+    """The first prefix that holds the resource, or ``None``. Raises for names with a path separator."""
+    _check_type(resource_type)
+    if not name or _has_separator(name):
+        raise InvalidResourceNameError(f"Resource name '{name}' is invalid")
+    for prefix in prefixes:
+        if os.path.isfile(os.path.join(prefix, INDEX_FOLDER, resource_type, name)):
+            return prefix
+    return None
+
+
+def read_resource(resource_type: str, name: str, prefixes: Sequence[str]) -> Resource:
+    """Text and prefix of a resource. Raises ``LookupError`` when no prefix has it."""
+    prefix = find_resource(resource_type, name, prefixes)
+    if prefix is None:
+        raise LookupError(
+            f"Could not find the resource '{name}' of type '{resource_type}', searching: {list(prefixes)}"
+        )
+    path = os.path.join(prefix, INDEX_FOLDER, resource_type, name)
+    try:
+        with open(path, encoding="utf-8") as file:
+            return Resource(file.read(), prefix)
+    except OSError as error:
+        raise OSError(f"Could not open the resource '{name}' of type '{resource_type}':\n{error}") from error
+
+
+def list_resources(resource_type: str, prefixes: Sequence[str]) -> dict[str, str]:
+    """Every resource of one type: name to the first prefix that holds it. Dot files do not count."""
+    _check_type(resource_type)
+    found: dict[str, str] = {}
+    for prefix in prefixes:
+        for entry in _entries(os.path.join(prefix, INDEX_FOLDER, resource_type)):
+            if not entry.is_dir() and not entry.name.startswith("."):
+                found.setdefault(entry.name, prefix)
+    return found
+
+
+def list_resource_types(prefixes: Sequence[str]) -> set[str]:
+    """Every resource type that some prefix knows."""
+    return {
+        entry.name
+        for prefix in prefixes
+        for entry in _entries(os.path.join(prefix, INDEX_FOLDER))
+        if entry.is_dir() and not entry.name.startswith(".")
+    }
+
+
+def _entries(folder: str) -> list[os.DirEntry[str]]:
+    try:
+        with os.scandir(folder) as entries:
+            return sorted(entries, key=lambda entry: entry.name)
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+
+
+def _check_type(resource_type: str) -> None:
+    if not resource_type or _has_separator(resource_type):
+        raise InvalidResourceTypeNameError(f"Resource type '{resource_type}' is invalid")
+
+
+def _has_separator(name: str) -> bool:
+    return "/" in name or "\\" in name
