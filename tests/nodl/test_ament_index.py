@@ -110,7 +110,8 @@ def test_names_never_leave_the_index(name: str, prefixes: tuple[str, str]) -> No
 
 def test_search_prefixes_puts_options_first_and_drops_what_is_not_there(tmp_path: Path) -> None:
     first, second = tmp_path / "first", tmp_path / "second"
-    first.mkdir(), second.mkdir()
+    first.mkdir()
+    second.mkdir()
     path = os.pathsep.join([str(second), str(tmp_path / "gone"), "", str(first)])
     found = ament_index.search_prefixes([str(first)], {"AMENT_PREFIX_PATH": path})
     assert found == (str(first), str(second))
