@@ -66,7 +66,10 @@ class NameTemplate:
         return "".join(part if isinstance(part, str) else "*" for part in self.parts)
 
     def __str__(self) -> str:
-        return "".join(
-            part if isinstance(part, str) else f"param:{part.name}" if isinstance(part, ParameterPart) else "?"
-            for part in self.parts
-        )
+        return "".join(_shown(part) for part in self.parts)
+
+
+def _shown(part: Part) -> str:
+    if isinstance(part, ParameterPart):
+        return f"param:{part.name}"
+    return part if isinstance(part, str) else "?"

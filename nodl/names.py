@@ -4,7 +4,8 @@ Pure text in, text out. Used by manifests (what may be written), by inference (w
 by policy derivation (what a name becomes once launch has decided node name and namespace).
 
 Rules from ros2/design articles/topic_and_service_names, rcl ``validate_topic_name.c`` and
-``expand_topic_name.c``, rmw ``validate_node_name.c``, ``validate_namespace.c``, ``validate_full_topic_name.c``.
+``expand_topic_name.c``, rmw ``validate_node_name.c``, ``validate_namespace.c`` and
+``validate_full_topic_name.c``.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _WILDCARDS = frozenset("*?[]")
 
 
 class InvalidNameError(ValueError):
-    """A name that rcl or rmw would refuse. ``position`` counts characters from 0, ``None`` for the whole name."""
+    """A name that rcl or rmw would refuse. ``position`` counts characters from 0, ``None``: the whole name."""
 
     def __init__(self, what: str, name: str, reason: str, position: int | None = None):
         self.what = what
@@ -49,7 +50,7 @@ def validate_node_name(name: str) -> None:
     _check_characters(what, name, allowed="")
     if name[0].isdigit():
         raise InvalidNameError(what, name, "must not start with a digit", 0)
-    raise InvalidNameError(what, name, f"is longer than {MAX_NODE_NAME_LENGTH} characters", MAX_NODE_NAME_LENGTH)
+    raise InvalidNameError(what, name, f"is longer than {MAX_NODE_NAME_LENGTH} characters")
 
 
 def validate_namespace(namespace: str) -> None:
@@ -59,7 +60,7 @@ def validate_namespace(namespace: str) -> None:
 
 
 def validate_full_name(name: str, what: str = "name") -> None:
-    """A fully qualified topic, service or action name, at most 247 characters. Raises ``InvalidNameError``."""
+    """A fully qualified topic, service or action name, <= 247 characters. Raises ``InvalidNameError``."""
     _check_absolute(what, name, MAX_NAME_LENGTH)
 
 
@@ -102,7 +103,8 @@ def validate_written_name(name: str, what: str = "name") -> None:
         raise InvalidNameError(what, name, "must not contain '//'", name.index("//"))
     unknown = [text for text in _SUBSTITUTION.findall(name) if text not in ("node", "ns", "namespace")]
     if unknown:
-        raise InvalidNameError(what, name, f"unknown substitution {{{unknown[0]}}}", name.index("{" + unknown[0]))
+        written = "{" + unknown[0] + "}"
+        raise InvalidNameError(what, name, f"unknown substitution {written}", name.index(written))
 
 
 def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> str:
@@ -162,7 +164,7 @@ def _check_absolute(what: str, name: str, maximum: int) -> None:
     _check_tokens(what, name)
     if "//" in name:
         raise InvalidNameError(what, name, "must not contain '//'", name.index("//"))
-    raise InvalidNameError(what, name, f"is longer than {maximum} characters", maximum)
+    raise InvalidNameError(what, name, f"is longer than {maximum} characters")
 
 
 def _check_characters(what: str, name: str, allowed: str) -> None:

@@ -1,0 +1,230 @@
+"""Remap rules as rcl reads and applies them: ``[NODE:]MATCH:=REPLACEMENT``.
+
+Text of rules in, resolved names out; pure. Launch passes rules on unchecked, so a bad rule is only
+noticed by the started process; ``parse_rule`` notices it before.
+
+Rules from ros2/rcl ``arguments.c`` and ``lexer.c`` (what parses), ``remap.c`` and
+``node_resolve_name.c`` (order and matching), and for action names rcl pull request 1170.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
+
+from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
+
+_TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"  # that it holds no "__" is checked apart
+_NAME = re.compile(rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*\Z")
+_PREFIX = re.compile(rf"({_TOKEN}):(?!//)")
+_NODE_NAME = re.compile(rf"{_TOKEN}\Z")
+_NAMESPACE = re.compile(rf"/\Z|(?:/{_TOKEN})+/?\Z")
+
+ACTION_SERVICES = ("send_goal", "cancel_goal", "get_result")
+ACTION_TOPICS = ("feedback", "status")
+
+
+class RemapKind(str, Enum):
+    """What a rule applies to; the value of a name rule is its written prefix."""
+
+    ANY_NAME = ""
+    TOPIC = "rostopic://"
+    SERVICE = "rosservice://"
+    NODE_NAME = "__node"
+    NAMESPACE = "__ns"
+
+
+class InvalidRemapRuleError(ValueError):
+    """A rule at which rcl's initialisation fails. ``rule`` is its text, ``origin`` where it was written."""
+
+    def __init__(self, rule: str, reason: str, origin: str = ""):
+        self.rule = rule
+        self.reason = reason
+        self.origin = origin
+        where = f"{origin}: " if origin else ""
+        super().__init__(f"{where}invalid remap rule {shown(rule)}: {reason}")
+
+
+@dataclass(frozen=True, slots=True)
+class ParsedRule:
+    """``node`` restricts the rule to nodes of that name; ``match`` is empty for ``__node`` and ``__ns``."""
+
+    kind: RemapKind
+    match: str
+    replacement: str
+    node: str | None = None
+    text: str = ""
+    origin: str = ""  # "file:line" or what else tells a reader where the rule was written
+
+    def __str__(self) -> str:
+        return f"{self.text} ({self.origin})" if self.origin else self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Resolved:
+    """A fully qualified name and the rules that led to it, in the order applied (mostly none or one)."""
+
+    name: str
+    rules: tuple[ParsedRule, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RemapRules:
+    """The rules one node obeys: its own (``local``, of a component's load request) before the process's.
+
+    Within each list the first match wins and nothing is applied to the result.
+    """
+
+    local: tuple[ParsedRule, ...] = ()
+    process: tuple[ParsedRule, ...] = ()
+    ordered: tuple[ParsedRule, ...] = field(init=False, repr=False, compare=False)
+    names: tuple[ParsedRule, ...] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        ordered = (*self.local, *self.process)
+        object.__setattr__(self, "ordered", ordered)
+        names = tuple(r for r in ordered if r.kind not in (RemapKind.NODE_NAME, RemapKind.NAMESPACE))
+        object.__setattr__(self, "names", names)
+
+    def node_name(self, original: str) -> Resolved:
+        """The name the node gets; ``NODE:`` compares with the original name."""
+        return self._first(RemapKind.NODE_NAME, original, original)
+
+    def namespace(self, original: str, node: str) -> Resolved:
+        """The namespace the node gets; ``NODE:`` compares with ``node``, its name after remapping."""
+        return self._first(RemapKind.NAMESPACE, node, original)
+
+    def _first(self, kind: RemapKind, node: str, original: str) -> Resolved:
+        for rule in self.ordered:
+            if rule.kind is kind and rule.node in (None, node):
+                return Resolved(rule.replacement, (rule,))
+        return Resolved(original)
+
+
+class NodeNames:
+    """Resolves names for one node under its final name and namespace.
+
+    The rules are expanded once, so that a node with many names costs one look-up per name.
+    Raises ``InvalidNameError`` from its methods for names that rcl would refuse.
+    """
+
+    def __init__(self, node: str, namespace: str, rules: RemapRules | None = None):
+        self.node = node
+        self.namespace = namespace
+        self._topics: dict[str, ParsedRule] = {}
+        self._services: dict[str, ParsedRule] = {}
+        for rule in rules.names if rules else ():
+            self._add(rule)
+
+    @property
+    def fqn(self) -> str:
+        return join(self.namespace, self.node)
+
+    def expand(self, name: str, what: str = "name") -> str:
+        """The fully qualified name before remapping."""
+        return expand_name(name, namespace=self.namespace, node=self.node, what=what)
+
+    def topic(self, name: str) -> Resolved:
+        return self._resolve(self.expand(name, "topic name"), self._topics)
+
+    def service(self, name: str) -> Resolved:
+        return self._resolve(self.expand(name, "service name"), self._services)
+
+    def action(self, name: str, *, as_a_whole: bool) -> Resolved:
+        """The action name; ``as_a_whole`` is true for the distributions that remap it (kilted and later).
+
+        rcl then looks it up among the topic rules. The five names below it are remapped once more,
+        each by itself: ``action_parts``.
+        """
+        expanded = self.expand(name, "action name")
+        return self._resolve(expanded, self._topics) if as_a_whole else Resolved(expanded)
+
+    def action_parts(self, action: str) -> ActionParts:
+        """The names that the three services and two topics of the expanded ``action`` really get."""
+        services = {part: self._part(action, part, self._services) for part in ACTION_SERVICES}
+        topics = {part: self._part(action, part, self._topics) for part in ACTION_TOPICS}
+        return ActionParts(services, topics)
+
+    def _part(self, action: str, part: str, rules: dict[str, ParsedRule]) -> Resolved:
+        name = f"{action}/_action/{part}"
+        if name in rules:
+            return self._resolve(name, rules)
+        validate_full_name(name, "action name")
+        return Resolved(name)
+
+    def _add(self, rule: ParsedRule) -> None:
+        if rule.node not in (None, self.node):
+            return
+        try:
+            match = self.expand(rule.match)
+        except InvalidNameError:
+            return  # rcl skips a rule whose match cannot be expanded
+        if rule.kind is not RemapKind.SERVICE:
+            self._topics.setdefault(match, rule)
+        if rule.kind is not RemapKind.TOPIC:
+            self._services.setdefault(match, rule)
+
+    def _resolve(self, expanded: str, rules: dict[str, ParsedRule]) -> Resolved:
+        rule = rules.get(expanded)
+        if rule is None:
+            return Resolved(expanded)
+        return Resolved(self.expand(rule.replacement), (rule,))
+
+
+@dataclass(frozen=True, slots=True)
+class ActionParts:
+    services: dict[str, Resolved]
+    topics: dict[str, Resolved]
+
+    @property
+    def remapped(self) -> bool:
+        return any(part.rules for part in (*self.services.values(), *self.topics.values()))
+
+
+def parse_rule(text: str, origin: str = "") -> ParsedRule:
+    """One rule as it follows ``-r``. Raises ``InvalidRemapRuleError`` for what rcl's lexer refuses."""
+    match, separator, replacement = text.partition(":=")
+    if not separator:
+        raise InvalidRemapRuleError(text, "must have the form FROM:=TO", origin)
+    node: str | None = None
+    prefix = _PREFIX.match(match)
+    if prefix and "__" not in prefix[1]:
+        node, match = prefix[1], match[prefix.end() :]
+    try:
+        return _rule_of_kind(match, replacement, node, text, origin)
+    except ValueError as error:
+        raise InvalidRemapRuleError(text, str(error), origin) from None
+
+
+def parse_rules(rules: Iterable[tuple[str, str]]) -> tuple[ParsedRule, ...]:
+    """Pairs of rule text and origin. Raises ``InvalidRemapRuleError`` for the first bad one."""
+    return tuple(parse_rule(text, origin) for text, origin in rules)
+
+
+def _rule_of_kind(match: str, replacement: str, node: str | None, text: str, origin: str) -> ParsedRule:
+    if match in ("__node", "__name"):
+        _check(_NODE_NAME, replacement, "the node name")
+        return ParsedRule(RemapKind.NODE_NAME, "", replacement, node, text, origin)
+    if match == "__ns":
+        _check(_NAMESPACE, replacement, "the namespace (it must be absolute)")
+        return ParsedRule(RemapKind.NAMESPACE, "", replacement, node, text, origin)
+    kind = RemapKind.ANY_NAME
+    for candidate in (RemapKind.TOPIC, RemapKind.SERVICE):
+        if match.startswith(candidate.value):
+            kind, match = candidate, match[len(candidate.value) :]
+    _check(_NAME, match, "the name to match")
+    _check(_NAME, replacement, "the replacement")
+    return ParsedRule(kind, match, replacement, node, text, origin)
+
+
+def _check(pattern: re.Pattern[str], value: str, what: str) -> None:
+    if not value:
+        raise ValueError(f"{what} is empty")
+    if "__" in value:
+        raise ValueError(f"{what} {shown(value)} contains '__', which rcl does not allow in rules")
+    if "*" in value or "\\" in value:
+        raise ValueError(f"{what} {shown(value)} uses a pattern, which rcl has not implemented")
+    if not pattern.match(value):
+        raise ValueError(f"{what} {shown(value)} is not a valid name")
