@@ -1,0 +1,74 @@
+"""All errors a user of the keystore can meet, cut by who must act.
+
+    KeystoreError
+    ├── InvalidEnclaveName      the author of a launch file, policy or command: a name that is no enclave name
+    ├── InvalidInput            the author of a YAML, policy, certificate or option value
+    ├── NotAKeystore            the caller: the path is something else
+    ├── UnsafeKeystore          the owner of the files: links, owners or modes that let others in
+    ├── DamagedKeystore         the operator: a file is missing, unreadable or not what it should be
+    ├── SigningUnavailable      the holder of the CA key: no key here, no passphrase, a token that refuses
+    ├── KeystoreBusy            another run holds the lock
+    └── StorageError            the system: disk full, read-only, no permission
+
+``str(error)`` is one message: what, where, what to do next. Key material, passphrases and PINs never
+enter a message. Errors of the operating system, cryptography, lxml and yaml are translated where they enter.
+"""
+
+from __future__ import annotations
+
+from os import PathLike
+
+
+class KeystoreError(Exception):
+    """Root of the tree. ``exit_status`` is what the command line returns."""
+
+    exit_status = 1
+
+
+class InvalidEnclaveName(KeystoreError, ValueError):
+    """``reason`` alone, for callers that know better where the name was written."""
+
+    exit_status = 2
+
+    def __init__(self, name: str, reason: str):
+        self.name = name
+        self.reason = reason
+        super().__init__(f"{printable(name)} is not an enclave name: {reason}")
+
+
+class InvalidInput(KeystoreError, ValueError):
+    exit_status = 2
+
+
+class NotAKeystore(KeystoreError):
+    pass
+
+
+class UnsafeKeystore(KeystoreError):
+    pass
+
+
+class DamagedKeystore(KeystoreError):
+    pass
+
+
+class SigningUnavailable(KeystoreError):
+    pass
+
+
+class KeystoreBusy(KeystoreError):
+    exit_status = 75  # EX_TEMPFAIL of sysexits.h: trying again may help
+
+
+class StorageError(KeystoreError):
+    @classmethod
+    def of(cls, error: OSError, doing: str) -> StorageError:
+        """The translation of an operating-system error; ``doing`` is a phrase such as ``writing the keystore``."""
+        place = f" {printable(str(error.filename))}" if error.filename else ""
+        return cls(f"{doing}{place}: {error.strerror or error}; nothing visible was left half-written, run it again")
+
+
+def printable(text: str | PathLike[str]) -> str:
+    """``text`` quoted for a terminal: names from outside may hold escape sequences."""
+    shown = str(text)
+    return f"'{shown}'" if shown.isprintable() and "'" not in shown else ascii(shown)

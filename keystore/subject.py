@@ -1,0 +1,79 @@
+"""Enclave name -> subject of its certificate and grant, and the lint for subjects that can be borrowed. Pure.
+
+Cyclone DDS compares subjects as bags: it cuts both names at ``, / |``, and a grant fits an identity when every
+piece of the identity occurs in the grant (access_control_utils.c, unchanged on master). With SROS2's
+``CN=/talker`` the identity ``/talker`` may therefore use the permissions of ``/robot/talker``, and ``/`` those
+of everyone. Our common names contain none of these separators, so a subject is a single piece and fits only itself.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections.abc import Iterable, Mapping
+from enum import Enum
+
+# X.520 ub-common-name; cryptography >= 43 enforces it.
+MAX_COMMON_NAME = 64
+_SEPARATORS = re.compile(r"[,/|]")
+
+
+class SubjectScheme(str, Enum):
+    """How the common name is made from the enclave name."""
+
+    EXACT = "exact"  # ros.front.camera: fits one grant only
+    COMPATIBLE = "compatible"  # /front/camera: as SROS2, needed by `ros2 security create_permission`
+
+
+def common_name(enclave: str, scheme: SubjectScheme = SubjectScheme.EXACT) -> str:
+    """The CN of a valid enclave name, at most 64 characters, different for different names.
+
+    ``/front/camera`` becomes ``ros.front.camera``, the root ``ros``. Longer names become ``ros-`` + 160 bits
+    of SHA-256 + ``-`` + their last characters; ``-`` cannot occur in a plain form, so the two never meet.
+    """
+    if scheme is SubjectScheme.COMPATIBLE:
+        return enclave if len(enclave) <= MAX_COMMON_NAME else _short(enclave)
+    plain = "ros" if enclave == "/" else "ros" + enclave.replace("/", ".")
+    return plain if len(plain) <= MAX_COMMON_NAME else _short(enclave)
+
+
+def _short(enclave: str) -> str:
+    head = f"ros-{hashlib.sha256(enclave.encode()).hexdigest()[:40]}-"
+    return head + enclave.replace("/", ".")[-(MAX_COMMON_NAME - len(head)) :].lstrip(".")
+
+
+def subject_name(cn: str) -> str:
+    """``subject_name`` of a grant for this common name: both implementations match exactly this form."""
+    return f"CN={cn}"
+
+
+def scheme_of(cn: str) -> SubjectScheme:
+    return SubjectScheme.COMPATIBLE if cn.startswith("/") else SubjectScheme.EXACT
+
+
+def pieces(cn: str) -> frozenset[tuple[str, str]]:
+    """The bag Cyclone compares: pieces between separators, each cut at its first ``=``."""
+    cut = (piece.partition("=") for piece in _SEPARATORS.split(subject_name(cn)))
+    return frozenset((key, value) for key, _, value in cut)
+
+
+def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Pairs (borrower, lender) of enclaves whose CNs let Cyclone accept the lender's grant for the borrower.
+
+    ``names`` maps enclave to common name. Sorted; empty for any set of names of the exact scheme.
+    """
+    bags = {enclave: pieces(cn) for enclave, cn in names.items()}
+    open_ones = {enclave: bag for enclave, bag in bags.items() if len(bag) > 1}
+    by_bag: dict[frozenset[tuple[str, str]], list[str]] = {}
+    for enclave, bag in bags.items():
+        by_bag.setdefault(bag, []).append(enclave)
+    pairs = {(a, b) for group in by_bag.values() for a in group for b in group if a != b}
+    pairs |= {(a, b) for a, bag in open_ones.items() for b, other in open_ones.items() if a != b and bag <= other}
+    return sorted(pairs)
+
+
+def cannot_be_told_apart(pairs: Iterable[tuple[str, str]], limit: int = 3) -> str:
+    """One sentence naming the first few pairs."""
+    listed = list(pairs)
+    shown = ", ".join(f"{a} could use the permissions of {b}" for a, b in listed[:limit])
+    return shown + (f" and {len(listed) - limit} more pairs" if len(listed) > limit else "")

@@ -1,0 +1,107 @@
+"""From when until when a certificate and its permissions hold: one value for both. Pure.
+
+The DDS implementations disagree about permissions dates: Cyclone DDS reads UTC, Fast DDS the local time of the
+process, in every release inspected. Hence the back-dating floor of 14 hours (the most easterly offset), and no
+promise of an expiry more precise than that on Fast DDS.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from datetime import datetime, timedelta, timezone
+
+from keystore.errors import InvalidInput, printable
+
+# Clocks behind ours, and Connext 5.3.1, make SROS2 back-date by a day; Fast DDS needs at least 14 h.
+DEFAULT_BACKDATE = timedelta(days=1)
+MIN_BACKDATE = timedelta(hours=14)
+DEFAULT_LIFETIME = timedelta(days=3650)
+# Cyclone DDS counts nanoseconds in 64 bits (until 2262-04-11) and refuses later dates as expired.
+LATEST = datetime(2262, 4, 11, tzinfo=timezone.utc)
+
+_UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
+_DURATION = re.compile(r"(?:(\d{1,6})([smhdwy]))\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Validity:
+    """Both ends in UTC, whole seconds (X.509 has no fractions), ``not_after`` capped to 2262-04-11."""
+
+    not_before: datetime
+    not_after: datetime
+
+    def __post_init__(self) -> None:
+        for name in ("not_before", "not_after"):
+            moment: datetime = getattr(self, name)
+            if moment.tzinfo is None:
+                raise ValueError(f"{name} needs a time zone")
+            object.__setattr__(self, name, min(moment.astimezone(timezone.utc).replace(microsecond=0), LATEST))
+        if self.not_after <= self.not_before:
+            raise InvalidInput(f"the validity ends ({iso(self.not_after)}) before it begins ({iso(self.not_before)})")
+
+    @classmethod
+    def starting(
+        cls,
+        now: datetime,
+        lifetime: timedelta = DEFAULT_LIFETIME,
+        *,
+        until: datetime | None = None,
+        backdate: timedelta = DEFAULT_BACKDATE,
+    ) -> Validity:
+        """Valid from ``now`` minus ``backdate`` for ``lifetime``, or to the absolute date ``until``.
+
+        Raises InvalidInput when ``until`` is past or ``backdate`` is under 14 hours.
+        """
+        if backdate < MIN_BACKDATE:
+            raise InvalidInput("back-dating under 14 h makes Fast DDS start late west of UTC; use 14h or more")
+        end = until if until is not None else _add(now, lifetime)
+        if end <= now:
+            raise InvalidInput(f"the validity would already have ended ({iso(end)})")
+        return cls(now - backdate, end)
+
+    def within(self, outer: Validity) -> Validity:
+        """Cut to what the issuer itself can promise: no leaf outlives its CA."""
+        return Validity(max(self.not_before, outer.not_before), min(self.not_after, outer.not_after))
+
+    def covers(self, now: datetime) -> bool:
+        return self.not_before <= now <= self.not_after
+
+
+def _add(now: datetime, lifetime: timedelta) -> datetime:
+    try:
+        return now + lifetime
+    except OverflowError:
+        return LATEST
+
+
+def parse_duration(text: str) -> timedelta:
+    """``90d``, ``12h``, ``10y`` (a year is 365 days), ``45m``, ``30s``, ``2w``; raises InvalidInput."""
+    match = _DURATION.match(text.strip())
+    if not match:
+        raise InvalidInput(f"{printable(text)} is not a duration; write for example 90d, 12h or 10y")
+    count, unit = int(match[1]), match[2]
+    return timedelta(days=365 * count) if unit == "y" else timedelta(**{_UNITS[unit]: count})
+
+
+def parse_moment(text: str) -> datetime:
+    """An ISO date or date-time; without a zone it is UTC, a bare date is its first second. Raises InvalidInput."""
+    try:
+        moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
+    except ValueError:
+        raise InvalidInput(f"{printable(text)} is not an ISO date; write for example 2030-12-31") from None
+    return moment if moment.tzinfo else moment.replace(tzinfo=timezone.utc)
+
+
+def parse_end(text: str, now: datetime) -> datetime:
+    """``--valid-for``: a duration from now or an ISO date."""
+    return _add(now, parse_duration(text)) if _DURATION.match(text.strip()) else parse_moment(text)
+
+
+def utc_now() -> datetime:
+    return datetime.now(timezone.utc).replace(microsecond=0)
+
+
+def iso(moment: datetime) -> str:
+    """``2030-12-31T00:00:00Z``, for reports."""
+    return moment.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
