@@ -9,6 +9,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
+from keystore.errors import InvalidInput
+
+
+class PolicyError(InvalidInput):
+    """A policy, or a name in one, that must not become permissions. The text says what and where."""
+
 
 class Operation(str, Enum):
     """What a rule is about; the value is the attribute of the policy XML."""

@@ -1,0 +1,85 @@
+"""ROS domain ids that governance and permissions apply to.
+
+Written as single ids or full ranges within 0..230: Cyclone DDS crashes on a range without ``min`` and
+refuses a document that names an id above 230 (measured on 0.10.2).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from keystore.errors import InvalidInput, printable
+
+LOWEST_ID = 0
+HIGHEST_ID = 230
+_PART = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Domains:
+    """``ranges``: pairs (first, last), both included, sorted, neither touching nor overlapping."""
+
+    ranges: tuple[tuple[int, int], ...]
+
+    def __post_init__(self) -> None:
+        if not self.ranges:
+            raise InvalidInput("at least one ROS domain id is needed")
+        for first, last in self.ranges:
+            if not LOWEST_ID <= first <= last <= HIGHEST_ID:
+                raise InvalidInput(
+                    f"domain ids {_text(first, last)} are no range within {LOWEST_ID}..{HIGHEST_ID}"
+                )
+        object.__setattr__(self, "ranges", tuple(_merged(self.ranges)))
+
+    @classmethod
+    def single(cls, domain_id: int) -> Domains:
+        return cls(((domain_id, domain_id),))
+
+    @classmethod
+    def every(cls) -> Domains:
+        return cls(((LOWEST_ID, HIGHEST_ID),))
+
+    @classmethod
+    def parse(cls, text: str) -> Domains:
+        """``0``, ``0-10``, ``0,5,7-9`` or ``all``. Raises ``InvalidInput``."""
+        if text.strip() == "all":
+            return cls.every()
+        ranges = []
+        for part in text.split(","):
+            match = _PART.match(part.strip())
+            if match is None:
+                raise InvalidInput(f"{printable(text)} are no domain ids; write for example 0, 0-10 or 0,5,7-9")
+            ranges.append((int(match[1]), int(match[2] or match[1])))
+        return cls(tuple(ranges))
+
+    def __contains__(self, domain_id: int) -> bool:
+        return any(first <= domain_id <= last for first, last in self.ranges)
+
+    def __str__(self) -> str:
+        return ",".join(_text(first, last) for first, last in self.ranges)
+
+    def xml(self) -> str:
+        """The ``domains`` element of governance and permissions, one line, no blanks in leaves."""
+        return f"<domains>{''.join(_element(first, last) for first, last in self.ranges)}</domains>"
+
+
+def _element(first: int, last: int) -> str:
+    if first == last:
+        return f"<id>{first}</id>"
+    return f"<id_range><min>{first}</min><max>{last}</max></id_range>"
+
+
+def _text(first: int, last: int) -> str:
+    return str(first) if first == last else f"{first}-{last}"
+
+
+def _merged(ranges: Iterable[tuple[int, int]]) -> list[tuple[int, int]]:
+    merged: list[tuple[int, int]] = []
+    for first, last in sorted(ranges):
+        if merged and first <= merged[-1][1] + 1:
+            merged[-1] = (merged[-1][0], max(last, merged[-1][1]))
+        else:
+            merged.append((first, last))
+    return merged
