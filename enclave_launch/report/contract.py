@@ -1,0 +1,76 @@
+"""The dry run's JSON as pydantic models: the versioned contract with other programs.
+
+``secure-launch --dry-run --format json`` prints a document that ``DryRun`` validates; ``report.plan_json``
+writes it without importing this module (pydantic costs more start-up time than the whole dry run), and the
+tests hold both together. Read a document with ``DryRun.model_validate_json(text)``.
+
+Within one ``version`` fields are only ever added; a removed or changed field raises the number.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+JsonScalar = bool | int | float | str
+JsonParameter = JsonScalar | list[JsonScalar]
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class Process(_Strict):
+    """One process, in launch order."""
+
+    package: str | None = Field(description="null for executable actions and nodes given without a package")
+    executable: str = Field(description="executable name; the first word of an executable action")
+    namespace: str | None = Field(description="as launch shows it; null for executable actions")
+    name: str | None = Field(description="node name, the manifest's where launch gives none; null for executables")
+    fqn: str | None
+    cmd: list[str] = Field(description="what would be executed; holds --enclave only under --secure")
+    remaps: list[tuple[str, str]] = Field(description="from, to; global rules before the node's own")
+    parameters: dict[str, JsonParameter] = Field(description="as the node will see them")
+    enclave: str | None
+    environment: dict[str, str] = Field(description="variables added or changed, values as the process sees them")
+    launch_file: str
+    line: int = Field(description="line of the element, 0 when not known")
+    on_event: str | None = Field(description="the event that would start it; null when the launch itself does")
+
+
+class Component(_Strict):
+    """One composable node, in launch order."""
+
+    container: str
+    package: str
+    plugin: str
+    fqn: str
+    remaps: list[tuple[str, str]]
+    parameters: dict[str, JsonParameter]
+    enclave: str | None = Field(description="the container's; null when the container is not part of this launch")
+    launch_file: str
+    line: int
+    on_event: str | None
+
+
+class Enclave(_Strict):
+    """What one enclave may do: final names, sorted."""
+
+    nodes: list[str]
+    publish: list[str]
+    subscribe: list[str]
+    call_services: list[str]
+    serve_services: list[str]
+    call_actions: list[str]
+    serve_actions: list[str]
+
+
+class DryRun(_Strict):
+    """The whole document."""
+
+    version: Literal[1]
+    processes: list[Process]
+    components: list[Component]
+    enclaves: dict[str, Enclave]
+    warnings: list[str]

@@ -1,0 +1,1 @@
+"""Command lines: arguments, one call of the library, an exit status."""

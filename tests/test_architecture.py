@@ -1,0 +1,81 @@
+"""The rules of ARCHITECTURE.md that a program can check."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ("enclave_launch", "nodl", "keystore")
+
+# Which of our packages a package may import; arrows point one way.
+ALLOWED = {"enclave_launch": {"nodl", "keystore"}, "nodl": set(), "keystore": set()}
+
+# Stages of the flow that decide only: they may not import what acts.
+PURE = {
+    "enclave_launch/enclave": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
+    "enclave_launch/policy": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
+    "enclave_launch/report": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
+}
+
+
+def imports_of(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module
+
+
+def sources(folder: str) -> list[Path]:
+    return sorted((ROOT / folder).rglob("*.py"))
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_arrows_between_the_packages_point_one_way(package: str) -> None:
+    forbidden = set(PACKAGES) - {package} - ALLOWED[package]
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in sources(package)
+        for name in imports_of(path)
+        if name.split(".")[0] in forbidden
+    ]
+    assert wrong == []
+
+
+@pytest.mark.parametrize("folder", sorted(PURE))
+def test_deciding_stages_do_not_import_what_acts(folder: str) -> None:
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in sources(folder)
+        for name in imports_of(path)
+        if name.startswith(PURE[folder])
+    ]
+    assert wrong == []
+
+
+def modules_loaded_by(arguments: list[str]) -> set[str]:
+    """What a whole run of ``secure-launch`` imports."""
+    code = (
+        "import sys\n"
+        "from enclave_launch.verb.secure_launch import main\n"
+        f"status = main({arguments!r})\n"
+        "print('\\n'.join(sys.modules), file=sys.stderr)\n"
+        "sys.exit(status)\n"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    return set(run.stderr.split())
+
+
+@pytest.mark.parametrize("form", ["tree", "json"])
+def test_a_dry_run_imports_only_what_its_path_needs(form: str) -> None:
+    loaded = modules_loaded_by(
+        ["--dry-run", "--format", form, "--prefix", "fixtures/demo_ws", "demo_nodes", "talker_listener.launch.xml"]
+    )
+    assert {"lxml.etree", "enclave_launch.plan"} <= loaded
+    assert loaded.isdisjoint({"cryptography", "pydantic", "asyncio", "yaml", "cyclonedds", "tree_sitter"})
