@@ -50,7 +50,7 @@ class Domains:
         for part in text.split(","):
             match = _PART.match(part.strip())
             if match is None:
-                raise InvalidInput(f"{printable(text)} are no domain ids; write for example 0, 0-10 or 0,5,7-9")
+                raise InvalidInput(f"{printable(text)} are no domain ids; write 0, 0-10 or 0,5,7-9")
             ranges.append((int(match[1]), int(match[2] or match[1])))
         return cls(tuple(ranges))
 

@@ -7,18 +7,14 @@ signed content as bytes; the signature is not its business. Touches no files but
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from keystore.errors import InvalidInput
 from keystore.permissions_names import ros_rules
 from keystore.policy import Qualifier, Rule
+from keystore.safe_xml import check_schema, parse_xml
 
 if TYPE_CHECKING:
     from lxml import etree
-
-MAX_BYTES = 4_000_000
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +29,7 @@ class DdsRule:
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """``not_before`` and ``not_after`` as written: what zone they are in depends on the DDS implementation."""
+    """``not_before`` and ``not_after`` as written; their zone depends on the DDS implementation."""
 
     name: str
     subject_name: str
@@ -65,32 +61,9 @@ def parse_permissions(document: bytes, where: str = "permissions.xml") -> tuple[
 
 def check_permissions_schema(document: bytes, where: str = "permissions.xml") -> etree._Element:
     """Parse and compare with the bundled schema. Raises ``InvalidInput`` with file:line."""
-    from lxml import etree
-
-    if len(document) > MAX_BYTES:
-        raise InvalidInput(f"{where}: larger than {MAX_BYTES} bytes")
-    parser = etree.XMLParser(
-        resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False, remove_comments=True, remove_pis=True
-    )
-    try:
-        root = etree.fromstring(document, parser)
-    except etree.XMLSyntaxError as error:
-        raise InvalidInput(f"{where}:{error.lineno}: not well-formed XML: {error.msg}") from None
-    if root.getroottree().docinfo.doctype:
-        raise InvalidInput(f"{where}: a DOCTYPE is not allowed")
-    schema = _schema()
-    if not schema.validate(root):
-        problem = schema.error_log[0]
-        raise InvalidInput(f"{where}:{problem.line}: not valid DDS permissions: {problem.message}")
+    root = parse_xml(document, where)
+    check_schema(root, "permissions.xsd", where, "DDS permissions document")
     return root
-
-
-@cache
-def _schema() -> etree.XMLSchema:
-    from lxml import etree
-
-    text = files("keystore").joinpath("schemas", "permissions.xsd").read_bytes()
-    return etree.XMLSchema(etree.fromstring(text))
 
 
 def _grant(element: etree._Element) -> Grant:
