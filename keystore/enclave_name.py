@@ -13,7 +13,7 @@ from keystore.errors import InvalidEnclaveName, printable
 
 # RMW_TOPIC_MAX_NAME_LENGTH (247) minus two, where SROS2's namespace check stops; rcl itself allows 255.
 MAX_LENGTH = 245
-# Cyclone DDS cuts subject names into at most 20 pieces, the first being the CN's own (access_control_utils.c).
+# Cyclone DDS cuts subject names into at most 20 pieces, the CN's own first (access_control_utils.c).
 MAX_SEGMENTS = 19
 
 _SEGMENT = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
@@ -32,7 +32,8 @@ def validate_enclave_name(name: str) -> str:
     if not _ENCLAVE.match(name):
         raise InvalidEnclaveName(name, _what_is_wrong(name))
     if name.count("/") > MAX_SEGMENTS:
-        raise InvalidEnclaveName(name, f"it has {name.count('/')} segments, Cyclone DDS carries at most {MAX_SEGMENTS}")
+        count = name.count("/")
+        raise InvalidEnclaveName(name, f"it has {count} segments, Cyclone DDS carries at most {MAX_SEGMENTS}")
     return name
 
 

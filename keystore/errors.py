@@ -63,9 +63,10 @@ class KeystoreBusy(KeystoreError):
 class StorageError(KeystoreError):
     @classmethod
     def of(cls, error: OSError, doing: str) -> StorageError:
-        """The translation of an operating-system error; ``doing`` is a phrase such as ``writing the keystore``."""
+        """The translation of a system error; ``doing`` is a phrase such as ``writing the keystore``."""
         place = f" {printable(str(error.filename))}" if error.filename else ""
-        return cls(f"{doing}{place}: {error.strerror or error}; nothing visible was left half-written, run it again")
+        reason = error.strerror or error
+        return cls(f"{doing}{place}: {reason}; nothing visible was left half-written, run it again")
 
 
 def printable(text: str | PathLike[str]) -> str:

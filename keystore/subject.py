@@ -1,9 +1,9 @@
-"""Enclave name -> subject of its certificate and grant, and the lint for subjects that can be borrowed. Pure.
+"""Enclave name -> subject of its certificate and grant, and the lint for borrowable subjects. Pure.
 
-Cyclone DDS compares subjects as bags: it cuts both names at ``, / |``, and a grant fits an identity when every
-piece of the identity occurs in the grant (access_control_utils.c, unchanged on master). With SROS2's
-``CN=/talker`` the identity ``/talker`` may therefore use the permissions of ``/robot/talker``, and ``/`` those
-of everyone. Our common names contain none of these separators, so a subject is a single piece and fits only itself.
+Cyclone DDS compares subjects as bags: it cuts both names at ``, / |``, and a grant fits an identity when
+every piece of the identity occurs in the grant (access_control_utils.c, unchanged on master). With SROS2's
+``CN=/talker`` the identity ``/talker`` may therefore use the permissions of ``/robot/talker``, and ``/``
+those of everyone. Our common names contain none of these separators: each is one piece and fits only itself.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
     for enclave, bag in bags.items():
         by_bag.setdefault(bag, []).append(enclave)
     pairs = {(a, b) for group in by_bag.values() for a in group for b in group if a != b}
-    pairs |= {(a, b) for a, bag in open_ones.items() for b, other in open_ones.items() if a != b and bag <= other}
+    pairs |= {(a, b) for a, bag in open_ones.items() for b, lent in open_ones.items() if a != b and bag <= lent}
     return sorted(pairs)
 
 

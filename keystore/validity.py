@@ -1,8 +1,8 @@
 """From when until when a certificate and its permissions hold: one value for both. Pure.
 
-The DDS implementations disagree about permissions dates: Cyclone DDS reads UTC, Fast DDS the local time of the
-process, in every release inspected. Hence the back-dating floor of 14 hours (the most easterly offset), and no
-promise of an expiry more precise than that on Fast DDS.
+The DDS implementations disagree about permissions dates: Cyclone DDS reads UTC, Fast DDS the local time of
+the process, in every release inspected. Hence the back-dating floor of 14 hours (the most easterly offset),
+and no promise of an expiry more precise than that on Fast DDS.
 """
 
 from __future__ import annotations
@@ -36,9 +36,10 @@ class Validity:
             moment: datetime = getattr(self, name)
             if moment.tzinfo is None:
                 raise ValueError(f"{name} needs a time zone")
-            object.__setattr__(self, name, min(moment.astimezone(timezone.utc).replace(microsecond=0), LATEST))
+            whole = moment.astimezone(timezone.utc).replace(microsecond=0)
+            object.__setattr__(self, name, min(whole, LATEST))
         if self.not_after <= self.not_before:
-            raise InvalidInput(f"the validity ends ({iso(self.not_after)}) before it begins ({iso(self.not_before)})")
+            raise InvalidInput(f"a validity ends ({iso(self.not_after)}) before it begins ({iso(self.not_before)})")
 
     @classmethod
     def starting(
@@ -54,7 +55,7 @@ class Validity:
         Raises InvalidInput when ``until`` is past or ``backdate`` is under 14 hours.
         """
         if backdate < MIN_BACKDATE:
-            raise InvalidInput("back-dating under 14 h makes Fast DDS start late west of UTC; use 14h or more")
+            raise InvalidInput("back-dating under 14 h makes Fast DDS start late west of UTC; use more")
         end = until if until is not None else _add(now, lifetime)
         if end <= now:
             raise InvalidInput(f"the validity would already have ended ({iso(end)})")
@@ -85,7 +86,7 @@ def parse_duration(text: str) -> timedelta:
 
 
 def parse_moment(text: str) -> datetime:
-    """An ISO date or date-time; without a zone it is UTC, a bare date is its first second. Raises InvalidInput."""
+    """An ISO date or date-time; without a zone it is UTC, a bare date is its first second; InvalidInput."""
     try:
         moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
     except ValueError:

@@ -1,0 +1,136 @@
+"""What the keystore wants to know about a certificate, read without ``cryptography``. Pure.
+
+Nothing here proves anything: signatures are checked by ``keystore.verify``. These facts serve status, the
+warm path of a launch, and finding out which subject an enclave already has.
+"""
+
+from __future__ import annotations
+
+import binascii
+from dataclasses import dataclass, field
+
+from keystore import der
+from keystore.validity import Validity
+
+_COMMON_NAME = der.object_identifier("2.5.4.3")
+_SUBJECT_KEY_ID = der.object_identifier("2.5.29.14")
+_AUTHORITY_KEY_ID = der.object_identifier("2.5.29.35")
+_EXTENDED_KEY_USAGE = der.object_identifier("2.5.29.37")
+_KEY_USAGE = der.object_identifier("2.5.29.15")
+_EMAIL_PROTECTION = der.object_identifier("1.3.6.1.5.5.7.3.4")
+_ANY_USAGE = der.object_identifier("2.5.29.37.0")
+_EXTENSIONS = 0xA3
+_BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
+
+
+@dataclass(frozen=True, slots=True)
+class CertificateFacts:
+    """``issuer``, ``subject`` and ``public_key`` are DER; key identifiers are None where absent."""
+
+    der: bytes = field(repr=False)
+    serial: int
+    issuer: bytes = field(repr=False)
+    subject: bytes = field(repr=False)
+    common_name: str | None
+    name_parts: int
+    validity: Validity
+    public_key: bytes = field(repr=False)
+    subject_key_id: bytes | None = field(repr=False)
+    authority_key_id: bytes | None = field(repr=False)
+    can_sign_mail: bool
+    """Whether OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
+
+    def names_issuer(self, ca: CertificateFacts) -> bool:
+        """Whether this certificate says that ``ca`` issued it (names and, where present, key identifiers)."""
+        if self.issuer != ca.subject:
+            return False
+        both = self.authority_key_id and ca.subject_key_id
+        return not both or self.authority_key_id == ca.subject_key_id
+
+
+def pem_blocks(pem: bytes) -> list[bytes]:
+    """DER of each certificate in a PEM file; text around the blocks is skipped. Raises DerError."""
+    found = []
+    for part in pem.split(_BEGIN)[1:]:
+        body, end, _ = part.partition(_END)
+        if not end:
+            raise der.DerError("a PEM block without its end line")
+        try:
+            found.append(binascii.a2b_base64(body))
+        except binascii.Error as error:
+            raise der.DerError("a PEM block that is not base64") from error
+    return found
+
+
+def read_pem(pem: bytes) -> CertificateFacts:
+    """Facts of the first certificate of a PEM file, as Cyclone DDS reads it. Raises DerError."""
+    blocks = pem_blocks(pem)
+    if not blocks:
+        raise der.DerError("no PEM certificate in it")
+    return read_der(blocks[0])
+
+
+def read_der(data: bytes) -> CertificateFacts:
+    """Raises DerError when ``data`` is no X.509 v3 certificate."""
+    try:
+        return _read(data)
+    except (IndexError, ValueError) as error:
+        raise error if isinstance(error, der.DerError) else der.DerError(str(error)) from error
+
+
+def _read(data: bytes) -> CertificateFacts:
+    fields = der.parse(data).expect(der.SEQUENCE).children()[0].children()
+    _, serial, _, issuer, validity, subject, public_key, *rest = fields
+    not_before, not_after = (der.time_value(moment) for moment in validity.children())
+    extensions = _extensions(rest)
+    names = [part for group in subject.children() for part in group.children()]
+    return CertificateFacts(
+        der=data,
+        serial=int.from_bytes(serial.content, "big"),
+        issuer=issuer.whole,
+        subject=subject.whole,
+        common_name=_common_name(names),
+        name_parts=len(names),
+        validity=Validity(not_before, not_after),
+        public_key=public_key.whole,
+        subject_key_id=_key_id(extensions.get(_SUBJECT_KEY_ID)),
+        authority_key_id=_authority(extensions.get(_AUTHORITY_KEY_ID)),
+        can_sign_mail=_can_sign_mail(extensions),
+    )
+
+
+def _extensions(rest: list[der.Element]) -> dict[bytes, bytes]:
+    """OID -> content of the extension's OCTET STRING."""
+    holder = next((part for part in rest if part.tag == _EXTENSIONS), None)
+    if holder is None:
+        return {}
+    entries = (entry.children() for entry in holder.children()[0].children())
+    return {entry[0].whole: entry[-1].content for entry in entries}
+
+
+def _common_name(names: list[der.Element]) -> str | None:
+    values = [name.children() for name in names]
+    found = [value.content.decode("utf-8", "replace") for oid, value in values if oid.whole == _COMMON_NAME]
+    return found[0] if len(found) == 1 else None
+
+
+def _key_id(extension: bytes | None) -> bytes | None:
+    return der.parse(extension).content if extension else None
+
+
+def _authority(extension: bytes | None) -> bytes | None:
+    """The keyIdentifier [0] of AuthorityKeyIdentifier."""
+    parts = der.parse(extension).children() if extension else []
+    return next((part.content for part in parts if part.tag == 0x80), None)
+
+
+def _can_sign_mail(extensions: dict[bytes, bytes]) -> bool:
+    """OpenSSL's S/MIME signing purpose: EKU absent or emailProtection, KU absent or a signature bit."""
+    usages = extensions.get(_EXTENDED_KEY_USAGE)
+    if usages is not None:
+        allowed = {usage.whole for usage in der.parse(usages).children()}
+        if not allowed & {_EMAIL_PROTECTION, _ANY_USAGE}:
+            return False
+    bits = extensions.get(_KEY_USAGE)
+    # digitalSignature and nonRepudiation are the two highest bits of the first byte.
+    return bits is None or bool(der.parse(bits).content[1] & 0xC0)

@@ -1,0 +1,126 @@
+"""The little DER that certificates and S/MIME need, read and written in plain Python. Pure.
+
+Why not a library: the warm path of a launch must look into certificates without importing ``cryptography``,
+and its PKCS#7 writer cannot sign with a key that lives in a token. Only definite lengths and single-byte tags
+are accepted, which is all X.509 and CMS use (ITU-T X.690 section 10).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime, timezone
+from typing import NamedTuple
+
+SEQUENCE, SET = 0x30, 0x31
+INTEGER, BIT_STRING, OCTET_STRING, NULL, OID = 0x02, 0x03, 0x04, 0x05, 0x06
+UTC_TIME, GENERALIZED_TIME = 0x17, 0x18
+BOOLEAN = 0x01
+
+
+class DerError(ValueError):
+    """The bytes are not the DER they should be; callers translate it to an error with a place."""
+
+
+class Element(NamedTuple):
+    """One value inside ``data``: its tag, where it starts, where its content starts and ends."""
+
+    data: bytes
+    tag: int
+    start: int
+    body: int
+    end: int
+
+    @property
+    def content(self) -> bytes:
+        return self.data[self.body : self.end]
+
+    @property
+    def whole(self) -> bytes:
+        return self.data[self.start : self.end]
+
+    def children(self) -> list[Element]:
+        return list(_elements(self.data, self.body, self.end))
+
+    def expect(self, tag: int) -> Element:
+        if self.tag != tag:
+            raise DerError(f"expected tag {tag:#04x}, found {self.tag:#04x}")
+        return self
+
+
+def parse(data: bytes) -> Element:
+    """The single value that ``data`` consists of; raises DerError."""
+    found = list(_elements(data, 0, len(data)))
+    if len(found) != 1:
+        raise DerError("expected one value")
+    return found[0]
+
+
+def _elements(data: bytes, at: int, end: int) -> Iterator[Element]:
+    while at < end:
+        element = _element(data, at, end)
+        yield element
+        at = element.end
+
+
+def _element(data: bytes, at: int, limit: int) -> Element:
+    if at + 2 > limit:
+        raise DerError("cut short")
+    length, body = data[at + 1], at + 2
+    if length >= 0x80:
+        width = length & 0x7F
+        if not 1 <= width <= 4 or body + width > limit:
+            raise DerError("unsupported length")
+        length, body = int.from_bytes(data[body : body + width], "big"), body + width
+    if body + length > limit:
+        raise DerError("cut short")
+    return Element(data, data[at], at, body, body + length)
+
+
+def encode(tag: int, *parts: bytes) -> bytes:
+    content = b"".join(parts)
+    size = len(content)
+    if size < 0x80:
+        return bytes((tag, size)) + content
+    width = (size.bit_length() + 7) // 8
+    return bytes((tag, 0x80 | width)) + size.to_bytes(width, "big") + content
+
+
+def integer(value: int) -> bytes:
+    """A non-negative INTEGER."""
+    return encode(INTEGER, value.to_bytes(value.bit_length() // 8 + 1, "big"))
+
+
+def object_identifier(dotted: str) -> bytes:
+    first, second, *rest = (int(part) for part in dotted.split("."))
+    return encode(OID, b"".join(_base128(arc) for arc in (40 * first + second, *rest)))
+
+
+def _base128(arc: int) -> bytes:
+    groups = [arc & 0x7F]
+    while arc := arc >> 7:
+        groups.append(0x80 | arc & 0x7F)
+    return bytes(reversed(groups))
+
+
+def time_value(element: Element) -> datetime:
+    """UTCTime or GeneralizedTime in the Zulu form that RFC 5280 section 4.1.2.5 demands."""
+    text = element.content.decode("ascii", "replace")
+    if element.tag == UTC_TIME:
+        text = ("19" if text[:2] >= "50" else "20") + text
+    elif element.tag != GENERALIZED_TIME:
+        raise DerError("not a time")
+    if len(text) != 15 or text[14] != "Z" or not text[:14].isdigit():
+        raise DerError("a time that is not in UTC")
+    try:
+        year, *rest = (int(part) for part in (text[:4], *(text[at : at + 2] for at in range(4, 14, 2))))
+        month, day, hour, minute, second = rest
+        return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
+    except ValueError as error:
+        raise DerError("an impossible time") from error
+
+
+def utc_time(moment: datetime) -> bytes:
+    """Until 2049 UTCTime, afterwards GeneralizedTime (RFC 5652 section 11.3)."""
+    if moment.year < 2050:
+        return encode(UTC_TIME, moment.strftime("%y%m%d%H%M%SZ").encode())
+    return encode(GENERALIZED_TIME, moment.strftime("%Y%m%d%H%M%SZ").encode())
