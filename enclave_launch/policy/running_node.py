@@ -1,0 +1,96 @@
+"""A node as it will run: its interface under the final name, in its enclave.
+
+Takes a ``NodeInterface`` and the process or component that launch starts; gives a ``RunningNode``; next is the
+derivation of the policy. Pure.
+
+Final names follow rcl (``rcl/src/rcl/remap.c``, ``node.c``): the program's own name and namespace, then the first
+``__node`` and ``__ns`` rule that applies. A component has its own rule list from the load request and does not see
+the container's command line (rclcpp_components/component_manager.cpp), unless ``forward_global_arguments`` says so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from enclave_launch.errors import LaunchFileError
+from enclave_launch.policy.ros_arguments import remap_rules
+from enclave_launch.process import ParameterValue, RemapRule, ResolvedComponent, ResolvedProcess
+from enclave_launch.source_location import SourceLocation
+from nodl.names import join
+from nodl.node_interface import NodeInterface
+from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+
+Role = Literal["node", "lifecycle_node", "container", "component", "launcher"]
+
+
+@dataclass(frozen=True, slots=True)
+class RunningNode:
+    """``name`` and ``namespace`` are final; ``original_name`` is what the program calls itself."""
+
+    interface: NodeInterface
+    original_name: str
+    name: str
+    namespace: str
+    rules: RemapRules
+    parameters: Mapping[str, ParameterValue]
+    enclave: str
+    location: SourceLocation
+    role: Role = "node"
+
+    @property
+    def fqn(self) -> str:
+        return join(self.namespace, self.name)
+
+
+def node_of_process(process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role) -> RunningNode:
+    """One node of ``process``. Raises ``LaunchFileError`` for a remap rule that would make rcl refuse to start."""
+    rules = RemapRules(process=_parse(remap_rules(process.cmd), process.remaps, process.location))
+    return _named(interface, rules, process.parameters, enclave, process.location, role)
+
+
+def node_of_component(
+    component: ResolvedComponent, container: ResolvedProcess | None, interface: NodeInterface, enclave: str
+) -> RunningNode:
+    """The node that ``component`` becomes. Raises ``LaunchFileError`` as ``node_of_process``."""
+    texts = [f"{rule.source}:={rule.target}" for rule in component.remaps]
+    if component.name:
+        texts.append(f"__node:={component.name}")
+    if component.namespace:
+        texts.append(f"__ns:={component.namespace}")
+    forwarded: tuple[ParsedRule, ...] = ()
+    if container is not None and component.extra_arguments.get("forward_global_arguments") is True:
+        forwarded = _parse(remap_rules(container.cmd), container.remaps, container.location)
+    rules = RemapRules(local=_parse(texts, component.remaps, component.location), process=forwarded)
+    return _named(interface, rules, component.parameters, enclave, component.location, "component")
+
+
+def _named(
+    interface: NodeInterface,
+    rules: RemapRules,
+    parameters: Mapping[str, ParameterValue],
+    enclave: str,
+    location: SourceLocation,
+    role: Role,
+) -> RunningNode:
+    original = interface.name or ""
+    name = rules.node_name(original).name
+    if not name:
+        raise LaunchFileError(
+            f"the name of node {interface.package}/{interface.executable or interface.plugin} is not known: neither "
+            f"launch nor {interface.source} gives one; set name=",
+            location,
+        )
+    namespace = rules.namespace(interface.namespace or "/", name).name
+    return RunningNode(interface, original or name, name, namespace, rules, parameters, enclave, location, role)
+
+
+def _parse(
+    texts: Iterable[str], written: Iterable[RemapRule], location: SourceLocation
+) -> tuple[ParsedRule, ...]:
+    places = {f"{rule.source}:={rule.target}": str(rule.location) for rule in written if rule.location is not None}
+    try:
+        return tuple(parse_rule(text, places.get(text, str(location))) for text in texts)
+    except InvalidRemapRuleError as error:
+        raise LaunchFileError(f"{error}; rcl would refuse to start this process", location, error) from error
