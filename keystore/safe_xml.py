@@ -6,6 +6,7 @@ instructions are dropped, so that no reader meets them as children.
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
@@ -32,7 +33,6 @@ def parse_xml(document: bytes, where: str, max_bytes: int = MAX_BYTES) -> etree.
         huge_tree=False,
         remove_comments=True,
         remove_pis=True,
-        base_url=where,
     )
     try:
         root = etree.fromstring(document, parser)
@@ -44,10 +44,14 @@ def parse_xml(document: bytes, where: str, max_bytes: int = MAX_BYTES) -> etree.
 
 def check_schema(root: etree._Element, schema_name: str, where: str, what: str) -> None:
     """Compare with a bundled schema. Raises ``InvalidInput`` with file:line for the first difference."""
-    schema = _schema(schema_name)
-    if not schema.validate(root):
-        problem = next(iter(schema.error_log))
-        raise InvalidInput(f"{where}:{problem.line}: not a valid {what}: {problem.message}")
+    from lxml import etree
+
+    try:
+        _schema(schema_name).assertValid(root)
+    except etree.DocumentInvalid as error:
+        problem = re.match(r"(.*?)(?:, line (\d+))?$", str(error), re.DOTALL)
+        message, line = problem.groups() if problem else (str(error), None)
+        raise InvalidInput(f"{where}:{line or 1}: not a valid {what}: {message}") from None
 
 
 def _refuse_doctype(present: bool, where: str) -> None:
