@@ -1,0 +1,314 @@
+"""All processes of one launch: spawned, signalled and awaited through the warden. Touches the world.
+
+Lives in one asyncio loop. ``Child`` is one incarnation of a process: its pid, its three streams, its exit
+status. Next: ``supervision`` decides when to start, escalate and start again.
+"""
+
+from __future__ import annotations
+
+import array
+import asyncio
+import contextlib
+import errno
+import marshal
+import os
+import signal
+import socket
+import struct
+import subprocess
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from enclave_launch.errors import RuntimeFailure
+
+Stream = Literal["stdout", "stderr"]
+OnOutput = Callable[[Stream, bytes], None]
+Message = str | int | bytes | list[bytes] | dict[bytes, bytes]
+
+HEADER = struct.Struct("!I")
+CHUNK = 1 << 16  # bytes; what a Linux pipe holds by default
+
+
+@dataclass(frozen=True, slots=True)
+class ProcessSpec:
+    """``environment`` is complete: nothing is inherited. ``shell``: the words, joined, are a shell's
+    command line.
+    """
+
+    cmd: tuple[str, ...]
+    environment: Mapping[str, str]
+    cwd: str | None = None
+    shell: bool = False
+    emulate_tty: bool = False
+
+    @property
+    def argv(self) -> tuple[str, ...]:
+        return ("/bin/sh", "-c", " ".join(self.cmd)) if self.shell else self.cmd
+
+
+class OutputPump:
+    """Reads one stream of a child whenever there is something, unless paused; ``closed`` at its end."""
+
+    def __init__(
+        self, descriptor: int, receive: Callable[[bytes], None], loop: asyncio.AbstractEventLoop
+    ) -> None:
+        os.set_blocking(descriptor, False)
+        self._descriptor = descriptor
+        self._receive = receive
+        self._loop = loop
+        self._reading = False
+        self.closed = False
+
+    def resume(self) -> None:
+        if not self.closed and not self._reading:
+            self._loop.add_reader(self._descriptor, self._read)
+            self._reading = True
+
+    def pause(self) -> None:
+        if self._reading:
+            self._loop.remove_reader(self._descriptor)
+            self._reading = False
+
+    def drain(self) -> None:
+        """Take all that the kernel holds by now. A pipe's content is bounded, so this ends."""
+        for _ in range(64):
+            if self.closed or not self._read():
+                return
+
+    def close(self) -> None:
+        self.pause()
+        if not self.closed:
+            self.closed = True
+            os.close(self._descriptor)
+
+    def _read(self) -> bool:
+        try:
+            data = os.read(self._descriptor, CHUNK)
+        except BlockingIOError:
+            return False
+        except OSError as error:
+            if error.errno != errno.EIO:  # a pseudo terminal whose last user is gone
+                raise
+            data = b""
+        if data:
+            self._receive(data)
+        else:
+            self.close()
+        return bool(data)
+
+
+class Child:
+    """One started process. ``returncode`` is negative for a signal, as in ``subprocess``."""
+
+    def __init__(self, tree: ProcessTree, identifier: int, stdin: int, pumps: tuple[OutputPump, ...]) -> None:
+        loop = asyncio.get_running_loop()
+        self._tree = tree
+        self._identifier = identifier
+        self._stdin = stdin
+        self.pumps = pumps
+        self.started: asyncio.Future[int] = loop.create_future()
+        self.exited: asyncio.Future[int] = loop.create_future()
+
+    @property
+    def pid(self) -> int:
+        return self.started.result()
+
+    @property
+    def running(self) -> bool:
+        return self.started.done() and not self.exited.done()
+
+    def signal(self, number: int) -> None:
+        """To the whole process group. Nothing happens once the process has ended."""
+        if self.running:
+            self._tree.send("signal", self._identifier, int(number))
+
+    def write_stdin(self, data: bytes) -> None:
+        """As much as the pipe takes; a process that does not read its stdin must not block the launch."""
+        with contextlib.suppress(BlockingIOError, BrokenPipeError):
+            os.write(self._stdin, data)
+
+    async def wait(self) -> int:
+        """The exit status, after all that the process itself wrote has been received."""
+        status = await asyncio.shield(self.exited)
+        for pump in self.pumps:
+            pump.drain()
+        return status
+
+    def sweep(self) -> None:
+        """Kill what the ended process left running, so that a successor finds its devices free."""
+        self._tree.send("sweep", self._identifier, self.pid)
+
+    def release(self) -> None:
+        """Close our ends of its streams."""
+        for pump in self.pumps:
+            pump.close()
+        if self._stdin >= 0:
+            os.close(self._stdin)
+            self._stdin = -1
+
+
+class ProcessTree:
+    """Use as an async context manager: leaving it ends everything that is still running."""
+
+    def __init__(self) -> None:
+        ours, theirs = socket.socketpair()
+        with theirs:
+            os.set_inheritable(theirs.fileno(), True)
+            try:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-I", "-S", _warden_script(), str(theirs.fileno())],
+                    pass_fds=[theirs.fileno()],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    start_new_session=True,
+                    env={},
+                )
+            except OSError as error:
+                ours.close()
+                raise RuntimeFailure(
+                    f"cannot start the warden with {sys.executable!r}: {error.strerror}"
+                ) from error
+        self._socket = ours
+        self._buffer = b""
+        self._children: dict[int, Child] = {}
+        self._count = 0
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self.lost: asyncio.Future[None] | None = None
+
+    async def __aenter__(self) -> ProcessTree:
+        self._loop = asyncio.get_running_loop()
+        self.lost = self._loop.create_future()
+        self._loop.add_reader(self._socket, self._receive)
+        return self
+
+    async def __aexit__(self, *_: object) -> None:
+        await self.close()
+
+    @property
+    def warden_pid(self) -> int:
+        return self._process.pid
+
+    async def spawn(self, spec: ProcessSpec, on_output: OnOutput) -> Child:
+        """Start a process; returns once it has been executed.
+
+        :raises OSError: as ``exec`` would: missing file, no permission, no such directory.
+        """
+        loop = asyncio.get_running_loop()
+        stdin, stdin_ours = os.pipe()
+        os.set_blocking(stdin_ours, False)
+        opened = [_open_output(spec.emulate_tty) for _ in range(2)]
+        names: tuple[Stream, Stream] = ("stdout", "stderr")
+        pumps = tuple(
+            OutputPump(ours, lambda data, name=name: on_output(name, data), loop)  # type: ignore[misc]
+            for name, (ours, _) in zip(names, opened, strict=True)
+        )
+        self._count += 1
+        child = Child(self, self._count, stdin_ours, pumps)
+        self._children[self._count] = child
+        theirs = [stdin, *(descriptor for _, descriptor in opened)]
+        environment = {os.fsencode(name): os.fsencode(value) for name, value in spec.environment.items()}
+        try:
+            self.send(
+                "spawn",
+                self._count,
+                [os.fsencode(word) for word in spec.argv],
+                environment,
+                os.fsencode(spec.cwd or os.getcwd()),
+                descriptors=theirs,
+            )
+        finally:
+            for descriptor in theirs:
+                os.close(descriptor)
+        try:
+            await asyncio.shield(child.started)
+        except OSError:
+            child.release()
+            raise
+        for pump in pumps:
+            pump.resume()
+        return child
+
+    def send(self, *message: Message, descriptors: Sequence[int] = ()) -> None:
+        data = marshal.dumps(message)
+        rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))
+        try:
+            self._socket.sendmsg([HEADER.pack(len(data))], [rights] if descriptors else [])
+            self._socket.sendall(data)
+        except OSError:
+            self._on_lost()
+
+    async def close(self) -> None:
+        """Ends the whole tree; returns when nothing of it is left."""
+        if self._loop is not None:
+            self._loop.remove_reader(self._socket)
+        self._socket.close()
+        loop = asyncio.get_running_loop()
+        await asyncio.shield(loop.run_in_executor(None, self._process.wait))
+        for child in self._children.values():
+            child.release()
+            if not child.exited.done():
+                child.exited.cancel()
+        self._children.clear()
+
+    def _receive(self) -> None:
+        try:
+            data = self._socket.recv(CHUNK, socket.MSG_DONTWAIT)
+        except BlockingIOError:
+            return
+        except ConnectionError:
+            data = b""
+        if not data:
+            self._on_lost()
+            return
+        self._buffer += data
+        while len(self._buffer) >= HEADER.size:
+            end = HEADER.size + HEADER.unpack_from(self._buffer)[0]
+            if len(self._buffer) < end:
+                break
+            kind, identifier, *rest = marshal.loads(self._buffer[HEADER.size : end])
+            self._buffer = self._buffer[end:]
+            self._on_message(kind, self._children[identifier], rest)
+
+    def _on_message(self, kind: str, child: Child, rest: list[object]) -> None:
+        if kind == "started":
+            child.started.set_result(int(str(rest[0])))
+        elif kind == "failed":
+            number, path = int(str(rest[0])), rest[1]
+            assert isinstance(path, bytes)
+            child.started.set_exception(OSError(number, os.strerror(number), os.fsdecode(path)))
+        elif kind == "exited" and not child.exited.done():
+            child.exited.set_result(int(str(rest[0])))
+
+    def _on_lost(self) -> None:
+        """The warden was killed. Its children died with it; end what they had started in their groups."""
+        if self._loop is not None:
+            self._loop.remove_reader(self._socket)
+        for child in self._children.values():
+            if child.running:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.killpg(child.pid, signal.SIGKILL)
+                child.exited.set_result(-signal.SIGKILL)
+            elif not child.started.done():
+                child.started.set_exception(RuntimeFailure("the warden process was killed"))
+        if self.lost is not None and not self.lost.done():
+            self.lost.set_result(None)
+
+
+def _warden_script() -> str:
+    return str(Path(__file__).with_name("warden.py"))
+
+
+def _open_output(emulate_tty: bool) -> tuple[int, int]:
+    """Our end and the child's end of one output stream."""
+    if not emulate_tty:
+        return os.pipe()
+    import termios
+
+    ours, theirs = os.openpty()
+    mode = termios.tcgetattr(theirs)
+    mode[1] &= ~termios.OPOST  # lines end as the process wrote them, without a carriage return
+    termios.tcsetattr(theirs, termios.TCSANOW, mode)
+    return ours, theirs

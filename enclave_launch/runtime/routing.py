@@ -1,0 +1,137 @@
+"""Which stream of a process goes where, and how a line of it looks there. Pure but for the writer it hands
+lines to.
+
+Rules of launch/logging/__init__.py (``get_output_loggers``) and launch/actions/execute_local.py. Lines are
+rendered by the chunk, not one by one: tens of megabytes a second pass without a Python loop over lines.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+from typing import Literal
+
+from enclave_launch.runtime.launch_log import LaunchLog
+from enclave_launch.runtime.process_tree import Stream
+from enclave_launch.runtime.sinks import Sink
+
+Source = Literal["stdout", "stderr", "both"]
+OutputSetting = str | Mapping[str, str | Iterable[str]]
+Routes = Mapping[Source, frozenset[str]]  # source -> destinations out of DESTINATIONS
+
+SOURCES: tuple[Source, ...] = ("stdout", "stderr", "both")
+DESTINATIONS = frozenset({"screen", "log", "own_log"})
+ALIASES: dict[str, dict[Source, set[str]]] = {
+    "screen": {"both": {"screen"}},
+    "log": {"both": {"log"}, "stderr": {"screen"}},
+    "both": {"both": {"log", "screen"}},
+    "own_log": {"both": {"own_log"}, "stdout": {"own_log"}, "stderr": {"own_log"}},
+    "full": {"both": {"screen", "log", "own_log"}, "stdout": {"own_log"}, "stderr": {"own_log"}},
+}
+DEFAULT_FORMAT = "[{this.process_description.final_name}] {line}"
+LONGEST_LINE = 1 << 20  # bytes kept waiting for a line end
+
+
+def output_routes(setting: OutputSetting) -> Routes:
+    """:raises ValueError: an alias, source or destination that launch does not know."""
+    if isinstance(setting, str):
+        if setting not in ALIASES:
+            raise ValueError(
+                f'{setting} is not a valid standard output config i.e. "screen", "log" or "both"'
+            )
+        named: Mapping[str, Iterable[str]] = dict(ALIASES[setting].items())
+    else:
+        named = {source: {to} if isinstance(to, str) else set(to) for source, to in setting.items()}
+    for source, destinations in named.items():
+        if source not in SOURCES:
+            raise ValueError(f'{source} is not a valid output source i.e. "stdout", "stderr" or "both"')
+        for destination in destinations:
+            if destination not in DESTINATIONS:
+                raise ValueError(
+                    f'{destination} is not a valid output destination i.e. "screen", "log" or "own_log"'
+                )
+    return {source: frozenset(named.get(source, ())) for source in SOURCES}
+
+
+class LineBuffer:
+    """Cuts a byte stream into runs of complete lines."""
+
+    def __init__(self) -> None:
+        self._rest: list[bytes] = []
+        self._length = 0
+
+    def feed(self, data: bytes) -> bytes:
+        """The complete lines that ``data`` finishes, each with its line end; empty when there is none yet."""
+        cut = data.rfind(b"\n") + 1
+        if not cut and self._length + len(data) < LONGEST_LINE:
+            self._rest.append(data)
+            self._length += len(data)
+            return b""
+        lines = b"".join((*self._rest, data[:cut])) if cut else b"".join((*self._rest, data, b"\n"))
+        remainder = data[cut:] if cut else b""
+        self._rest, self._length = [remainder], len(remainder)
+        return lines
+
+    def flush(self) -> bytes:
+        """What is left, as a line."""
+        rest = b"".join(self._rest)
+        self._rest, self._length = [], 0
+        return rest + b"\n" if rest else b""
+
+
+class OutputRouter:
+    """Takes the output of one process, every incarnation of it, to its sinks.
+
+    ``render_line`` turns one line into what is shown, for a custom ``output_format``; None is launch's
+    default, the process name in brackets.
+    """
+
+    def __init__(
+        self, log: LaunchLog, name: str, routes: Routes, render_line: Callable[[str], str] | None = None
+    ) -> None:
+        self._log = log
+        self._prefix = f"[{name}] ".encode()
+        self._render_line = render_line
+        self._buffers: dict[Stream, LineBuffer] = {"stdout": LineBuffer(), "stderr": LineBuffer()}
+        self._sinks = {stream: tuple(_sinks_of(log, name, stream, routes)) for stream in self._buffers}
+
+    def feed(self, stream: Stream, data: bytes) -> None:
+        self._emit(stream, self._buffers[stream].feed(data))
+
+    def flush(self) -> None:
+        """At the end of a process: a last line without a line end is a line too."""
+        for stream, buffer in self._buffers.items():
+            self._emit(stream, buffer.flush())
+
+    def _emit(self, stream: Stream, lines: bytes) -> None:
+        if not lines:
+            return
+        if not lines.isascii():
+            lines = lines.decode(errors="replace").encode()
+        shown = self._render(lines)
+        for sink, timed in self._sinks[stream]:
+            self._log.writer.write(sink, prefixed(shown, f"{time.time():.7f} ".encode()) if timed else shown)
+
+    def _render(self, lines: bytes) -> bytes:
+        if self._render_line is None:
+            return prefixed(lines, self._prefix)
+        rendered = (self._render_line(line) for line in lines[:-1].decode().split("\n"))
+        return "".join(f"{line}\n" for line in rendered).encode(errors="replace")
+
+
+def prefixed(lines: bytes, prefix: bytes) -> bytes:
+    """``lines``, which ends with a line end, with ``prefix`` before each."""
+    return prefix + lines[:-1].replace(b"\n", b"\n" + prefix) + b"\n"
+
+
+def _sinks_of(log: LaunchLog, name: str, stream: Stream, routes: Routes) -> Iterable[tuple[Sink, bool]]:
+    """Each sink of a stream with whether its lines carry the time, as only launch.log's do."""
+    wanted = routes["both"] | routes[stream]
+    if "screen" in wanted:
+        yield log.screen, False
+    if "log" in wanted:
+        yield log.launch_file, True
+    if "own_log" in routes[stream]:
+        yield log.file(f"{name}-{stream}.log"), False
+    if "own_log" in routes["both"]:
+        yield log.file(f"{name}.log"), False

@@ -1,0 +1,157 @@
+"""Where lines end up: the screen and files, written by one thread so that a slow terminal stalls nobody.
+
+``SinkWriter.write`` only queues. Above ``HIGH_WATER`` queued bytes it asks the pumps of all children to
+pause and below ``LOW_WATER`` to go on: nothing is lost, memory stays bounded, and the event loop never
+waits for a reader. Touches the world: writes.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import threading
+from collections.abc import Callable
+from pathlib import Path
+from typing import Protocol, TextIO
+
+HIGH_WATER = 8 << 20  # bytes
+LOW_WATER = 2 << 20
+FLUSH_TIMEOUT = 5.0  # seconds that a blocked screen may hold up our end
+
+
+class Sink(Protocol):
+    def write(self, data: bytes) -> None:
+        """Write all of ``data``, in the writer's thread. Failures disable the sink; they never reach a
+        process.
+        """
+
+
+class ScreenSink:
+    """Our own standard output. A reader that went away costs the screen, not the robot."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+        self._gone = False
+        try:
+            stream.flush()
+            self._descriptor: int | None = stream.fileno()
+        except (OSError, ValueError):  # a stream in memory, as test runners put in place
+            self._descriptor = None
+
+    def write(self, data: bytes) -> None:
+        if self._gone:
+            return
+        try:
+            if self._descriptor is None:
+                self._stream.write(data.decode(errors="replace"))
+                self._stream.flush()
+            else:
+                _write_all(self._descriptor, data)
+        except (OSError, ValueError):
+            self._gone = True
+
+
+class FileSink:
+    """Appends to a file, opened on first use and again after something (logrotate) moved it away."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._descriptor = -1
+        self._identity: tuple[int, int] | None = None
+
+    def write(self, data: bytes) -> None:
+        with contextlib.suppress(OSError):  # a full disk must not end the launch
+            self._reopen_if_moved()
+            _write_all(self._descriptor, data)
+
+    def close(self) -> None:
+        if self._descriptor >= 0:
+            os.close(self._descriptor)
+            self._descriptor, self._identity = -1, None
+
+    def _reopen_if_moved(self) -> None:
+        try:
+            status = os.stat(self.path)
+            present: tuple[int, int] | None = (status.st_dev, status.st_ino)
+        except FileNotFoundError:
+            present = None
+        if present is not None and present == self._identity:
+            return
+        self.close()
+        self._descriptor = os.open(self.path, os.O_WRONLY | os.O_APPEND | os.O_CREAT | os.O_CLOEXEC, 0o644)
+        status = os.fstat(self._descriptor)
+        self._identity = (status.st_dev, status.st_ino)
+
+
+class SinkWriter:
+    """``on_full`` is called in the caller's thread, ``on_drained`` in the writer's."""
+
+    def __init__(self, on_full: Callable[[], None], on_drained: Callable[[], None]) -> None:
+        self._on_full, self._on_drained = on_full, on_drained
+        self._queue: list[tuple[Sink, bytes]] = []
+        self._pending = 0  # bytes queued and not yet written
+        self._full = False
+        self._stopping = False
+        self._changed = threading.Condition()
+        self._thread = threading.Thread(target=self._run, name="sink-writer", daemon=True)
+        self._thread.start()
+
+    def write(self, sink: Sink, data: bytes) -> None:
+        with self._changed:
+            self._queue.append((sink, data))
+            self._pending += len(data)
+            became_full = not self._full and self._pending > HIGH_WATER
+            self._full |= became_full
+            self._changed.notify()
+        if became_full:
+            self._on_full()
+
+    def close(self) -> None:
+        """Write what is queued, at most for ``FLUSH_TIMEOUT``: a terminal stopped with Ctrl-S must not
+        hold us.
+        """
+        with self._changed:
+            self._stopping = True
+            self._changed.notify()
+        self._thread.join(FLUSH_TIMEOUT)
+
+    def _run(self) -> None:
+        while batch := self._next_batch():
+            for sink, data in _merged(batch):
+                sink.write(data)
+                self._written(len(data))
+
+    def _next_batch(self) -> list[tuple[Sink, bytes]]:
+        with self._changed:
+            while not self._queue and not self._stopping:
+                self._changed.wait()
+            batch, self._queue = self._queue, []
+            return batch
+
+    def _written(self, count: int) -> None:
+        with self._changed:
+            self._pending -= count
+            drained = self._full and self._pending < LOW_WATER
+            self._full &= not drained
+        if drained:
+            self._on_drained()
+
+
+def _merged(batch: list[tuple[Sink, bytes]]) -> list[tuple[Sink, bytes]]:
+    """Neighbours that go to the same sink in one piece, in order of first appearance; order within a
+    sink is kept.
+    """
+    pieces: dict[Sink, list[bytes]] = {}
+    for sink, data in batch:
+        pieces.setdefault(sink, []).append(data)
+    return [(sink, b"".join(parts)) for sink, parts in pieces.items()]
+
+
+def _write_all(descriptor: int, data: bytes) -> None:
+    view = memoryview(data)
+    while view:
+        try:
+            view = view[os.write(descriptor, view) :]
+        except BlockingIOError:  # somebody else made our standard output non-blocking
+            select.select([], [descriptor], [], 1.0)

@@ -1,0 +1,183 @@
+"""One process of the launch over its whole life: started, watched, started again, ended with growing
+insistence.
+
+Takes what evaluation decided and a ``ProcessTree``; reports to ``Watcher``, which is the launch's event
+queue. Semantics and messages of launch/actions/execute_local.py. Two things are stricter than there:
+signals reach the whole process group, and a successor never meets what its predecessor left running.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from signal import SIGINT, SIGKILL, SIGTERM, Signals
+from typing import Protocol
+
+from enclave_launch.runtime.launch_log import Level
+from enclave_launch.runtime.process_tree import Child, ProcessSpec, ProcessTree, Stream
+
+Log = Callable[[Level, str], None]
+
+
+@dataclass(frozen=True, slots=True)
+class LifeRules:
+    """Seconds throughout. ``max_retries`` below zero: no limit."""
+
+    respawn: bool = False
+    respawn_delay: float = 0.0
+    max_retries: int = -1
+    sigterm_timeout: float = 5.0
+    sigkill_timeout: float = 5.0
+
+
+class Watcher(Protocol):
+    """Told in the event loop, in the order things happen."""
+
+    def on_started(self, pid: int) -> None: ...
+
+    def on_output(self, stream: Stream, data: bytes) -> None: ...
+
+    def on_exited(self, pid: int, returncode: int) -> None: ...
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How the last incarnation ended. ``returncode`` is None when none could be started."""
+
+    returncode: int | None
+    asked_to_end: bool
+
+
+class SupervisedProcess:
+    """``prepare`` is awaited before every start, so that the enclave is complete each time; it gives what
+    to run.
+
+    :raises EnclaveLaunchError: from ``run``, when ``prepare`` refuses.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        prepare: Callable[[], Awaitable[ProcessSpec]],
+        tree: ProcessTree,
+        rules: LifeRules,
+        watcher: Watcher,
+        log: Log,
+    ) -> None:
+        self.name = name
+        self._prepare = prepare
+        self._tree = tree
+        self._rules = rules
+        self._watcher = watcher
+        self._log = log
+        self._child: Child | None = None
+        self._ending = asyncio.Event()
+        self._timers: list[asyncio.TimerHandle] = []
+        self._sigint_on_start: bool | None = None
+
+    @property
+    def child(self) -> Child | None:
+        return self._child
+
+    async def run(self) -> Outcome:
+        """From the first start to the last exit."""
+        retries = 0
+        try:
+            while True:
+                returncode = await self._run_once()
+                if returncode is None or not self._may_respawn(retries):
+                    break
+                if await self._ending_within(self._rules.respawn_delay):
+                    break
+                retries += 1
+            return Outcome(returncode, self._ending.is_set())
+        finally:
+            self._cancel_timers()
+            if self._child is not None:
+                self._child.release()
+
+    def end(self, *, quiet: bool = False) -> None:
+        """SIGINT now, SIGTERM and SIGKILL when it does not help. ``quiet``: the user knows, it was his
+        Ctrl-C.
+        """
+        if self._ending.is_set():
+            return
+        self._ending.set()
+        if self._child is None:
+            self._sigint_on_start = quiet
+        else:
+            self._begin_escalation(quiet)
+
+    def signal(self, number: Signals, *, quiet: bool = False) -> None:
+        if self._child is None or not self._child.running:
+            return
+        if not quiet:
+            self._log("INFO", f"sending signal '{number.name}' to process[{self.name}]")
+        self._child.signal(number)
+
+    async def _run_once(self) -> int | None:
+        if self._ending.is_set():
+            return None
+        try:
+            spec = await self._prepare()
+            if self._ending.is_set():
+                return None
+            child = await self._tree.spawn(spec, self._watcher.on_output)
+        except OSError as error:
+            self._log("ERROR", f"cannot start process: {error.strerror}: {error.filename!r}")
+            return None
+        self._child = child
+        self._log("INFO", f"process started with pid [{child.pid}]")
+        self._watcher.on_started(child.pid)
+        if self._sigint_on_start is not None:  # asked to end while it was being started
+            self._begin_escalation(self._sigint_on_start)
+        returncode = await child.wait()
+        self._report_exit(child.pid, returncode, spec)
+        child.sweep()
+        child.release()
+        self._child = None
+        return returncode
+
+    def _report_exit(self, pid: int, returncode: int, spec: ProcessSpec) -> None:
+        self._cancel_timers()
+        if returncode == 0:
+            self._log("INFO", f"process has finished cleanly [pid {pid}]")
+        else:
+            command = " ".join(word for word in spec.cmd if word.strip())
+            self._log("ERROR", f"process has died [pid {pid}, exit code {returncode}, cmd '{command}'].")
+        self._watcher.on_exited(pid, returncode)
+
+    def _may_respawn(self, retries: int) -> bool:
+        limit = self._rules.max_retries
+        return self._rules.respawn and (limit < 0 or retries < limit)
+
+    async def _ending_within(self, seconds: float) -> bool:
+        if seconds > 0:
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._ending.wait(), seconds)
+        return self._ending.is_set()
+
+    def _begin_escalation(self, quiet: bool) -> None:
+        loop = asyncio.get_running_loop()
+        first = self._rules.sigterm_timeout
+        both = first + self._rules.sigkill_timeout
+        self.signal(SIGINT, quiet=quiet)
+        self._timers = [
+            loop.call_later(first, self._escalate, first, SIGINT, SIGTERM),
+            loop.call_later(both, self._escalate, both, SIGTERM, SIGKILL),
+        ]
+
+    def _escalate(self, seconds: float, sent: Signals, next_signal: Signals) -> None:
+        self._log(
+            "ERROR",
+            f"process[{self.name}] failed to terminate '{seconds:g}' seconds after receiving '{sent.name}', "
+            f"escalating to '{next_signal.name}'",
+        )
+        self.signal(next_signal)
+
+    def _cancel_timers(self) -> None:
+        for timer in self._timers:
+            timer.cancel()
+        self._timers = []
