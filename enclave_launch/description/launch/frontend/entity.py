@@ -1,0 +1,71 @@
+"""``Entity``: one element of a markup launch file, whatever its syntax (API of ``launch.frontend.Entity``)."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, TypeVar, overload
+
+if TYPE_CHECKING:
+    from enclave_launch.source_location import SourceLocation
+
+T = TypeVar("T")
+
+
+class Entity:
+    """Element with a type name, attributes and children. XML and YAML bring the implementations."""
+
+    @property
+    def type_name(self) -> str:
+        """Name of the element: ``node``, ``arg``, ..."""
+        raise NotImplementedError()
+
+    @property
+    def parent(self) -> Entity | None:
+        """Upstream's front ends never fill this in, nor do ours."""
+        raise NotImplementedError()
+
+    @property
+    def children(self) -> list[Entity]:
+        """All child elements, in order; asking for them counts as having read them."""
+        raise NotImplementedError()
+
+    @property
+    def source_location(self) -> SourceLocation | None:
+        """File, line and element name (ours; upstream has no positions)."""
+        return None
+
+    @overload
+    def get_attr(
+        self, name: str, *, data_type: type[T], optional: bool, can_be_str: bool = True
+    ) -> T | None: ...
+
+    @overload
+    def get_attr(self, name: str, *, data_type: type[T], can_be_str: bool = True) -> T: ...
+
+    @overload
+    def get_attr(self, name: str, *, optional: bool, can_be_str: bool = True) -> str | None: ...
+
+    @overload
+    def get_attr(self, name: str, *, can_be_str: bool = True) -> str: ...
+
+    @overload
+    def get_attr(
+        self, name: str, *, data_type: None, optional: bool = False, can_be_str: bool = True
+    ) -> Any: ...
+
+    def get_attr(
+        self, name: str, *, data_type: Any = str, optional: bool = False, can_be_str: bool = True
+    ) -> Any:
+        """Read attribute ``name`` as ``data_type``.
+
+        ``data_type``: ``str``, ``int``, ``float``, ``bool``, a ``List`` of one of them, ``None`` for YAML
+        typing, or ``List[Entity]`` for the child elements called ``name``. With ``can_be_str`` text stays text
+        where it has not the type, because it may hold substitutions.
+
+        Raises ``AttributeError`` when absent and not ``optional`` (else returns ``None``), ``TypeError`` for
+        a value of the wrong type.
+        """
+        raise NotImplementedError()
+
+    def assert_entity_completely_parsed(self) -> None:
+        """Raise ``ValueError`` naming the attributes and children that nobody has read."""
+        raise NotImplementedError()

@@ -1,0 +1,97 @@
+"""Text -> substitution objects (API of ``launch.frontend.parse_substitution``).
+
+The grammar is in ``enclave_launch.frontend.substitution_grammar``. Launch files repeat themselves, and our own
+substitutions never change once built, so what a text gave is kept and its objects are shared.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.evaluation import distro
+from enclave_launch.frontend.substitution_grammar import (
+    Call,
+    Template,
+    VisitError,
+    called_names,
+    parse_template,
+    unescape,
+)
+
+from . import expose
+
+if TYPE_CHECKING:
+    from ..substitution import Substitution
+
+
+def replace_escaped_characters(data: str) -> str:
+    """Backslash and a character -> that character."""
+    return unescape(data)
+
+
+def parse_substitution(string_value: str) -> list[Substitution]:
+    """Text -> its substitutions, in a new list.
+
+    Raises ``UnexpectedCharacters``, ``UnexpectedEOF``, or ``VisitError`` for an unknown name and for arguments
+    that the substitution refuses.
+    """
+    shared = _parse_shared(string_value, distro.current())
+    if shared is None:
+        return _instantiate(parse_template(string_value), string_value)
+    return list(shared)
+
+
+def parse_if_substitutions(value: Any) -> Any:
+    """Text without ``$(...)`` -> un-escaped text, other text -> substitutions, lists item by item.
+
+    Raises ``ValueError`` when the plain items of a list differ in type.
+    """
+    if not isinstance(value, list):
+        return _parse_if(value)
+    result = [_parse_if(item) for item in value]
+    plain_types = {
+        type(parsed)
+        for item, parsed in zip(value, result, strict=True)
+        if not (isinstance(item, str) and isinstance(parsed, list))
+    }
+    if len(plain_types) > 1:
+        raise ValueError("The result is a non-uniform list")
+    return result
+
+
+def _parse_if(value: Any) -> Any:
+    if not isinstance(value, str):
+        return value
+    if "$(" not in value:
+        return unescape(value)
+    template = parse_template(value)
+    if len(template) == 1 and isinstance(template[0], str):
+        return template[0]
+    return parse_substitution(value)
+
+
+@lru_cache(maxsize=16384)
+def _parse_shared(string_value: str, distro_name: str) -> tuple[Substitution, ...] | None:
+    """The substitutions of a text; ``None`` when a foreign class takes part, whose objects may have a state."""
+    template = parse_template(string_value)
+    if not all(expose.is_ours(name) for name in called_names(template)):
+        return None
+    return tuple(_instantiate(template, string_value))
+
+
+def _instantiate(template: Template, text: str) -> list[Substitution]:
+    from ..substitutions import TextSubstitution
+
+    return [
+        _instantiate_call(part, text) if isinstance(part, Call) else TextSubstitution(text=part)
+        for part in template
+    ]
+
+
+def _instantiate_call(call: Call, text: str) -> Substitution:
+    args = [_instantiate(argument, text) for argument in call.args]
+    try:
+        return expose.instantiate_substitution(call.name, args)
+    except Exception as error:  # whatever a parse method raises: upstream wraps it in the same way
+        raise VisitError(call.rule, text, error) from error

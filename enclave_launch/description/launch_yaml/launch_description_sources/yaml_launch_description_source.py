@@ -1,0 +1,13 @@
+"""Source of a markup launch file that calls itself YAML."""
+
+from __future__ import annotations
+
+from ...launch.launch_description_sources import FrontendLaunchDescriptionSource
+from ...launch.some_substitutions_type import SomeSubstitutionsType
+
+
+class YAMLLaunchDescriptionSource(FrontendLaunchDescriptionSource):
+    """As upstream, the name decides nothing: either syntax is read."""
+
+    def __init__(self, launch_file_path: SomeSubstitutionsType) -> None:
+        super().__init__(launch_file_path, method="interpreted YAML launch file")

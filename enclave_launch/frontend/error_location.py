@@ -1,0 +1,49 @@
+"""Where in which file an exception came from. The exception keeps its type and text; the place rides along.
+
+Upstream's errors carry no position, and library callers catch them by type, so the position is an attribute
+of the exception object. Read by the evaluation when it turns the exception into a ``LaunchFileError``.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from enclave_launch.source_location import SourceLocation
+
+_ATTRIBUTE = "enclave_launch_location"
+
+
+class Locatable(Protocol):
+    """An element of a launch file."""
+
+    @property
+    def source_location(self) -> SourceLocation | None: ...
+
+    def find_text(self, text: str) -> SourceLocation | None:
+        """The place at or below this element where an attribute has exactly this text."""
+        ...
+
+
+def mark(error: BaseException, entity: object) -> None:
+    """Note that ``error`` came from ``entity``; the innermost, first note is kept.
+
+    An error in a template knows its text, not its place: the attribute with that text is searched for.
+    """
+    if location_of(error) is not None:
+        return
+    template = getattr(error, "template", None)
+    find_text = getattr(entity, "find_text", None)
+    found = find_text(template) if template is not None and find_text is not None else None
+    mark_at(error, found or getattr(entity, "source_location", None))
+
+
+def mark_at(error: BaseException, location: SourceLocation | None) -> None:
+    """Note the place of ``error`` unless it has one."""
+    if location is not None and location_of(error) is None:
+        setattr(error, _ATTRIBUTE, location)
+
+
+def location_of(error: BaseException) -> SourceLocation | None:
+    """The place noted on ``error``, or on the attempt that an ``InvalidLaunchFileError`` is about."""
+    location: SourceLocation | None = getattr(error, _ATTRIBUTE, None)
+    return location

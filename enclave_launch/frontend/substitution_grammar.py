@@ -1,0 +1,244 @@
+"""The ``$(name arg ...)`` language: text -> ``Template`` -> text. Pure; knows no substitution class.
+
+A template is a sequence of texts and calls. An argument is a template again, in one of three contexts:
+
+    unquoted   a$(b)c          ends at a space or ``)``; quotes and parentheses only with a backslash
+    '...'      'a (b) $(c d)'  everything but its own quote; the arguments of calls inside cannot be quoted
+    "..."      likewise
+
+Rules that surprise, all upstream's (``launch/frontend/grammar.lark``): exactly one space separates arguments;
+a backslash before ``$``, a quote or a parenthesis takes its meaning away, even when that backslash is itself
+escaped; ``$`` without ``(`` is text. Contexts matter only for where an argument ends, so the result does not
+keep them, except to name the rule in error messages.
+
+The scanner is linear in the text. Next: ``launch.frontend.parse_substitution`` turns calls into objects.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import TypeAlias
+
+MAX_NESTING = 64  # upstream's own parser gives up (RecursionError) at about this depth
+
+TemplatePart: TypeAlias = "str | Call"
+Template: TypeAlias = tuple[TemplatePart, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Call:
+    """``$(name arg ...)``. ``rule``: upstream's grammar rule, which tells the quotes it stands in."""
+
+    name: str
+    args: tuple[Template, ...]
+    rule: str = field(default="substitution", compare=False)
+
+
+class TemplateSyntaxError(ValueError):
+    """A text is no template. ``template`` is that text."""
+
+    def __init__(self, message: str, template: str):
+        super().__init__(message)
+        self.template = template
+
+
+class UnexpectedCharacters(TemplateSyntaxError):  # noqa: N818  (the name that upstream's users know)
+    """A character that cannot stand at ``position`` (index into the text)."""
+
+    def __init__(self, template: str, position: int, expected: str):
+        self.position = position
+        self.line = template.count("\n", 0, position) + 1
+        start = template.rfind("\n", 0, position) + 1
+        self.column = position - start + 1
+        before = template[max(start, position - 40) : position].expandtabs()
+        after = template[position : position + 40].split("\n", 1)[0]
+        super().__init__(
+            f"No terminal matches '{template[position]}' in the current parser context, at line {self.line} "
+            f"col {self.column}\n\n{before}{after}\n{' ' * len(before)}^\nExpected {expected}",
+            template,
+        )
+
+
+class UnexpectedEOF(TemplateSyntaxError):  # noqa: N818
+    """The text ends inside ``$(...)``."""
+
+    def __init__(self, template: str, expected: str):
+        super().__init__(f"Unexpected end-of-input. Expected {expected}, in '{template}'", template)
+
+
+class VisitError(ValueError):
+    """A well-formed ``$(...)`` that names no substitution, or whose arguments its class refuses.
+
+    ``orig_exc`` is the complaint.
+    """
+
+    def __init__(self, rule: str, template: str, orig_exc: Exception):
+        super().__init__(f'Error trying to process rule "{rule}":\n\n{orig_exc}')
+        self.rule = rule
+        self.template = template
+        self.orig_exc = orig_exc
+
+
+def unescape(text: str) -> str:
+    """Backslash and any character but a newline -> that character."""
+    return _ESCAPED.sub(r"\1", text) if "\\" in text else text
+
+
+@lru_cache(maxsize=8192)
+def parse_template(text: str) -> Template:
+    """Parse ``text``; the empty text is one empty text part.
+
+    Raises ``UnexpectedCharacters`` or ``UnexpectedEOF``.
+    """
+    if "$(" not in text:
+        return (unescape(text),)
+    return _Scanner(text).template()
+
+
+def called_names(template: Template) -> Iterator[str]:
+    """Names of all calls, arguments included."""
+    for part in template:
+        if isinstance(part, Call):
+            yield part.name
+            for argument in part.args:
+                yield from called_names(argument)
+
+
+def print_template(template: Template) -> str:
+    """A text that parses to ``template``; ``ValueError`` for one that no text parses to."""
+    text = "".join(_print_part(part, _TOP) for part in template)
+    if parse_template(text) != template:
+        raise ValueError(f"no text stands for the template {template!r}")
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class _Context:
+    """How text looks in one place of the grammar, and in the calls that stand there."""
+
+    rule: str
+    text: re.Pattern[str]  # a whole run of text
+    argument: re.Pattern[str]  # a run of text inside an unquoted argument of a call here
+    may_quote: bool  # whether arguments of a call here may be quoted
+    quote: str = ""
+
+
+_ESCAPED = re.compile(r"\\(.)")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_DOLLAR = r"\$(?!\()|(?<=\\)\$"  # a dollar that begins no call
+_PARENTHESIS = r"(?<=\\)[()]"
+
+_UNQUOTED_ARGUMENT = re.compile(rf"""(?:[^ '"\\$()]+|\\["']|{_PARENTHESIS}|{_DOLLAR}|\\)+""")
+_TOP = _Context("substitution", re.compile(rf"(?:[^$]+|{_DOLLAR})+"), _UNQUOTED_ARGUMENT, may_quote=True)
+_QUOTED = {
+    quote: _Context(
+        f"{name}_quoted_substitution",
+        re.compile(rf"(?:[^{quote}\\$]+|\\{quote}|{_DOLLAR}|\\)+"),
+        re.compile(rf"(?:[^ {quote}\\$()]+|\\{quote}|{_PARENTHESIS}|{_DOLLAR}|\\)+"),
+        may_quote=False,
+        quote=quote,
+    )
+    for quote, name in (("'", "single"), ('"', "double"))
+}
+
+
+class _Scanner:
+    """One pass over one text; each method reads from ``position`` and leaves it after what it read."""
+
+    def __init__(self, text: str):
+        self.text = text
+        self.position = 0
+        self.depth = 0
+
+    def template(self) -> Template:
+        parts = self.parts(_TOP, _TOP.text)
+        assert self.position == len(self.text)  # at the top everything is text or a call
+        return parts
+
+    def parts(self, context: _Context, text_pattern: re.Pattern[str]) -> Template:
+        """Texts and calls, up to the first character that is neither."""
+        parts: list[TemplatePart] = []
+        while self.position < len(self.text):
+            match = text_pattern.match(self.text, self.position)
+            if match:
+                parts.append(unescape(match.group()))
+                self.position = match.end()
+            elif self.text.startswith("$(", self.position):
+                parts.append(self.call(context))
+            else:
+                break
+        return tuple(parts)
+
+    def call(self, context: _Context) -> Call:
+        self.position += 2
+        self.depth += 1
+        if self.depth > MAX_NESTING:
+            raise TemplateSyntaxError(
+                f"substitutions are nested more than {MAX_NESTING} deep in '{self.text[:80]}...'", self.text
+            )
+        name = _NAME.match(self.text, self.position)
+        if name is None:
+            raise self.unexpected("the name of a substitution")
+        self.position = name.end()
+        args: list[Template] = []
+        while self.peek() == " ":
+            self.position += 1
+            args.append(self.argument(context))
+        if self.peek() != ")":
+            raise self.unexpected("one space and an argument, or ')'")
+        self.position += 1
+        self.depth -= 1
+        return Call(name.group(), tuple(args), context.rule)
+
+    def argument(self, context: _Context) -> Template:
+        quoted = _QUOTED.get(self.peek()) if context.may_quote else None
+        if quoted is not None:
+            return self.quoted_argument(quoted)
+        parts = self.parts(context, context.argument)
+        if not parts:
+            raise self.unexpected("an argument")
+        return parts
+
+    def quoted_argument(self, context: _Context) -> Template:
+        self.position += 1
+        parts = self.parts(context, context.text)
+        if self.peek() != context.quote:
+            raise self.unexpected(f"a closing {context.quote}")
+        self.position += 1
+        return parts
+
+    def peek(self) -> str:
+        return self.text[self.position : self.position + 1]
+
+    def unexpected(self, expected: str) -> TemplateSyntaxError:
+        if self.position == len(self.text):
+            return UnexpectedEOF(self.text, expected)
+        return UnexpectedCharacters(self.text, self.position, expected)
+
+
+def _print_part(part: TemplatePart, context: _Context) -> str:
+    if isinstance(part, Call):
+        return _print_call(part, context)
+    escaped = part.replace("\\", "\\\\").replace("$(", "\\$(")
+    return escaped.replace(context.quote, "\\" + context.quote) if context.quote else escaped
+
+
+def _print_call(call: Call, context: _Context) -> str:
+    return "$(" + " ".join([call.name, *(_print_argument(arg, context) for arg in call.args)]) + ")"
+
+
+def _print_argument(argument: Template, context: _Context) -> str:
+    spaced = any(isinstance(part, str) and " " in part for part in argument)
+    if context.may_quote and (spaced or not argument):
+        quoted = _QUOTED["'"]
+        return "'" + "".join(_print_part(part, quoted) for part in argument) + "'"
+    special = "\\()" + (context.quote or "\"'")
+    return "".join(
+        _print_call(part, context)
+        if isinstance(part, Call)
+        else "".join("\\" + character if character in special else character for character in part)
+        for part in argument
+    )
