@@ -32,6 +32,9 @@ class Distro(str, Enum):
     ROLLING = "rolling"
 
 
+DISTROS = tuple(distro.value for distro in Distro)
+
+
 @dataclass(frozen=True, slots=True)
 class Since:
     """The first version with a feature, per distribution; ``None``: not in that series."""
@@ -215,3 +218,10 @@ def _installed_version(package: str, prefixes: Sequence[str]) -> Version | None:
         if found:
             return tuple(int(part) for part in found.group(1).split(".") if part)
     return None
+
+
+def at_least(first: str) -> bool:
+    """Is the distribution of the evaluation in progress ``first`` or a later one?"""
+    from enclave_launch.evaluation.host import current_release
+
+    return DISTROS.index(current_release().distro.value) >= DISTROS.index(first)

@@ -1,0 +1,11 @@
+"""What an action accepts where text is expected: text, a substitution, or a sequence of both to concatenate."""
+
+from __future__ import annotations
+
+import collections.abc
+from typing import Union
+
+from enclave_launch.description.launch.substitution import Substitution
+
+SomeSubstitutionsType = Union[str, Substitution, collections.abc.Iterable[Union[str, Substitution]]]
+SomeSubstitutionsType_types_tuple = (str, Substitution, collections.abc.Iterable)

@@ -1,0 +1,73 @@
+"""``os.environ`` with the stack that groups need, and cheap snapshots.
+
+The process environment is the state itself, as upstream: Python launch files, their helpers and the commands
+they run must see what ``set_env`` did. A snapshot for each of thousands of processes would be slow to decode,
+so the last one is kept for as long as nothing changed.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+
+
+class Environment:
+    """``start`` is the environment when the context was made: what ``reset_env`` goes back to."""
+
+    def __init__(self) -> None:
+        self._raw: dict[bytes, bytes] | None = None
+        self._text: dict[str, str] = {}
+        self.start = self.snapshot()
+        self._stack: list[dict[str, str]] = []
+        self._changes: tuple[dict[str, str], dict[str, str]] | None = None
+
+    def snapshot(self) -> dict[str, str]:
+        """The variables of this moment. Shared between calls while nothing changes: do not modify."""
+        raw = os.environ._data if hasattr(os.environ, "_data") else None
+        if raw is None or raw != self._raw:
+            self._raw = None if raw is None else dict(raw)
+            self._text = dict(os.environ)
+        return self._text
+
+    def changes(self) -> dict[str, str]:
+        """The variables that differ from ``start``; shared like ``snapshot``."""
+        now = self.snapshot()
+        if self._changes is None or self._changes[0] is not now:
+            self._changes = now, changed(self.start, now)
+        return self._changes[1]
+
+    def assign(self, variables: Mapping[str, str]) -> None:
+        """Make ``os.environ`` exactly ``variables``, touching only what differs."""
+        now = self.snapshot()
+        if now is variables:
+            return
+        for name in now.keys() - variables.keys():
+            del os.environ[name]
+        os.environ.update(changed(now, variables))
+
+    def push(self) -> None:
+        self._stack.append(self.snapshot())
+
+    def pop(self) -> None:
+        if not self._stack:
+            raise RuntimeError("environment stack unexpectedly empty")
+        self.assign(self._stack.pop())
+
+    def reset(self) -> None:
+        self.assign(self.start)
+
+
+def changed(before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, str]:
+    """The entries of ``after`` that ``before`` has not, or has with another value."""
+    return {name: value for name, value in after.items() if before.get(name) != value}
+
+
+@contextmanager
+def environment_untouched() -> Iterator[None]:
+    """Whatever the block does to ``os.environ`` is undone."""
+    environment = Environment()
+    try:
+        yield
+    finally:
+        environment.reset()

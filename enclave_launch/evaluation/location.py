@@ -1,0 +1,39 @@
+"""Where in the launch files an entity stands, and through which includes we came there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from enclave_launch.source_location import SourceLocation
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
+
+_MARK = "_enclave_launch_place"
+
+
+def location_of(entity: object, context: LaunchContext) -> SourceLocation:
+    """The place of ``entity``; the file being evaluated when it is not known itself."""
+    place: SourceLocation | None = getattr(entity, "source_location", None)
+    if place is None:
+        file = str(context.get_locals_as_dict().get("current_launch_file_path", "<unknown>"))
+        return SourceLocation(file, 0, type(entity).__name__, context.includes)
+    return SourceLocation(place.file, place.line, place.element, context.includes)
+
+
+def include_step(include: LaunchDescriptionEntity) -> str:
+    """The ``file:line`` of one include for the chain."""
+    return "command line" if include.source_location is None else str(include.source_location)
+
+
+def annotate(error: BaseException, entity: object, context: LaunchContext) -> None:
+    """Note on ``error`` which entity raised it; the innermost note stays."""
+    if place_of(error) is None:
+        setattr(error, _MARK, location_of(entity, context))
+
+
+def place_of(error: BaseException) -> SourceLocation | None:
+    """What ``annotate`` noted."""
+    place: SourceLocation | None = getattr(error, _MARK, None)
+    return place

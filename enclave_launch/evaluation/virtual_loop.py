@@ -1,0 +1,130 @@
+"""An event loop without time: what ``context.asyncio_loop`` is in a dry run.
+
+It has the few methods that actions use of asyncio's loop. Timers fire when the dry run asks for the next
+one, in order of due time, then creation; coroutines are never run.
+"""
+
+from __future__ import annotations
+
+import heapq
+from collections.abc import Callable, Coroutine
+from typing import Any, NoReturn
+
+
+class VirtualFuture:
+    """The part of ``asyncio.Future`` that launch code uses, without a loop behind it."""
+
+    def __init__(self) -> None:
+        self._done = False
+        self._cancelled = False
+        self._result: Any = None
+        self._callbacks: list[Callable[[Any], object]] = []
+
+    def done(self) -> bool:
+        return self._done
+
+    def cancelled(self) -> bool:
+        return self._cancelled
+
+    def result(self) -> Any:
+        return self._result
+
+    def exception(self) -> None:
+        return None
+
+    def set_result(self, result: Any) -> None:
+        self._result = result
+        self._finish()
+
+    def cancel(self, msg: object = None) -> bool:
+        if self._done:
+            return False
+        self._cancelled = True
+        self._finish()
+        return True
+
+    def add_done_callback(self, callback: Callable[[Any], object], *, context: object = None) -> None:
+        if self._done:
+            callback(self)
+        else:
+            self._callbacks.append(callback)
+
+    def _finish(self) -> None:
+        self._done = True
+        callbacks, self._callbacks = self._callbacks, []
+        for callback in callbacks:
+            callback(self)
+
+
+class VirtualTimer:
+    """A scheduled call; ``cancel()`` as asyncio's handle."""
+
+    __slots__ = ("args", "callback", "cancelled_", "when")
+
+    def __init__(self, when: float, callback: Callable[..., object], args: tuple[Any, ...]) -> None:
+        self.when = when
+        self.callback = callback
+        self.args = args
+        self.cancelled_ = False
+
+    def cancel(self) -> None:
+        self.cancelled_ = True
+
+    def cancelled(self) -> bool:
+        return self.cancelled_
+
+
+class VirtualLoop:
+    """A clock that jumps from timer to timer."""
+
+    def __init__(self) -> None:
+        self._now = 0.0
+        self._timers: list[tuple[float, int, VirtualTimer]] = []
+        self._count = 0
+
+    def time(self) -> float:
+        return self._now
+
+    def create_future(self) -> VirtualFuture:
+        return VirtualFuture()
+
+    def create_task(self, coroutine: Coroutine[Any, Any, Any], **_: Any) -> VirtualFuture:
+        coroutine.close()
+        return VirtualFuture()
+
+    def call_soon(self, callback: Callable[..., object], *args: Any, **_: Any) -> VirtualTimer:
+        return self.call_later(0, callback, *args)
+
+    call_soon_threadsafe = call_soon
+
+    def call_later(self, delay: float, callback: Callable[..., object], *args: Any, **_: Any) -> VirtualTimer:
+        timer = VirtualTimer(self._now + max(delay, 0.0), callback, args)
+        self._count += 1
+        heapq.heappush(self._timers, (timer.when, self._count, timer))
+        return timer
+
+    def run_in_executor(self, executor: object, function: Callable[..., object], *args: Any) -> VirtualFuture:
+        return VirtualFuture()
+
+    def run_until_complete(self, future: object) -> NoReturn:
+        raise RuntimeError("a dry run cannot wait for a coroutine")
+
+    def is_running(self) -> bool:
+        return True
+
+    def fire_next(self) -> bool:
+        """Call the next timer that is due; ``False`` when there is none."""
+        while self._timers:
+            when, _, timer = heapq.heappop(self._timers)
+            if timer.cancelled_:
+                continue
+            self._now = max(self._now, when)
+            timer.callback(*timer.args)
+            return True
+        return False
+
+    def save(self) -> tuple[float, list[tuple[float, int, VirtualTimer]]]:
+        return self._now, list(self._timers)
+
+    def restore(self, saved: tuple[float, list[tuple[float, int, VirtualTimer]]]) -> None:
+        self._now, self._timers = saved[0], list(saved[1])
