@@ -1,0 +1,95 @@
+"""Real DDS for the tests: which implementations are there, and a domain for each test alone.
+
+Where a component is missing the tests that need it are skipped; under ``CI=true`` they fail.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.dds.probe import Probe
+
+HERE = Path(__file__).parent
+# Ports of a domain are 7400 + 250 * domain and up; from domain 100 on they are ports that the kernel
+# hands out to others.
+DOMAINS = range(1, 100)
+
+
+def missing(what: str, how: str) -> None:
+    """Skip, or fail where nothing may be missing."""
+    message = f"{what} is not available: {how}"
+    if os.environ.get("CI") == "true":
+        pytest.fail(message)
+    pytest.skip(message)
+
+
+@pytest.fixture
+def domain_id() -> Iterator[int]:
+    """A DDS domain that no other test on this machine uses meanwhile, whatever process it runs in."""
+    folder = Path(tempfile.gettempdir()) / f"enclave-launch-dds-domains-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    for candidate in DOMAINS:
+        with open(folder / str(candidate), "w") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                continue
+            yield candidate
+            return
+    pytest.fail("all DDS domains are in use by other tests")
+
+
+@pytest.fixture(scope="session")
+def cyclone() -> Probe:
+    if importlib.util.find_spec("cyclonedds") is None:
+        missing("Cyclone DDS", "pip install --no-binary cyclonedds '.[dds]' with CYCLONEDDS_HOME set")
+    return Probe("Cyclone DDS", (sys.executable, str(HERE / "cyclone_probe.py")))
+
+
+@pytest.fixture(scope="session")
+def fastdds() -> Probe:
+    return Probe("Fast DDS", (str(_built_fastdds_probe()),))
+
+
+@pytest.fixture(params=["cyclone", "fastdds"])
+def dds(request: pytest.FixtureRequest) -> Probe:
+    """Each of the implementations in turn."""
+    probe = request.getfixturevalue(request.param)
+    assert isinstance(probe, Probe)
+    return probe
+
+
+def _built_fastdds_probe() -> Path:
+    """Compiled once per version of its source, also when several test processes come at once."""
+    if shutil.which("g++") is None or not Path("/usr/include/fastdds/dds").is_dir():
+        missing("Fast DDS", "apt-get install g++ libfastrtps-dev")
+    sources = sorted((HERE / "fastdds_probe").iterdir())
+    version = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
+    folder = Path(tempfile.gettempdir()) / f"enclave-launch-fastdds-probe-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    program = folder / version
+    with open(folder / f"{version}.lock", "w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not program.exists():
+            _compile([source for source in sources if source.suffix == ".cpp"], program)
+    return program
+
+
+def _compile(sources: list[Path], program: Path) -> None:
+    unfinished = program.with_suffix(".unfinished")
+    libraries = ["-lfastrtps", "-lfastcdr"]
+    command = ["g++", "-std=c++17", "-O1", "-o", str(unfinished), *map(str, sources), *libraries]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert result.returncode == 0, result.stderr
+    unfinished.rename(program)
