@@ -24,7 +24,7 @@ _WILDCARDS = frozenset("*?[]")
 
 
 class InvalidNameError(ValueError):
-    """A name that rcl or rmw would refuse. ``position`` counts characters from 0, ``None``: the whole name."""
+    """A name that rcl or rmw would refuse. ``position`` counts from 0; ``None``: the whole name."""
 
     def __init__(self, what: str, name: str, reason: str, position: int | None = None):
         self.what = what

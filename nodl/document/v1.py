@@ -1,0 +1,200 @@
+"""NoDL v1 (``*.nodl.xml``) -> ``ManifestNode`` values.
+
+What ubuntu-robotics/nodl's schema ``v1.xsd`` accepts is accepted, and told with file and line where it is
+not; comments are ignored and a name with two roles keeps both, unlike in its parser. Names are checked
+as rcl would, which the schema leaves open.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from nodl.document.manifest_node import ManifestNode
+from nodl.errors import (
+    InvalidElementError,
+    InvalidNodeChildError,
+    InvalidNoDLDocumentError,
+    InvalidXMLError,
+    UnsupportedInterfaceError,
+)
+from nodl.name_template import NameTemplate
+from nodl.names import (
+    InvalidNameError,
+    shown,
+    split_fqn,
+    validate_full_name,
+    validate_node_name,
+    validate_written_name,
+)
+from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
+from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+MAX_BYTES = 4_000_000
+VERSION = 1
+
+# element -> role -> the endpoints it stands for
+_ROLES: dict[str, dict[str, tuple[EndpointKind, ...]]] = {
+    "topic": {
+        "publisher": (EndpointKind.PUBLISHER,),
+        "subscription": (EndpointKind.SUBSCRIPTION,),
+        "both": (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION),
+    },
+    "service": {
+        "server": (EndpointKind.SERVICE_SERVER,),
+        "client": (EndpointKind.SERVICE_CLIENT,),
+        "both": (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT),
+    },
+    "action": {
+        "server": (EndpointKind.ACTION_SERVER,),
+        "client": (EndpointKind.ACTION_CLIENT,),
+        "both": (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT),
+    },
+}
+
+
+def parse_v1(text: bytes, file: str, package: str | None = None) -> tuple[ManifestNode, ...]:
+    """The nodes of one document, in document order. Raises ``InvalidNoDLError`` with file:line."""
+    root = _parse_xml(text, file)
+    _expect(root, "interface", ("version",), file)
+    version = root.get("version", "")
+    if version != str(VERSION):
+        raise UnsupportedInterfaceError.at(
+            _at(root, file), f"interface version {shown(version)} is not supported, only {VERSION} is"
+        )
+    nodes = tuple(_node(element, file, package) for element in root)
+    if not nodes:
+        raise InvalidNoDLDocumentError.at(_at(root, file), "<interface> needs at least one <node>")
+    return nodes
+
+
+def _parse_xml(text: bytes, file: str) -> etree._Element:
+    """No DOCTYPE, no entities, no network; comments and processing instructions are dropped."""
+    from lxml import etree
+
+    if len(text) > MAX_BYTES:
+        raise InvalidXMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
+    parser = etree.XMLParser(
+        resolve_entities=False,
+        no_network=True,
+        load_dtd=False,
+        huge_tree=False,
+        remove_comments=True,
+        remove_pis=True,
+    )
+    try:
+        if b"<!DOCTYPE" not in text:
+            root = etree.fromstring(text, parser)
+            if root.getroottree().docinfo.internalDTD is None:
+                return root
+    except etree.XMLSyntaxError as error:
+        raise InvalidXMLError.at(
+            SourceRef(file, error.lineno or 0), f"not well-formed XML: {error.msg}"
+        ) from None
+    raise InvalidXMLError.at(SourceRef(file), "a DOCTYPE is not allowed; remove it and write entities out")
+
+
+def _node(element: etree._Element, file: str, package: str | None) -> ManifestNode:
+    _expect(element, "node", ("name", "executable"), file)
+    namespace, name = _node_name(element, file)
+    executable = element.get("executable", "")
+    if not executable or not executable.isprintable():
+        raise InvalidElementError.at(
+            _at(element, file), f"executable {shown(executable)} is not a program name"
+        )
+    if not len(element):
+        raise InvalidNoDLDocumentError.at(_at(element, file), f"node {name} describes no interface at all")
+    endpoints: dict[Endpoint, None] = {}
+    parameters: dict[str, str] = {}
+    for child in element:
+        if child.tag == "parameter":
+            _expect(child, "parameter", ("name", "type"), file)
+            parameters[child.get("name", "")] = child.get("type", "")
+        elif child.tag in _ROLES:
+            endpoints.update(dict.fromkeys(_endpoints(child, file)))
+        else:
+            raise InvalidNodeChildError.at(
+                _at(child, file),
+                f"<{child.tag}> is not allowed in a node, only action, parameter, service and topic are",
+            )
+    interface = NodeInterface(
+        package=package,
+        executable=None if "::" in executable else executable,
+        plugin=executable if "::" in executable else None,
+        name=name,
+        namespace=namespace,
+        endpoints=_once(endpoints),
+        source=_at(element, file),
+        parameters=tuple(parameters),
+    )
+    return ManifestNode(interface, VERSION, parameters)
+
+
+def _node_name(element: etree._Element, file: str) -> tuple[str | None, str]:
+    """Namespace (when the name has one, as in ``/ns/node``) and node name."""
+    written = element.get("name", "")
+    try:
+        if "/" not in written:
+            validate_node_name(written)
+            return None, written
+        absolute = written if written.startswith("/") else f"/{written}"
+        validate_full_name(absolute, "node name")
+        namespace, name = split_fqn(absolute)
+        return namespace, name
+    except InvalidNameError as error:
+        raise InvalidElementError.at(_at(element, file), f"<node> {error}") from None
+
+
+def _endpoints(element: etree._Element, file: str) -> list[Endpoint]:
+    tag = str(element.tag)
+    _expect(element, tag, ("name", "type", "role"), file)
+    name, role = element.get("name", ""), element.get("role", "")
+    if role not in _ROLES[tag]:
+        raise InvalidNoDLDocumentError.at(
+            _at(element, file), f"role {shown(role)} of <{tag}> must be one of {', '.join(_ROLES[tag])}"
+        )
+    try:
+        validate_written_name(name, f"{tag} name")
+    except InvalidNameError as error:
+        raise InvalidElementError.at(_at(element, file), str(error)) from None
+    source = _at(element, file)
+    type_name = element.get("type", "")
+    return [Endpoint(kind, NameTemplate.literal(name), type_name, source) for kind in _ROLES[tag][role]]
+
+
+def _once(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
+    """Each (kind, name, type) once, the first mention stays."""
+    first: dict[tuple[EndpointKind, NameTemplate, str], Endpoint] = {}
+    for endpoint in endpoints:
+        first.setdefault((endpoint.kind, endpoint.name, endpoint.type), endpoint)
+    return tuple(first.values())
+
+
+def _expect(element: etree._Element, tag: str, attributes: tuple[str, ...], file: str) -> None:
+    if element.tag != tag:
+        raise InvalidNoDLDocumentError.at(_at(element, file), f"expected <{tag}>, found <{element.tag}>")
+    for name in attributes:
+        if name not in element.attrib:
+            raise InvalidNoDLDocumentError.at(_at(element, file), f"<{tag}> needs the attribute {name}")
+    for attribute in element.attrib:
+        if attribute not in attributes:
+            raise InvalidNoDLDocumentError.at(_at(element, file), f"<{tag}> has no attribute {attribute!s}")
+    _no_text(element, file)
+
+
+def _no_text(element: etree._Element, file: str) -> None:
+    """The schema knows no text; some there is mostly a tag that lost its bracket."""
+    for text in (element.text, *(child.tail for child in element)):
+        if text and text.strip():
+            raise InvalidNoDLDocumentError.at(
+                _at(element, file),
+                f"<{element.tag}> holds the text {shown(text.strip()[:40])}, which has no meaning",
+            )
+
+
+def _at(element: etree._Element, file: str) -> SourceRef:
+    line = element.sourceline
+    return SourceRef(file, line if isinstance(line, int) else 0)

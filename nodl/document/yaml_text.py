@@ -1,0 +1,165 @@
+"""YAML (or JSON) text -> plain values that remember their line. Safe against what YAML can be abused for.
+
+Only the standard scalar types, no tags that make objects; duplicate keys are errors; aliases are allowed
+but what they unfold to is limited, as are size and depth. Pure; PyYAML does the scanning.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nodl.errors import InvalidYAMLError
+from nodl.names import shown
+from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    import yaml
+
+MAX_BYTES = 1_000_000
+MAX_NODES = 100_000
+MAX_DEPTH = 40
+_MAX_SCALAR = 20_000
+_MERGE_TAG = "tag:yaml.org,2002:merge"
+_SCALAR_TAGS = frozenset(f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null"))
+
+
+@dataclass(frozen=True, slots=True)
+class YamlScalar:
+    """``value`` is a ``str``, ``int``, ``float``, ``bool`` or ``None``."""
+
+    value: str | int | float | bool | None
+    source: SourceRef
+
+
+@dataclass(frozen=True, slots=True)
+class YamlList:
+    items: tuple[YamlValue, ...]
+    source: SourceRef
+
+
+@dataclass(frozen=True, slots=True)
+class YamlMap:
+    """``items`` in document order; ``keys`` tells where each key is written."""
+
+    items: dict[str, YamlValue]
+    keys: dict[str, SourceRef]
+    source: SourceRef
+
+
+YamlValue = YamlScalar | YamlList | YamlMap
+
+
+def parse_yaml(text: bytes, file: str) -> YamlValue:
+    """The one document of ``text``. Raises ``InvalidYAMLError`` with file:line."""
+    import yaml
+
+    if len(text) > MAX_BYTES:
+        raise InvalidYAMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    try:
+        root = yaml.compose(text, Loader=loader)
+    except yaml.MarkedYAMLError as error:
+        line = error.problem_mark.line + 1 if error.problem_mark else 0
+        raise InvalidYAMLError.at(SourceRef(file, line), f"not well-formed YAML: {error.problem}") from None
+    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+        raise InvalidYAMLError.at(SourceRef(file), f"not readable as YAML: {error}") from None
+    if root is None:
+        raise InvalidYAMLError.at(SourceRef(file), "the document is empty")
+    return _Builder(file).build(root, 0)
+
+
+class _Builder:
+    def __init__(self, file: str):
+        self._file = file
+        self._nodes = 0
+
+    def build(self, node: yaml.Node, depth: int) -> YamlValue:
+        import yaml
+
+        source = self._at(node)
+        self._nodes += 1
+        if self._nodes > MAX_NODES or depth > MAX_DEPTH:
+            raise InvalidYAMLError.at(source, "the document unfolds too far (aliases or nesting)")
+        if isinstance(node, yaml.MappingNode):
+            return self._mapping(node, source, depth)
+        if isinstance(node, yaml.SequenceNode):
+            return YamlList(tuple(self.build(child, depth + 1) for child in node.value), source)
+        return self._scalar(node, source)
+
+    def _mapping(self, node: yaml.MappingNode, source: SourceRef, depth: int) -> YamlMap:
+        result = YamlMap({}, {}, source)
+        merged: list[YamlMap] = []
+        for key_node, value_node in node.value:
+            value = self.build(value_node, depth + 1)
+            if key_node.tag == _MERGE_TAG:
+                merged.extend(self._merged(value))
+                continue
+            key = self._key(key_node)
+            if key in result.items:
+                raise InvalidYAMLError.at(
+                    self._at(key_node),
+                    f"key {shown(key)} is given twice, first on line {result.keys[key].line}",
+                )
+            result.items[key] = value
+            result.keys[key] = self._at(key_node)
+        for other in merged:
+            for key, value in other.items.items():
+                if key not in result.items:
+                    result.items[key], result.keys[key] = value, other.keys[key]
+        return result
+
+    def _merged(self, value: YamlValue) -> list[YamlMap]:
+        maps = value.items if isinstance(value, YamlList) else (value,)
+        found = [each for each in maps if isinstance(each, YamlMap)]
+        if len(found) != len(maps):
+            raise InvalidYAMLError.at(value.source, "'<<' can only merge mappings")
+        return found
+
+    def _key(self, node: yaml.Node) -> str:
+        value = self.build(node, 0)
+        if not isinstance(value, YamlScalar) or not isinstance(value.value, str):
+            raise InvalidYAMLError.at(value.source, "a key must be text")
+        return value.value
+
+    def _scalar(self, node: yaml.Node, source: SourceRef) -> YamlScalar:
+        text = str(node.value)
+        if len(text) > _MAX_SCALAR:
+            raise InvalidYAMLError.at(source, f"a value is longer than {_MAX_SCALAR} characters")
+        if node.tag == "tag:yaml.org,2002:timestamp":
+            return YamlScalar(text, source)
+        if node.tag not in _SCALAR_TAGS:
+            raise InvalidYAMLError.at(source, f"tag {shown(node.tag)} is not allowed")
+        return YamlScalar(_plain(node.tag.rpartition(":")[2], text, source), source)
+
+    def _at(self, node: yaml.Node) -> SourceRef:
+        return SourceRef(self._file, node.start_mark.line + 1)
+
+
+def _plain(kind: str, text: str, source: SourceRef) -> str | int | float | bool | None:
+    """The value of a scalar by the YAML 1.1 rules that PyYAML resolves with."""
+    if kind == "str":
+        return text
+    if kind == "null":
+        return None
+    if kind == "bool":
+        return text.lower() in ("yes", "true", "on")
+    try:
+        return _integer(text) if kind == "int" else _real(text)
+    except ValueError:
+        raise InvalidYAMLError.at(source, f"{shown(text[:40])} is not a number we can read") from None
+
+
+def _integer(text: str) -> int:
+    digits = text.replace("_", "")
+    if ":" in digits or len(digits) > 64:
+        raise ValueError(digits)
+    sign, body = (-1, digits[1:]) if digits[:1] == "-" else (1, digits.lstrip("+"))
+    if body.startswith("0") and body[1:].isdigit():
+        return sign * int(body, 8)
+    return sign * int(body, 0)
+
+
+def _real(text: str) -> float:
+    value = text.replace("_", "").lower()
+    return float(value.replace(".inf", "inf").replace(".nan", "nan"))
