@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.source_location import SourceLocation
 
-from ..launch.frontend import Entity as BaseEntity
-from ..launch.frontend.type_utils import check_is_list_entity
-from ..launch.utilities.type_utils import get_typed_value
+from enclave_launch.description.launch.frontend import Entity as BaseEntity
+from enclave_launch.description.launch.frontend.type_utils import check_is_list_entity
+from enclave_launch.description.launch.utilities.type_utils import get_typed_value
 
 if TYPE_CHECKING:
     from enclave_launch.frontend.xml_tree import XmlElement

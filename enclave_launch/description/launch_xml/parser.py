@@ -9,9 +9,9 @@ from enclave_launch.frontend.error_location import mark_at
 from enclave_launch.frontend.xml_tree import parse_xml
 from enclave_launch.source_location import SourceLocation
 
-from ..launch.frontend import Parser as BaseParser
-from ..launch.frontend.parser import FilePath
-from .entity import Entity
+from enclave_launch.description.launch.frontend import Parser as BaseParser
+from enclave_launch.description.launch.frontend.parser import FilePath
+from enclave_launch.description.launch_xml.entity import Entity
 
 
 class Parser(BaseParser):

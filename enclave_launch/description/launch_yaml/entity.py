@@ -7,9 +7,9 @@ from typing import Any
 
 from enclave_launch.source_location import SourceLocation
 
-from ..launch.frontend import Entity as BaseEntity
-from ..launch.frontend.type_utils import check_is_list_entity
-from ..launch.utilities.type_utils import is_instance_of
+from enclave_launch.description.launch.frontend import Entity as BaseEntity
+from enclave_launch.description.launch.frontend.type_utils import check_is_list_entity
+from enclave_launch.description.launch.utilities.type_utils import is_instance_of
 
 _NO_LINES: Mapping[int, int] = {}
 

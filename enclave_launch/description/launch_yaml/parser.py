@@ -8,9 +8,9 @@ from enclave_launch.frontend import launch_file
 from enclave_launch.frontend.error_location import mark_at
 from enclave_launch.source_location import SourceLocation
 
-from ..launch.frontend import Parser as BaseParser
-from ..launch.frontend.parser import FilePath
-from .entity import Entity
+from enclave_launch.description.launch.frontend import Parser as BaseParser
+from enclave_launch.description.launch.frontend.parser import FilePath
+from enclave_launch.description.launch_yaml.entity import Entity
 
 if TYPE_CHECKING:
     from enclave_launch.frontend.yaml_tree import YamlDocument

@@ -1,9 +1,9 @@
 """API of ``launch.frontend``: markup launch files -> actions."""
 
-from . import type_utils
-from .entity import Entity
-from .expose import expose_action, expose_substitution
-from .parser import InvalidFrontendLaunchFileError, Parser
+from enclave_launch.description.launch.frontend import type_utils
+from enclave_launch.description.launch.frontend.entity import Entity
+from enclave_launch.description.launch.frontend.expose import expose_action, expose_substitution
+from enclave_launch.description.launch.frontend.parser import InvalidFrontendLaunchFileError, Parser
 
 __all__ = [
     "Entity",

@@ -12,14 +12,16 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from enclave_launch.evaluation import distro
+from enclave_launch.evaluation.distro import Feature
+from enclave_launch.evaluation.host import current_release
+from enclave_launch.frontend import error_location, extensions
 
 if TYPE_CHECKING:
-    from ..action import Action
-    from ..some_substitutions_type import SomeSubstitutionsType
-    from ..substitution import Substitution
-    from .entity import Entity
-    from .parser import Parser
+    from enclave_launch.description.launch.action import Action
+    from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
+    from enclave_launch.description.launch.substitution import Substitution
+    from enclave_launch.description.launch.frontend.entity import Entity
+    from enclave_launch.description.launch.frontend.parser import Parser
 
 ParseMethod = Callable[..., tuple[type, dict[str, Any]]]
 Exposed = TypeVar("Exposed")
@@ -28,10 +30,10 @@ _OUR_PACKAGE = "enclave_launch."
 action_parse_methods: dict[str, ParseMethod] = {}
 substitution_parse_methods: dict[str, ParseMethod] = {}
 
-# Names that a distribution older than the value does not have; kept beside the registries, which third
-# parties may read and which map to plain callables upstream.
-_action_since: dict[str, str] = {}
-_substitution_since: dict[str, str] = {}
+# Names that not every release has; kept beside the registries, which third parties may read and which map to
+# plain callables upstream.
+_METHODS = {"action": action_parse_methods, "substitution": substitution_parse_methods}
+_gates: dict[tuple[str, str], Feature] = {}
 
 
 def instantiate_action(entity: Entity, parser: Parser) -> Action:
@@ -40,17 +42,15 @@ def instantiate_action(entity: Entity, parser: Parser) -> Action:
     Raises ``RuntimeError`` for an unknown tag, ``ValueError`` for an attribute or child nobody read, and
     whatever the action's ``parse`` or constructor raises; each carries the place (``error_location``).
     """
-    from enclave_launch.frontend.error_location import mark
-
     try:
         type_name = entity.type_name
-        parse = _lookup(type_name, action_parse_methods, _action_since)
+        parse = _lookup("action", type_name)
         if parse is None:
             raise RuntimeError(f"Unrecognized entity of the type: {type_name}")
         action_type, kwargs = parse(entity, parser)
         action: Action = action_type(**kwargs)
-    except Exception as error:
-        mark(error, entity)
+    except Exception as error:  # foreign parse methods too; the error goes on with its place noted
+        error_location.mark(error, entity)
         raise
     action.source_location = entity.source_location
     return action
@@ -60,7 +60,7 @@ def instantiate_substitution(
     type_name: str, args: Iterable[SomeSubstitutionsType] | None = None
 ) -> Substitution:
     """Build the substitution ``$(type_name args...)``; ``RuntimeError`` when there is none of that name."""
-    parse = _lookup(type_name, substitution_parse_methods, _substitution_since)
+    parse = _lookup("substitution", type_name)
     if parse is None:
         raise RuntimeError(f"Unknown substitution: {type_name}")
     substitution_type, kwargs = parse([] if args is None else args)
@@ -70,46 +70,46 @@ def instantiate_substitution(
 
 def is_ours(name: str) -> bool:
     """Whether substitution ``name`` is one of this package's, or unknown: not foreign code."""
-    method = _lookup(name, substitution_parse_methods, _substitution_since)
+    method = _lookup("substitution", name)
     return method is None or method.__module__.startswith(_OUR_PACKAGE)
 
 
-def expose_action(name: str, *, since: str = "humble") -> Callable[[Exposed], Exposed]:
+def expose_action(name: str, *, feature: Feature | None = None) -> Callable[[Exposed], Exposed]:
     """Register a class with a ``parse`` class method, or a parse function, as element ``name``.
 
-    ``since`` (ours): the first distribution that has the element.
+    ``feature`` (ours): the element is unknown to releases without it.
     """
-    return _exposer(name, action_parse_methods, _action_since, "action", since)
+    return _exposer("action", name, feature)
 
 
-def expose_substitution(name: str, *, since: str = "humble") -> Callable[[Exposed], Exposed]:
-    """Register a class with a ``parse`` class method, or a parse function, as ``$(name ...)``."""
-    return _exposer(name, substitution_parse_methods, _substitution_since, "substitution", since)
+def expose_substitution(name: str, *, feature: Feature | None = None) -> Callable[[Exposed], Exposed]:
+    """Register a class with a ``parse`` class method, or a parse function, as ``$(name ...)``.
+
+    ``feature`` (ours): the substitution is unknown to releases without it.
+    """
+    return _exposer("substitution", name, feature)
 
 
-def _lookup(name: str, methods: dict[str, ParseMethod], since: dict[str, str]) -> ParseMethod | None:
+def _lookup(kind: str, name: str) -> ParseMethod | None:
+    methods = _METHODS[kind]
     method = methods.get(name)
-    if method is None:
-        from enclave_launch.frontend.extensions import load_next_registrations
-
-        while method is None and load_next_registrations():
-            method = methods.get(name)
-    if name in since and not distro.at_least(since[name]):
-        return None
-    return method
+    while method is None and extensions.load_next_registrations():
+        method = methods.get(name)
+    gate = _gates.get((kind, name))
+    return None if gate is not None and not current_release().has(gate) else method
 
 
-def _exposer(
-    name: str, methods: dict[str, ParseMethod], since: dict[str, str], kind: str, first_distro: str
-) -> Callable[[Exposed], Exposed]:
+def _exposer(kind: str, name: str, gate: Feature | None) -> Callable[[Exposed], Exposed]:
+    methods = _METHODS[kind]
+
     def expose(exposed: Exposed) -> Exposed:
         method = _parse_method(exposed, name, kind)
         known = inspect.unwrap(methods[name]) if name in methods else method
         if known != method:
             raise RuntimeError(f"Two {kind} parsing methods exposed with the same name: [{name}].")
         methods[name] = _checking_leftovers(method) if kind == "action" else method
-        if first_distro != distro.DISTROS[0]:
-            since[name] = first_distro
+        if gate is not None:
+            _gates[kind, name] = gate
         return exposed
 
     return expose

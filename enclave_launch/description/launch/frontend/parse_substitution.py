@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.evaluation import distro
+from enclave_launch.evaluation.host import current_release
 from enclave_launch.frontend.substitution_grammar import (
     Call,
     Template,
@@ -19,10 +19,13 @@ from enclave_launch.frontend.substitution_grammar import (
     unescape,
 )
 
-from . import expose
+from enclave_launch.description.launch.frontend import expose
 
 if TYPE_CHECKING:
-    from ..substitution import Substitution
+    from enclave_launch.description.launch.substitution import Substitution
+    from enclave_launch.evaluation.distro import Release
+
+_shared_for: Release | None = None  # the release whose registered names the kept results used
 
 
 def replace_escaped_characters(data: str) -> str:
@@ -36,7 +39,12 @@ def parse_substitution(string_value: str) -> list[Substitution]:
     Raises ``UnexpectedCharacters``, ``UnexpectedEOF``, or ``VisitError`` for an unknown name and for arguments
     that the substitution refuses.
     """
-    shared = _parse_shared(string_value, distro.current())
+    global _shared_for
+    release = current_release()
+    if release is not _shared_for:
+        _parse_shared.cache_clear()
+        _shared_for = release
+    shared = _parse_shared(string_value)
     if shared is None:
         return _instantiate(parse_template(string_value), string_value)
     return list(shared)
@@ -72,7 +80,7 @@ def _parse_if(value: Any) -> Any:
 
 
 @lru_cache(maxsize=16384)
-def _parse_shared(string_value: str, distro_name: str) -> tuple[Substitution, ...] | None:
+def _parse_shared(string_value: str) -> tuple[Substitution, ...] | None:
     """The substitutions of a text; ``None`` when a foreign class takes part, whose objects may have a state."""
     template = parse_template(string_value)
     if not all(expose.is_ours(name) for name in called_names(template)):
@@ -81,7 +89,7 @@ def _parse_shared(string_value: str, distro_name: str) -> tuple[Substitution, ..
 
 
 def _instantiate(template: Template, text: str) -> list[Substitution]:
-    from ..substitutions import TextSubstitution
+    from enclave_launch.description.launch.substitutions import TextSubstitution
 
     return [
         _instantiate_call(part, text) if isinstance(part, Call) else TextSubstitution(text=part)

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from enclave_launch.frontend import extensions, launch_file
 
-from ..invalid_launch_file_error import InvalidLaunchFileError
-from . import expose, parse_substitution
-from .entity import Entity
+from enclave_launch.description.launch.invalid_launch_file_error import InvalidLaunchFileError
+from enclave_launch.description.launch.frontend import expose, parse_substitution
+from enclave_launch.description.launch.frontend.entity import Entity
 
 if TYPE_CHECKING:
-    from ..action import Action
-    from ..launch_description import LaunchDescription
-    from ..substitution import Substitution
+    from enclave_launch.description.launch.action import Action
+    from enclave_launch.description.launch.launch_description import LaunchDescription
+    from enclave_launch.description.launch.substitution import Substitution
 
 FilePath = str | bytes | os.PathLike[str]
 
@@ -41,8 +41,8 @@ class Parser:
     def load_parser_implementations(cls) -> None:
         """Find the front ends: ours, in the order in which they are tried."""
         if cls.frontend_parsers is None:
-            from ...launch_xml import Parser as XmlParser
-            from ...launch_yaml import Parser as YamlParser
+            from enclave_launch.description.launch_xml import Parser as XmlParser
+            from enclave_launch.description.launch_yaml import Parser as YamlParser
 
             Parser.frontend_parsers = {"xml": XmlParser, "yaml": YamlParser}
 
@@ -66,7 +66,7 @@ class Parser:
         """Root element -> ``LaunchDescription``; ``RuntimeError`` unless it is ``launch``."""
         from enclave_launch.frontend.error_location import mark
 
-        from ..launch_description import LaunchDescription
+        from enclave_launch.description.launch.launch_description import LaunchDescription
 
         try:
             if entity.type_name != "launch":

@@ -12,17 +12,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, List, TypeAlias, Union  # noqa: UP035  (upstream names typing.List)
 
-from enclave_launch.evaluation import distro
+from enclave_launch.evaluation.distro import Feature
+from enclave_launch.evaluation.host import current_release
 from enclave_launch.frontend import yaml_scalar
 
-from ..some_substitutions_type import SomeSubstitutionsType
-from ..substitution import Substitution
-from .ensure_argument_type_impl import ensure_argument_type
-from .normalize_to_list_of_substitutions_impl import normalize_to_list_of_substitutions
-from .perform_substitutions_impl import perform_substitutions
+from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
+from enclave_launch.description.launch.substitution import Substitution
+from enclave_launch.description.launch.utilities.ensure_argument_type_impl import ensure_argument_type
+from enclave_launch.description.launch.utilities.normalize_to_list_of_substitutions_impl import normalize_to_list_of_substitutions
+from enclave_launch.description.launch.utilities.perform_substitutions_impl import perform_substitutions
 
 if TYPE_CHECKING:
-    from ..launch_context import LaunchContext
+    from enclave_launch.description.launch.launch_context import LaunchContext
 
 ScalarTypesTuple = (int, float, bool, str)
 ListTypesTuple = (List[int], List[float], List[bool], List[str])  # noqa: UP006
@@ -146,7 +147,7 @@ def _list_from_yaml(value: str, scalar_type: Any, can_be_str: bool) -> Any:
 
 
 def _bool_from_yaml(value: str, can_be_str: bool) -> Any:
-    if value in ("0", "1") and distro.at_least("jazzy"):
+    if value in ("0", "1") and current_release().has(Feature.BOOLEAN_DIGITS):
         return value == "1"
     result = _from_yaml(value, f"Failed to convert '{value}' to '{bool}'", can_be_str)
     if isinstance(result, (str, bool) if can_be_str else bool):

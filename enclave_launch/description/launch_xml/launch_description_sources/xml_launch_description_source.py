@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ...launch.launch_description_sources import FrontendLaunchDescriptionSource
-from ...launch.some_substitutions_type import SomeSubstitutionsType
+from enclave_launch.description.launch.launch_description_sources import FrontendLaunchDescriptionSource
+from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
 
 
 class XMLLaunchDescriptionSource(FrontendLaunchDescriptionSource):

@@ -1,0 +1,25 @@
+"""Source of a launch file of any kind."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from enclave_launch.description.launch.launch_description_source import LaunchDescriptionSource
+from enclave_launch.description.launch.launch_description_sources.any_launch_file_utilities import (
+    get_launch_description_from_any_launch_file,
+)
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.launch_description import LaunchDescription
+    from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
+
+
+class AnyLaunchDescriptionSource(LaunchDescriptionSource):
+    """Tries the loaders in the order that the file name suggests. A relative path starts at the current
+    working directory."""
+
+    def __init__(self, launch_file_path: SomeSubstitutionsType) -> None:
+        super().__init__(None, launch_file_path, "interpreted launch file")
+
+    def _get_launch_description(self, location: str) -> LaunchDescription:
+        return get_launch_description_from_any_launch_file(location)

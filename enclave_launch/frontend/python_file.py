@@ -1,0 +1,64 @@
+"""Run a Python launch file. This is foreign code with all rights of the user: alone here, behind a switch.
+
+The compiled code of a file is kept while the file is unchanged; the file itself runs each time that upstream
+would run it. Nothing is written: no ``__pycache__`` beside the launch file.
+"""
+
+from __future__ import annotations
+
+import os
+import traceback
+from functools import lru_cache
+from importlib.machinery import SourceFileLoader
+from importlib.util import module_from_spec, spec_from_loader
+from types import CodeType, ModuleType
+
+from enclave_launch.source_location import SourceLocation
+
+MODULE_NAME = "python_launch_file"
+
+
+class PythonRefused(RuntimeError):  # noqa: N818
+    """``--no-python`` is in force."""
+
+
+def run(path: str, *, allowed: bool) -> ModuleType:
+    """Execute the file at ``path`` as a new module, which ``sys.modules`` does not get to know.
+
+    Raises ``PythonRefused`` unless ``allowed``, ``OSError``, ``SyntaxError``, and whatever the file raises.
+    """
+    os.stat(path)  # a missing file is reported as such even where Python is refused
+    if not allowed:
+        raise PythonRefused(f"'{path}' would have to be run as Python, which --no-python refuses")
+    loader = _Loader(MODULE_NAME, path)
+    spec = spec_from_loader(MODULE_NAME, loader)
+    assert spec is not None  # only namespace packages have none
+    module = module_from_spec(spec)
+    loader.exec_module(module)
+    return module
+
+
+def user_frame(error: BaseException, path: str) -> SourceLocation | None:
+    """Where in ``path`` the exception came from: the innermost of that file's own frames."""
+    if isinstance(error, SyntaxError) and error.filename == path:
+        return SourceLocation(path, error.lineno or 0)
+    lines = [
+        line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == path
+    ]
+    return SourceLocation(path, lines[-1]) if lines else None
+
+
+class _Loader(SourceFileLoader):
+    """Compiles in memory, and once for each version of a file."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        status = os.stat(self.path)
+        return _compile(self.path, status.st_ino, status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=512)
+def _compile(path: str, *_version: int) -> CodeType:
+    with open(path, "rb") as file:
+        source = file.read()
+    code: CodeType = compile(source, path, "exec", dont_inherit=True)
+    return code
