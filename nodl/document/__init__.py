@@ -1,1 +1,51 @@
-"""NoDL documents, v1 (XML) and v2 (YAML, JSON): text in, ``ManifestNode`` values with places out."""
+"""NoDL documents, v1 (XML) and v2 (YAML, JSON): files in, ``ManifestNode`` values with places out."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from nodl.document.manifest_node import ManifestNode
+from nodl.errors import InvalidNoDLError
+from nodl.source_ref import SourceRef
+
+__all__ = ["V1_SUFFIX", "V2_SUFFIXES", "ManifestNode", "read_document"]
+
+V1_SUFFIX = ".nodl.xml"
+V2_SUFFIXES = (".nodl.yaml", ".nodl.yml", ".nodl.json", ".yaml", ".yml", ".json")
+_MAX_BYTES = 4_000_000
+
+
+def read_document(
+    path: str | Path, *, package: str | None = None, name: str | None = None, prefixes: Sequence[str] = ()
+) -> tuple[ManifestNode, ...]:
+    """All nodes of one file, whichever version it is in; what begins with ``<`` is XML.
+
+    ``name`` is the registered name of a v2 document (default: from the file name). Raises
+    ``InvalidNoDLError`` with file:line, also for a file that cannot be read.
+    """
+    from nodl.document.v1 import parse_v1
+    from nodl.document.v2 import parse_v2
+
+    file = str(path)
+    text = _read(file)
+    if text.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<":
+        return parse_v1(text, file, package)
+    return (parse_v2(text, file, package=package, name=name or _stem(file), prefixes=prefixes),)
+
+
+def _read(file: str) -> bytes:
+    try:
+        if os.path.getsize(file) > _MAX_BYTES:
+            raise InvalidNoDLError.at(SourceRef(file), f"larger than the allowed {_MAX_BYTES} bytes")
+        with open(file, "rb") as stream:
+            return stream.read()
+    except OSError as error:
+        raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None
+
+
+def _stem(file: str) -> str:
+    base = os.path.basename(file)
+    suffix = next((s for s in V2_SUFFIXES if base.endswith(s)), "")
+    return base[: len(base) - len(suffix)].rpartition("__")[2]

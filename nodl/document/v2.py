@@ -1,0 +1,178 @@
+"""NoDL v2 (YAML or JSON, ``nodl_version: 2``) -> ``ManifestNode``, its includes merged in.
+
+A v2 document does not say who runs the node. The resource key ``<package>__<name>`` (or the file name
+``<name>.nodl.yaml``) does: *name* is the executable and the node's name. Where that is not so, a section
+of the opaque ``codegen`` tells, which other tools ignore:
+
+    codegen:
+      enclave_launch: {executable: talker, node: chatterbox, namespace: /demo, plugin: demo::Talker,
+                       library: rclcpp, lifecycle: false}
+
+Rules of includes, merging and collisions: ros-tooling/nodl, ``nodl_schema``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from nodl.document.manifest_node import ManifestNode
+from nodl.document.v2_include import Included, follow_includes
+from nodl.document.v2_schema import IDENTITY_KEY, check_document
+from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
+from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
+from nodl.name_template import NameTemplate
+from nodl.names import InvalidNameError, validate_namespace, validate_node_name, validate_written_name
+from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
+from nodl.source_ref import SourceRef
+
+VERSION = 2
+
+CATEGORIES: dict[str, EndpointKind] = {
+    "publishers": EndpointKind.PUBLISHER,
+    "subscriptions": EndpointKind.SUBSCRIPTION,
+    "service_servers": EndpointKind.SERVICE_SERVER,
+    "service_clients": EndpointKind.SERVICE_CLIENT,
+    "action_servers": EndpointKind.ACTION_SERVER,
+    "action_clients": EndpointKind.ACTION_CLIENT,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class _Identity:
+    node: str | None
+    namespace: str | None
+    executable: str | None
+    plugin: str | None
+    library: ClientLibrary
+    lifecycle: bool
+    explicit: bool
+
+
+def parse_v2(
+    text: bytes, file: str, *, package: str | None, name: str, prefixes: Sequence[str] = ()
+) -> ManifestNode:
+    """The node of one document. ``name`` as registered; ``prefixes`` to find ``nodl://`` includes.
+
+    Reads the included files. Raises ``InvalidNoDLError`` with file:line.
+    """
+    root = check_document(parse_yaml(text, file))
+    documents = (Included(file, root), *follow_includes(root, file, prefixes))
+    identity = _identity(root, name)
+    endpoints = tuple(_endpoints(documents))
+    parameters = _parameters(documents)
+    interface = NodeInterface(
+        package=package,
+        executable=identity.executable,
+        plugin=identity.plugin,
+        name=identity.node,
+        namespace=identity.namespace,
+        endpoints=endpoints,
+        source=SourceRef(file, 1),
+        library=identity.library,
+        lifecycle=identity.lifecycle,
+        parameters=tuple(parameters),
+    )
+    included = tuple(document.file for document in documents[1:])
+    return ManifestNode(interface, VERSION, parameters, identity.explicit, included)
+
+
+def _identity(root: YamlMap, name: str) -> _Identity:
+    section = root.items.get("codegen")
+    ours = section.items.get(IDENTITY_KEY) if isinstance(section, YamlMap) else None
+    given = ours.items if isinstance(ours, YamlMap) else {}
+    fields = {key: value.value for key, value in given.items() if isinstance(value, YamlScalar)}
+    executable, plugin = _text(fields, "executable"), _text(fields, "plugin")
+    if executable is None and plugin is None:
+        executable, plugin = (None, name) if "::" in name else (name, None)
+    node, namespace = _text(fields, "node"), _text(fields, "namespace")
+    try:
+        if node is not None:
+            validate_node_name(node)
+        if namespace is not None:
+            validate_namespace(namespace)
+    except InvalidNameError as error:
+        source = ours.source if ours else root.source
+        raise InvalidElementError.at(source, str(error)) from None
+    return _Identity(
+        node=node or _node_name_from(name),
+        namespace=namespace,
+        executable=executable,
+        plugin=plugin,
+        library=ClientLibrary(_text(fields, "library") or "unknown"),
+        lifecycle=fields.get("lifecycle") is True,
+        explicit="executable" in fields or "plugin" in fields,
+    )
+
+
+def _text(fields: dict[str, str | int | float | bool | None], key: str) -> str | None:
+    value = fields.get(key)
+    return value if isinstance(value, str) and value else None
+
+
+def _node_name_from(name: str) -> str | None:
+    """The registered name as node name, when it can be one."""
+    try:
+        validate_node_name(name)
+    except InvalidNameError:
+        return None
+    return name
+
+
+def _endpoints(documents: Sequence[Included]) -> Iterator[Endpoint]:
+    for category, kind in CATEGORIES.items():
+        seen: dict[str, SourceRef] = {}
+        for entry in _entries(documents, category):
+            name, source = _field(entry, "name")
+            type_name, _ = _field(entry, "type")
+            try:
+                validate_written_name(name)
+            except InvalidNameError as error:
+                raise InvalidElementError.at(source, str(error)) from None
+            if name in seen:
+                raise InvalidNoDLDocumentError.at(
+                    source, f"'{name}' is listed twice under {category}, first at {seen[name]}"
+                )
+            seen[name] = source
+            yield Endpoint(kind, NameTemplate.literal(name), _full_type(type_name, kind), source)
+
+
+def _entries(documents: Sequence[Included], category: str) -> Iterator[YamlMap]:
+    for document in documents:
+        listed = document.root.items.get(category)
+        for entry in listed.items if isinstance(listed, YamlList) else ():
+            if isinstance(entry, YamlMap):
+                yield entry
+
+
+def _field(entry: YamlMap, key: str) -> tuple[str, SourceRef]:
+    value = entry.items[key]
+    return (str(value.value) if isinstance(value, YamlScalar) else ""), value.source
+
+
+def _full_type(type_name: str, kind: EndpointKind) -> str:
+    """``std_msgs/String`` -> ``std_msgs/msg/String``: the middle part may be omitted in v2."""
+    package, _, rest = type_name.partition("/")
+    if "/" in rest:
+        return type_name
+    middle = {"publisher": "msg", "subscription": "msg"}.get(kind.value, kind.value.partition("_")[0])
+    return f"{package}/{middle.replace('service', 'srv')}/{rest}"
+
+
+def _parameters(documents: Sequence[Included]) -> dict[str, str]:
+    found: dict[str, str] = {}
+    first: dict[str, SourceRef] = {}
+    for document in documents:
+        section = document.root.items.get("parameters")
+        if not isinstance(section, YamlMap):
+            continue
+        for name, definition in section.items.items():
+            source = section.keys[name]
+            if name in found:
+                raise InvalidNoDLDocumentError.at(
+                    source, f"parameter '{name}' is declared twice, first at {first[name]}"
+                )
+            kind = definition.items["type"] if isinstance(definition, YamlMap) else definition
+            found[name] = str(kind.value) if isinstance(kind, YamlScalar) else ""
+            first[name] = source
+    return found

@@ -1,0 +1,174 @@
+"""Which NoDL describes the nodes of an executable or component.
+
+Takes package and executable (or plugin), gives their ``NodeInterface`` values, or tells where it looked.
+Sources, the first that knows the executable decides:
+
+1. manifests named by the user (``--nodl FILE``), to settle conflicts or stand in for missing ones;
+2. the package: v1 files ``share/<package>/*.nodl.xml`` and v2 resources ``nodl/<package>__<name>`` of
+   the ament index. Documents that disagree are an error, never a choice.
+
+In v1 a component is described by a node whose ``executable`` is the plugin (``demo::Talker``); in v2 by
+a document registered under the plugin's name, or under its class name, or with ``plugin:`` in our section.
+Reads the disk, each document once per ``ManifestLookup``.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
+from nodl.document import V1_SUFFIX, ManifestNode, read_document
+from nodl.document.v2_include import RESOURCE_TYPE, resource_key
+from nodl.errors import ConflictingNoDLError
+from nodl.node_interface import NodeInterface
+
+
+@dataclass(frozen=True, slots=True)
+class Lookup:
+    """``found`` is empty when no document describes the executable; ``searched`` says where we looked."""
+
+    found: tuple[NodeInterface, ...]
+    searched: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        return bool(self.found)
+
+
+class ManifestLookup:
+    """Answers for one launch: the same prefixes and ``--nodl`` files for every question."""
+
+    def __init__(self, prefixes: Sequence[str], manifests: Iterable[str | Path] = ()):
+        self._prefixes = tuple(prefixes)
+        self._manifests = tuple(str(manifest) for manifest in manifests)
+        self._chosen: tuple[ManifestNode, ...] | None = None
+        self._packages: dict[str, _Package] = {}
+
+    def find(self, package: str, *, executable: str | None = None, plugin: str | None = None) -> Lookup:
+        """The nodes that ``executable`` runs, or the one that ``plugin`` is.
+
+        Raises ``InvalidNoDLError`` for a broken document of the package, ``ConflictingNoDLError``.
+        """
+        fits = partial(_describes, executable=executable, plugin=plugin)
+        subject = f"{package}/{executable or plugin}"
+        chosen = [node for node in self._chosen_nodes() if fits(node) and _same_package(node, package)]
+        if chosen:
+            return Lookup(_agreed(subject, chosen), self._manifests)
+        installed = self._package(package)
+        found = [node for node in installed.nodes if fits(node)]
+        return Lookup(_agreed(subject, found), (*self._manifests, *installed.searched))
+
+    def _chosen_nodes(self) -> tuple[ManifestNode, ...]:
+        if self._chosen is None:
+            self._chosen = tuple(node for file in self._manifests for node in self._read_manifest(file))
+        return self._chosen
+
+    def _read_manifest(self, file: str) -> tuple[ManifestNode, ...]:
+        package = self._owner(file)
+        return read_document(file, package=package, prefixes=self._prefixes)
+
+    def _owner(self, file: str) -> str | None:
+        """The package whose share directory or index entry ``file`` is; ``None`` for a file elsewhere."""
+        absolute = os.path.abspath(file)
+        for prefix in self._prefixes:
+            relative = os.path.relpath(absolute, prefix).split(os.sep)
+            if relative[:4] == [*INDEX_FOLDER.split(os.sep), RESOURCE_TYPE]:
+                return relative[-1].partition("__")[0]
+            if len(relative) > 2 and relative[0] == "share" and relative[1] != "ament_index":
+                return relative[1]
+        return None
+
+    def _package(self, package: str) -> _Package:
+        if package not in self._packages:
+            self._packages[package] = _read_package(package, self._prefixes)
+        return self._packages[package]
+
+
+def find_node_interfaces(
+    package: str,
+    executable: str | None = None,
+    plugin: str | None = None,
+    *,
+    prefixes: Sequence[str],
+    manifests: Iterable[str | Path] = (),
+) -> Lookup:
+    """One question; for many, keep a ``ManifestLookup``. Raises as ``ManifestLookup.find``."""
+    return ManifestLookup(prefixes, manifests).find(package, executable=executable, plugin=plugin)
+
+
+@dataclass(frozen=True, slots=True)
+class _Package:
+    nodes: tuple[ManifestNode, ...]
+    searched: tuple[str, ...]
+
+
+def _read_package(package: str, prefixes: Sequence[str]) -> _Package:
+    nodes: list[ManifestNode] = []
+    searched: list[str] = []
+    try:
+        share = package_share_directory(package, prefixes)
+    except (PackageNotFoundError, ValueError):
+        searched.append(f"package '{package}' in {', '.join(prefixes) or 'no prefix at all'}")
+    else:
+        searched.append(os.path.join(share, "*" + V1_SUFFIX))
+        for file in sorted(_v1_files(share)):
+            nodes.extend(read_document(file, package=package))
+    start = resource_key(package, "")
+    for prefix in prefixes:
+        searched.append(os.path.join(prefix, INDEX_FOLDER, RESOURCE_TYPE, start + "*"))
+    for key, prefix in sorted(list_resources(RESOURCE_TYPE, prefixes).items()):
+        if key.startswith(start):
+            path = os.path.join(prefix, INDEX_FOLDER, RESOURCE_TYPE, key)
+            nodes.extend(read_document(path, package=package, name=key[len(start) :], prefixes=prefixes))
+    return _Package(tuple(nodes), tuple(searched))
+
+
+def _v1_files(share: str) -> list[str]:
+    try:
+        with os.scandir(share) as entries:
+            return [entry.path for entry in entries if entry.name.endswith(V1_SUFFIX) and entry.is_file()]
+    except (FileNotFoundError, NotADirectoryError):
+        return []
+
+
+def _describes(node: ManifestNode, *, executable: str | None, plugin: str | None) -> bool:
+    interface = node.interface
+    if executable is not None:
+        return interface.executable == executable
+    if plugin is None:
+        return False
+    if interface.plugin is not None or node.explicit_executable:
+        return interface.plugin == plugin
+    return interface.executable == plugin.rpartition("::")[2]
+
+
+def _same_package(node: ManifestNode, package: str) -> bool:
+    return node.interface.package in (None, package)
+
+
+def _agreed(subject: str, nodes: Sequence[ManifestNode]) -> tuple[NodeInterface, ...]:
+    """The nodes without repetitions. Raises ``ConflictingNoDLError`` when documents disagree.
+
+    One file may describe several nodes of an executable under different names. Two files that describe
+    it must say the same, except v2 documents that name the executable themselves: v2 needs one document
+    for each node.
+    """
+    distinct: dict[object, ManifestNode] = {}
+    for node in nodes:
+        distinct.setdefault(_meaning(node.interface), node)
+    kept = list(distinct.values())
+    files = {node.interface.source.file for node in kept}
+    names = {node.interface.name for node in kept}
+    one_document_each = all(node.version == 2 and node.explicit_executable for node in kept)
+    if len(names) < len(kept) or (len(files) > 1 and not one_document_each):
+        raise ConflictingNoDLError(subject, (node.interface.source for node in kept))
+    return tuple(node.interface for node in kept)
+
+
+def _meaning(interface: NodeInterface) -> object:
+    """What two definitions must have in common to be the same one; the place does not count."""
+    endpoints = frozenset((e.kind, e.name, e.type) for e in interface.endpoints)
+    return interface.name, interface.namespace or "/", endpoints, interface.lifecycle
