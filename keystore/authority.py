@@ -8,7 +8,7 @@ governance; with SROS2's single CA that is every enclave (CVE-2023-24010, CVE-20
 from __future__ import annotations
 
 import binascii
-import secrets
+import os
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from enum import Enum
@@ -92,7 +92,7 @@ def pem_certificate(der: bytes) -> bytes:
 
 def default_ca_name(role: Role) -> str:
     """A common name of its own for each CA ever made, so that documents of two CAs are never confused."""
-    return f"ROS {role.value.removesuffix('_ca')} CA {secrets.token_hex(4)}"
+    return f"ROS {role.value.removesuffix('_ca')} CA {os.urandom(4).hex()}"
 
 
 def new_key(curve: Curve) -> FileSigner:

@@ -26,10 +26,6 @@ from keystore.signer import Signer
 if TYPE_CHECKING:
     from keystore.certificate import CertificateFacts
 
-# The largest file any participant should send: Fast DDS 2.9.1 fails at 63,976 bytes (62,830 still work).
-MAX_SIGNED_SIZE = 62_830
-WARN_SIGNED_SIZE = 48 * 1024
-
 _TEXT_HEADER = b"Content-Type: text/plain\r\n\r\n"
 _SHA256 = der.encode(der.SEQUENCE, der.object_identifier("2.16.840.1.101.3.4.2.1"))
 _ECDSA_SHA256 = der.encode(der.SEQUENCE, der.object_identifier("1.2.840.10045.4.3.2"))

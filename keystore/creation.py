@@ -1,0 +1,306 @@
+"""A new keystore, or the missing parts of one: CAs, governance, settings. The same call completes what an
+interrupted run left; what is there is never made anew.
+
+A CA's certificate and key are published together: the pair is renamed into ``private/incoming`` as one
+directory and installed from there, so that no crash can leave a certificate beside another CA's key.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from keystore import authority, layout, lock, safe_files, smime, store
+from keystore.authority import Authority, Curve, Role
+from keystore.domains import Domains
+from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printable
+from keystore.governance import Governance, governance_document
+from keystore.settings import Settings
+from keystore.signer import CaAccess, FileSigner, Secret, Signer, open_signer
+from keystore.store import Content, Store
+from keystore.subject import SubjectScheme
+from keystore.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
+from keystore.view import KeystoreView, resolve_root
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedCa:
+    """An existing CA: its PEM certificate and its PEM key, or a file with the key's ``pkcs11:`` URI."""
+
+    certificate: Path
+    key: Path
+
+
+@dataclass(frozen=True, slots=True)
+class CreateOptions:
+    """``ca_lifetime`` and ``lifetime`` (of enclaves) start at ``now``; ``names`` are the CAs' common names."""
+
+    domains: Domains = field(default_factory=lambda: Domains.single(0))
+    governance: Governance | None = None
+    subjects: SubjectScheme = SubjectScheme.EXACT
+    curve: Curve = Curve.P256
+    ca_lifetime: timedelta = DEFAULT_LIFETIME
+    lifetime: timedelta = DEFAULT_LIFETIME
+    backdate: timedelta = DEFAULT_BACKDATE
+    names: Mapping[Role, str] = field(default_factory=dict)
+    imported: Mapping[Role, ImportedCa] = field(default_factory=dict)
+    encrypt_ca_keys: bool = False
+    """Encrypt new CA keys with ``access.passphrase``."""
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+    now: datetime | None = None
+
+    @property
+    def settings(self) -> Settings:
+        return Settings(self.subjects, self.curve, self.lifetime)
+
+
+@dataclass(frozen=True, slots=True)
+class CreateReport:
+    """``actions`` in words, empty when the keystore was complete already."""
+
+    keystore: Path
+    actions: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+
+def create_keystore(keystore: Path | str, options: CreateOptions | None = None) -> CreateReport:
+    """Create the keystore or complete it; a complete one is left as it is.
+
+    Raises NotAKeystore for a directory with other things in it, InvalidInput for a CA that cannot serve.
+    """
+    chosen = options or CreateOptions()
+    root = resolve_root(keystore)
+    _refuse_foreign(root)
+    store.create_root(root)
+    with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        return complete(opened, chosen)
+
+
+def _refuse_foreign(root: Path) -> None:
+    view = KeystoreView(root)
+    if not view.is_complete and not view.can_be_completed:
+        raise NotAKeystore(
+            f"{printable(root)} exists and is no keystore (it has other files); choose an empty or new directory"
+        )
+
+
+def complete(opened: Store, options: CreateOptions) -> CreateReport:
+    """What ``create_keystore`` does once it holds the lock."""
+    _refuse_foreign(opened.root)
+    view = KeystoreView(opened.root)
+    actions: list[str] = []
+    warnings: list[str] = []
+    install_incoming(opened)
+    if not view.is_complete:
+        _write_settings(opened, options, actions)
+        for directory in (layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES):
+            opened.ensure_directory(directory)
+    for role in Role:
+        _complete_ca(opened, role, options, actions, warnings)
+    _complete_governance(opened, options, actions)
+    return CreateReport(opened.root, tuple(actions), tuple(warnings))
+
+
+def _write_settings(opened: Store, options: CreateOptions, actions: list[str]) -> None:
+    """Before anything else: it marks the directory as ours."""
+    if os.path.lexists(opened.root / layout.SETTINGS) or os.path.lexists(opened.root / layout.PUBLIC):
+        return
+    with opened.batch() as batch:
+        batch.file(layout.SETTINGS, options.settings.to_json())
+    actions.append("settings written")
+
+
+def _complete_ca(
+    opened: Store, role: Role, options: CreateOptions, actions: list[str], warnings: list[str]
+) -> None:
+    has_cert = os.path.exists(opened.root / layout.ca_cert(role))
+    view = KeystoreView(opened.root)
+    if has_cert:
+        if role in options.imported:
+            _refuse_other_ca(opened, role, options.imported[role])
+        return  # a missing key is no fault: the CA may be kept elsewhere
+    if role in options.imported:
+        made, key_name, key_bytes = _import_ca(role, options, warnings)
+        verb = "imported"
+    else:
+        made, key_name, key_bytes = _make_ca(opened, view, role, options)
+        verb = "created"
+    put_incoming(opened, role, made.pem(), key_name, key_bytes)
+    install_incoming(opened)
+    actions.append(f"{role.value.replace('_ca', ' CA')} {verb}")
+    if authority_kind(made) not in ("P-256", "RSA-2048"):
+        warnings.append(
+            f"the {role.value.replace('_ca', ' CA')} key is {authority_kind(made)}: "
+            "Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
+        )
+
+
+def authority_kind(made: Authority) -> str:
+    from keystore.public_key import key_kind
+
+    return key_kind(made.facts.public_key)
+
+
+def _refuse_other_ca(opened: Store, role: Role, imported: ImportedCa) -> None:
+    given = authority.read_certificate(_read_given(imported.certificate), printable(imported.certificate))
+    if given.der != KeystoreView(opened.root).ca(role).der:
+        raise InvalidInput(
+            f"the keystore has another {role.value} already; a CA is replaced with: "
+            "secure-keystore renew KEYSTORE --ca start"
+        )
+
+
+def _make_ca(
+    opened: Store, view: KeystoreView, role: Role, options: CreateOptions
+) -> tuple[Authority, str, bytes]:
+    """A new key and certificate; a key that is there already (an interrupted SROS2 run) is kept."""
+    now = options.now or utc_now()
+    validity = Validity.starting(now, options.ca_lifetime, backdate=options.backdate)
+    name = options.names.get(role) or authority.default_ca_name(role)
+    present = view.key_file(role)
+    if present is not None:
+        reference = safe_files.read_private(opened.root, present)
+        signer = open_signer(reference, printable(opened.root / present), options.access)
+        return authority.self_signed_ca(role, name, signer, validity), present.rpartition("/")[2], reference
+    fresh = authority.new_key(options.curve)
+    made = authority.self_signed_ca(role, name, fresh, validity)
+    return made, layout.KEY, authority.key_pem(fresh, passphrase_for_new_keys(options.encrypt_ca_keys, options.access))
+
+
+def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
+    if encrypt and access.passphrase is None:
+        raise InvalidInput("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
+    return access.passphrase if encrypt else None
+
+
+def _import_ca(
+    role: Role, options: CreateOptions, warnings: list[str]
+) -> tuple[Authority, str, bytes]:
+    source = options.imported[role]
+    reference = _read_given(source.key)
+    signer = open_signer(reference, printable(source.key), options.access)
+    bound = authority.authority_of(_read_given(source.certificate), signer, printable(source.certificate))
+    check_can_serve(bound.facts.der, role, options.now or utc_now(), printable(source.certificate))
+    other = options.imported.get(Role.PERMISSIONS if role is Role.IDENTITY else Role.IDENTITY)
+    if role is Role.PERMISSIONS and other is not None and other.key == source.key:
+        warnings.append(
+            "one CA for identities and permissions: enclaves certified by it elsewhere can sign permissions "
+            "that Cyclone DDS before 11.0 and Fast DDS before 2.6.5 accept (CVE-2023-24010, CVE-2023-24011)"
+        )
+    return bound, (layout.KEY if isinstance(signer, FileSigner) else "key.p11"), reference
+
+
+def _read_given(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
+
+
+def check_can_serve(certificate_der: bytes, role: Role, now: datetime, place: str) -> None:
+    """Raises InvalidInput when DDS implementations would refuse what this CA signs."""
+    from cryptography import x509
+
+    cert = x509.load_der_x509_certificate(certificate_der)
+    facts = authority.read_certificate(authority.pem_certificate(certificate_der), place)
+    if not facts.validity.covers(now):
+        raise InvalidInput(f"{place} is not valid now")
+    try:
+        if not cert.extensions.get_extension_for_class(x509.BasicConstraints).value.ca:
+            raise InvalidInput(f"{place} is not a CA certificate (basicConstraints CA:FALSE)")
+        usage = cert.extensions.get_extension_for_class(x509.KeyUsage).value
+    except x509.ExtensionNotFound as error:
+        if error.oid == x509.OID_BASIC_CONSTRAINTS:
+            raise InvalidInput(f"{place} is not a CA certificate (no basicConstraints)") from None
+        return
+    if role is Role.IDENTITY and not usage.key_cert_sign:
+        raise InvalidInput(f"{place} may not sign certificates (key usage lacks keyCertSign)")
+    if role is Role.PERMISSIONS and not usage.digital_signature:
+        raise InvalidInput(f"{place} may not sign documents (key usage lacks digitalSignature)")
+
+
+def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: bytes) -> None:
+    """Stage a CA pair durably; ``install_incoming`` publishes it, now or in the next run."""
+    opened.ensure_directory(layout.PRIVATE)
+    opened.ensure_directory(layout.INCOMING)
+    name = "key.p11" if key_name.endswith(".p11") else layout.KEY
+    with opened.batch() as batch:
+        batch.directory(
+            f"{layout.INCOMING}/{role.value}",
+            {name: Content(key, store.PRIVATE_MODE), layout.CERT: Content(cert)},
+        )
+
+
+def install_incoming(opened: Store) -> None:
+    """Publish every complete CA pair waiting in ``private/incoming``; repeats safely after a crash."""
+    for role in Role:
+        waiting = f"{layout.INCOMING}/{role.value}"
+        if not opened.is_directory(waiting):
+            continue
+        cert = safe_files.read_if_there(opened.root, f"{waiting}/{layout.CERT}")
+        if cert is not None:
+            _install(opened, role, waiting, cert)
+        for name in (layout.CERT, layout.KEY, "key.p11"):  # the certificate first: without it nothing is installed
+            opened.remove(f"{waiting}/{name}")
+        opened.remove_empty_directory(waiting)
+    opened.remove_empty_directory(layout.INCOMING)
+
+
+def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
+    pem = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY}")
+    uri = safe_files.read_if_there(opened.root, f"{waiting}/key.p11")
+    if pem is None and uri is None:
+        raise DamagedKeystore(f"{printable(opened.root / waiting)} holds a certificate without key; remove it")
+    name, stale = layout.ca_key(role), layout.ca_key_uri(role)
+    if pem is None:
+        name, stale = stale, name
+    opened.ensure_directory(layout.PUBLIC)
+    with opened.batch() as batch:
+        batch.file(name, pem or uri or b"", store.PRIVATE_MODE)
+        batch.file(layout.ca_cert(role), cert)
+    opened.remove(stale)
+
+
+def _complete_governance(opened: Store, options: CreateOptions, actions: list[str]) -> None:
+    if os.path.isfile(opened.root / layout.GOVERNANCE):
+        return
+    present = safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML)
+    document = present or governance_document(options.governance or Governance.for_domains(options.domains))
+    view = KeystoreView(opened.root)
+    signer = view.authority(Role.PERMISSIONS, options.access)
+    write_governance(opened, document, signer, options.now or utc_now())
+    actions.append("governance signed")
+
+
+def write_governance(opened: Store, document: bytes, permissions_ca: Authority, now: datetime) -> None:
+    signed = sign_document(document, permissions_ca, now)
+    with opened.batch() as batch:
+        batch.file(layout.GOVERNANCE_XML, document)
+        batch.file(layout.GOVERNANCE, signed)
+
+
+def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
+    return smime.sign(document, ca.facts, ca.signer, now)
+
+
+def private_mode_problems(root: Path) -> list[str]:
+    """Keys and ``private/`` that others may read (SROS2 writes them so), as paths relative to ``root``."""
+    names = [layout.PRIVATE, *(layout.ca_key(role) for role in Role), layout.SHARED_CA_KEY]
+    return [name for name in names if _readable_by_others(root / name)]
+
+
+def _readable_by_others(path: Path) -> bool:
+    try:
+        return bool(stat.S_IMODE(os.stat(path).st_mode) & 0o077)
+    except OSError:
+        return False
+
+
+def signer_of(made: Authority) -> Signer:
+    return made.signer

@@ -1,0 +1,214 @@
+"""One enclave on disk against what it should be: what is missing, stale or wrong, by cheap means. Reads only.
+
+This is the warm path of every launch: no ``cryptography``, no XML parser, about ten system calls an enclave. It
+compares bytes, dates, modes and links; it does not check signatures, which DDS does at start and
+``keystore.verify`` on request.
+"""
+
+from __future__ import annotations
+
+import binascii
+import os
+import stat
+from collections.abc import Callable
+from dataclasses import dataclass
+from datetime import datetime
+from enum import Enum
+
+from keystore import certificate, layout, safe_files, smime
+from keystore.authority import Role
+from keystore.certificate import CertificateFacts
+from keystore.der import DerError
+from keystore.errors import DamagedKeystore, UnsafeKeystore
+from keystore.subject import SubjectScheme, common_name, subject_name
+from keystore.validity import Validity
+from keystore.view import KeystoreView
+
+PermissionsSource = Callable[[str, Validity], "bytes | None"]
+"""(subject name, validity of the certificate) -> the document the enclave should have; None: keep what it has."""
+
+
+class Identity(Enum):
+    """What the enclave's key pair needs."""
+
+    GOOD = "good"
+    CERTIFICATE = "certificate"  # a new certificate for the key that is there
+    PAIR = "pair"  # no key: both anew
+
+
+@dataclass(frozen=True, slots=True)
+class EnclaveState:
+    """``reasons`` are for reports; all empty and GOOD means nothing to do."""
+
+    enclave: str
+    identity: Identity
+    facts: CertificateFacts | None
+    permissions: bool
+    links: tuple[str, ...]
+    lax_key: bool
+    reasons: tuple[str, ...]
+
+    @property
+    def is_good(self) -> bool:
+        return self.identity is Identity.GOOD and not (self.permissions or self.links or self.lax_key)
+
+    @property
+    def exists(self) -> bool:
+        return self.identity is not Identity.PAIR or self.facts is not None
+
+
+def inspect(
+    view: KeystoreView, enclave: str, wanted: PermissionsSource, now: datetime, due: datetime
+) -> EnclaveState:
+    """``due``: certificates that end before it count as stale (``now`` for: only the expired).
+
+    Raises UnsafeKeystore for links, owners and modes that let others in.
+    """
+    directory = layout.enclave_directory(enclave)
+    _refuse_link(view, directory)
+    reasons: list[str] = []
+    lax = _key_mode(view, directory)
+    identity, facts = _identity(view, enclave, directory, now, due, reasons)
+    if lax:
+        reasons.append("the private key was readable by others")
+    permissions = identity is not Identity.GOOD or not _permissions_stand(view, directory, facts, wanted, reasons)
+    links = tuple(name for name in _wanted_links(view, enclave) if not _link_stands(view, enclave, directory, name))
+    if links:
+        reasons.append(f"{', '.join(links)} missing or out of step")
+    return EnclaveState(enclave, identity, facts, permissions, links, lax is True, tuple(reasons))
+
+
+def _refuse_link(view: KeystoreView, directory: str) -> None:
+    path = str(view.root)
+    for part in directory.split("/"):
+        path = f"{path}/{part}"
+        try:
+            if stat.S_ISLNK(os.lstat(path).st_mode):
+                raise UnsafeKeystore(f"{path!r} is a link; an enclave must be a real directory. Remove it: rm {path}")
+        except FileNotFoundError:
+            return
+
+
+def _key_mode(view: KeystoreView, directory: str) -> bool | None:
+    """None without a key, else whether others can read it."""
+    path = view.root / directory / layout.KEY
+    try:
+        info = os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    if not stat.S_ISREG(info.st_mode):
+        raise UnsafeKeystore(f"{str(path)!r} is not a regular file; remove it")
+    if problem := safe_files.private_problem(path, info):
+        raise UnsafeKeystore(problem)
+    return bool(info.st_mode & 0o077)
+
+
+def _identity(
+    view: KeystoreView, enclave: str, directory: str, now: datetime, due: datetime, reasons: list[str]
+) -> tuple[Identity, CertificateFacts | None]:
+    key = safe_files.read_if_there(view.root, f"{directory}/{layout.KEY}")
+    cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
+    facts = _facts(cert)
+    if key is None:
+        reasons.append("no private key" if cert is not None else "new enclave")
+        return Identity.PAIR, facts
+    problem = _certificate_problem(view, enclave, key, facts, now, due) if cert is not None else "no certificate"
+    if problem is None:
+        return Identity.GOOD, facts
+    reasons.append(problem)
+    return Identity.CERTIFICATE, facts
+
+
+def _facts(cert: bytes | None) -> CertificateFacts | None:
+    try:
+        return certificate.read_pem(cert) if cert is not None else None
+    except DerError:
+        return None
+
+
+def _certificate_problem(
+    view: KeystoreView, enclave: str, key: bytes, facts: CertificateFacts | None, now: datetime, due: datetime
+) -> str | None:
+    if facts is None:
+        return "the certificate cannot be read"
+    if facts.common_name not in {common_name(enclave, scheme) for scheme in SubjectScheme} | {enclave}:
+        return "the certificate names another subject"
+    if not facts.names_issuer(view.ca(Role.IDENTITY)):
+        return "the certificate is by another CA"
+    if not facts.validity.covers(now):
+        return "the certificate is expired or not yet valid"
+    if facts.validity.not_after < due:
+        return "the certificate expires soon"
+    if not key_matches(key, facts):
+        return "the certificate belongs to another key"
+    return None
+
+
+def key_matches(key_pem: bytes, facts: CertificateFacts) -> bool:
+    """Whether the key's file carries the certificate's public point (PKCS#8 and SEC1 files of OpenSSL do).
+
+    Only when it does not, or for RSA, ``cryptography`` has to load the key.
+    """
+    point = facts.public_key[-65:]
+    try:
+        body = key_pem.split(b"-----", 4)[2]
+        if point[0] == 4 and point in binascii.a2b_base64(body):
+            return True
+    except (IndexError, binascii.Error):
+        pass
+    return _key_matches_slowly(key_pem, facts)
+
+
+def _key_matches_slowly(key_pem: bytes, facts: CertificateFacts) -> bool:
+    from keystore.authority import spki
+    from keystore.errors import SigningUnavailable
+    from keystore.identity import public_half
+
+    try:
+        return spki(public_half(key_pem, "the enclave's key")) == facts.public_key
+    except SigningUnavailable:
+        return False
+
+
+def _permissions_stand(
+    view: KeystoreView,
+    directory: str,
+    facts: CertificateFacts | None,
+    wanted: PermissionsSource,
+    reasons: list[str],
+) -> bool:
+    signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
+    if signed is None or facts is None or facts.common_name is None:
+        reasons.append("no permissions")
+        return False
+    try:
+        present = smime.read(signed, f"{directory}/{layout.PERMISSIONS}")
+    except DamagedKeystore:
+        reasons.append("the signed permissions cannot be read")
+        return False
+    if not present.embeds(view.ca(Role.PERMISSIONS).der):
+        reasons.append("the permissions are signed by another CA")
+        return False
+    expected = wanted(subject_name(facts.common_name), facts.validity) or present.document
+    if present.document != expected:
+        reasons.append("other permissions")
+        return False
+    twin = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS_XML}")
+    if twin is not None and twin.replace(b"\r\n", b"\n") == present.document:
+        return True
+    reasons.append("permissions.xml differs from what is signed")
+    return False
+
+
+def _wanted_links(view: KeystoreView, enclave: str) -> list[str]:
+    links = list(layout.enclave_links(enclave))
+    return [*links, layout.ENCLAVE_CRL] if view.has_crl else links
+
+
+def _link_stands(view: KeystoreView, enclave: str, directory: str, name: str) -> bool:
+    relative = f"{directory}/{name}"
+    target = safe_files.link_target(view.root, relative)
+    if target is not None:
+        return target in safe_files.allowed_targets(relative)
+    copy = safe_files.read_if_there(view.root, relative)
+    return copy is not None and copy == safe_files.read_if_there(view.root, layout.link_source(name))

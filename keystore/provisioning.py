@@ -1,0 +1,250 @@
+"""Enclaves brought to exactly the wanted state: the engine behind provision, create-enclave, apply-policy, renew.
+
+    inspect (cheap, no lock) -> nothing to do -> done
+                             -> lock, inspect again, issue and sign what is missing, publish in batches
+
+Idempotent: what stands is not touched, keys are never replaced unless asked. An interrupted run is completed
+by the next one, because ``enclave_state`` finds every missing step again.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from keystore import layout, lock, safe_files, smime, store
+from keystore.authority import Role
+from keystore.creation import CreateOptions, complete
+from keystore.domains import Domains
+from keystore.enclave_name import check_distinct, validate_enclave_name
+from keystore.enclave_state import EnclaveState, Identity, PermissionsSource, inspect
+from keystore.errors import InvalidInput, NotAKeystore, StorageError, printable
+from keystore.governance import governance_document, parse_governance
+from keystore.permissions import permissions_document
+from keystore.policy import EnclavePolicy
+from keystore.signer import CaAccess
+from keystore.store import Store
+from keystore.subject import SubjectScheme
+from keystore.validity import DEFAULT_BACKDATE, Validity, utc_now
+from keystore.view import KeystoreView, resolve_root
+
+if TYPE_CHECKING:
+    from keystore.enclave_writing import EnclaveWriter
+
+Progress = Callable[[int, int], None]
+"""Called with (enclaves done, enclaves to do)."""
+
+_BATCH = 250
+
+
+@dataclass(frozen=True, slots=True)
+class ProvisionOptions:
+    """``lifetime``, ``subjects`` None: what the keystore was created with. ``renew_within``: certificates that
+    end sooner are re-issued, by default only those that are expired. ``creation``: for a new keystore; its
+    domains, access, clock and durability are taken from here."""
+
+    domains: Domains = field(default_factory=lambda: Domains.single(0))
+    create: bool = True
+    creation: CreateOptions = field(default_factory=CreateOptions)
+    lifetime: timedelta | None = None
+    valid_until: datetime | None = None
+    backdate: timedelta = DEFAULT_BACKDATE
+    renew_within: timedelta = timedelta(0)
+    subjects: SubjectScheme | None = None
+    rmw: str | None = None
+    allow_subject_overlap: bool = False
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+    progress: Progress | None = None
+    now: datetime | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Wish:
+    """What one enclave should have: these permissions, and at least this renewal of its identity."""
+
+    permissions: PermissionsSource
+    identity: Identity = Identity.GOOD
+
+
+@dataclass(frozen=True, slots=True)
+class EnclaveReport:
+    """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; empty: left untouched."""
+
+    enclave: str
+    actions: tuple[str, ...]
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class ProvisionReport:
+    keystore: Path
+    created: tuple[str, ...]
+    """What was done to the keystore itself, in words."""
+    enclaves: tuple[EnclaveReport, ...]
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def changed(self) -> bool:
+        return bool(self.created) or any(report.actions for report in self.enclaves)
+
+
+def provision(
+    keystore: Path | str, enclaves: Iterable[EnclavePolicy], *, options: ProvisionOptions | None = None
+) -> ProvisionReport:
+    """Give every enclave a valid identity and exactly the permissions of its policy.
+
+    Creates the keystore if ``options.create``. Other enclaves of the keystore are left alone. Raises a
+    KeystoreError and leaves only complete, valid enclaves visible.
+    """
+    chosen = options or ProvisionOptions()
+    wanted = {policy.path: Wish(policy_source(policy, chosen)) for policy in _distinct(enclaves)}
+    return bring_about(resolve_root(keystore), wanted, chosen)
+
+
+def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:
+    policies = sorted(enclaves, key=lambda policy: policy.path)
+    names = [validate_enclave_name(policy.path) for policy in policies]
+    if len(set(names)) != len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise InvalidInput(f"enclave {printable(twice)} is given twice; merge its profiles into one policy")
+    return policies
+
+
+def policy_source(policy: EnclavePolicy, options: ProvisionOptions) -> PermissionsSource:
+    def document(subject: str, validity: Validity) -> bytes:
+        return permissions_document(subject, policy, validity=validity, domains=options.domains, rmw=options.rmw)
+
+    return document
+
+
+def bring_about(root: Path, wishes: Mapping[str, Wish], options: ProvisionOptions) -> ProvisionReport:
+    """The engine: see the head of this module. ``root`` is resolved, the names are valid and in order."""
+    now = options.now or utc_now()
+    view = KeystoreView(root)
+    if view.is_complete and not _interrupted(root):
+        states = [_inspect(view, name, wish, options, now) for name, wish in wishes.items()]
+        if governance_stands(view, options.domains) and all(state.is_good for state in states):
+            return ProvisionReport(root, (), tuple(EnclaveReport(name, ()) for name in wishes))
+    elif not options.create:
+        raise NotAKeystore(
+            f"{printable(root)} is not a complete keystore, and creating it was forbidden; "
+            "make it with: secure-keystore create"
+        )
+    elif not view.can_be_completed and not view.is_complete:
+        raise NotAKeystore(f"{printable(root)} exists and is no keystore; choose an empty or new directory")
+    return _bring_about_locked(root, wishes, options, now)
+
+
+def _interrupted(root: Path) -> bool:
+    return os.path.lexists(root / layout.INCOMING)
+
+
+def _inspect(
+    view: KeystoreView, enclave: str, wish: Wish, options: ProvisionOptions, now: datetime
+) -> EnclaveState:
+    state = inspect(view, enclave, wish.permissions, now, now + options.renew_within)
+    if wish.identity is Identity.GOOD or state.identity is Identity.PAIR:
+        return state
+    return replace(state, identity=wish.identity, permissions=True, reasons=(*state.reasons, "asked for"))
+
+
+def _bring_about_locked(
+    root: Path, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
+) -> ProvisionReport:
+    from keystore.enclave_writing import EnclaveWriter  # brings cryptography: not on the warm path
+
+    with _locked(root, options) as opened:
+        done, warnings = _complete_keystore(opened, options, now)
+        view = KeystoreView(root)
+        check_distinct(dict.fromkeys((*view.enclaves(), *wishes)))
+        writer = EnclaveWriter(opened, view, options, now)
+        states = [_inspect(view, name, wish, options, now) for name, wish in wishes.items()]
+        writer.check_subjects(states)
+        reports = _write_all(opened, writer, states, wishes, options.progress)
+    return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
+
+
+@contextmanager
+def _locked(root: Path, options: ProvisionOptions) -> Iterator[Store]:
+    if options.create:
+        store.create_root(root)
+    with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
+        yield opened
+
+
+def _complete_keystore(
+    opened: Store, options: ProvisionOptions, now: datetime
+) -> tuple[list[str], list[str]]:
+    """Missing parts of the keystore itself, and a governance that covers the domains."""
+    creation = replace(
+        options.creation, domains=options.domains, access=options.access, durable=options.durable, now=now
+    )
+    report = complete(opened, creation)
+    done = list(report.actions)
+    if renew_governance(opened, options.domains, options.access, now):
+        done.append(f"governance signed for domains {options.domains}")
+    return done, list(report.warnings)
+
+
+def _write_all(
+    opened: Store,
+    writer: EnclaveWriter,
+    states: list[EnclaveState],
+    wishes: Mapping[str, Wish],
+    progress: Progress | None,
+) -> tuple[EnclaveReport, ...]:
+    """In batches: bounded loss when interrupted, few calls to make it durable."""
+    reports = {state.enclave: EnclaveReport(state.enclave, ()) for state in states}
+    todo = [state for state in states if not state.is_good]
+    for start in range(0, len(todo), _BATCH):
+        part = todo[start : start + _BATCH]
+        with opened.batch() as batch:
+            for position, state in enumerate(part, start + 1):
+                actions = writer.write(batch, state, wishes[state.enclave].permissions)
+                reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)
+                if progress is not None:
+                    progress(position, len(todo))
+    return tuple(reports.values())
+
+
+_DOMAIN_IDS = re.compile(rb"<id>\s*(\d{1,3})\s*</id>|<min>\s*(\d{1,3})\s*</min>\s*<max>\s*(\d{1,3})\s*</max>")
+
+
+def governance_stands(view: KeystoreView, domains: Domains) -> bool:
+    """Cheaply: signed by the present permissions CA, and each of ``domains`` is listed in it."""
+    signed = safe_files.read_if_there(view.root, layout.GOVERNANCE)
+    if signed is None:
+        return False
+    present = smime.read(signed, printable(view.root / layout.GOVERNANCE))
+    if not present.embeds(view.ca(Role.PERMISSIONS).der):
+        return False
+    ranges = [(int(one or low), int(one or high)) for one, low, high in _DOMAIN_IDS.findall(present.document)]
+    return all(any(low <= first and last <= high for low, high in ranges) for first, last in domains.ranges)
+
+
+def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
+    """Sign the governance again if its domains or its signer no longer fit; whether that was needed.
+
+    Raises InvalidInput when it has several rules and none for a domain: then a person must decide.
+    """
+    from keystore.creation import write_governance
+    from keystore.trusted_documents import trusted_document
+
+    view = KeystoreView(opened.root)
+    if governance_stands(view, domains):
+        return False
+    place = printable(view.root / layout.GOVERNANCE)
+    document = trusted_document(view, layout.GOVERNANCE)
+    governance = parse_governance(document, place)
+    if not governance.covers(domains):
+        document = governance_document(governance.extended_to(domains))
+    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
+    return True

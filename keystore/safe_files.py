@@ -1,0 +1,157 @@
+"""Reading a keystore without being led out of it, and refusing one that others could have changed.
+
+Used by everything that reads; ``keystore.store`` is the only module that writes. Errors say what is wrong and
+which command repairs it.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import stat
+from pathlib import Path
+
+from keystore import layout
+from keystore.errors import DamagedKeystore, StorageError, UnsafeKeystore, printable
+
+_MAX_FILE = 8_000_000
+_WRITABLE_BY_OTHERS = 0o022
+
+
+def read(root: Path, relative: str) -> bytes:
+    """The content of a keystore file; raises DamagedKeystore when it is missing, UnsafeKeystore for a strange
+    link, StorageError otherwise."""
+    path = root / relative
+    try:
+        return _read(path, _flags(root, relative))
+    except FileNotFoundError:
+        raise DamagedKeystore(f"{printable(path)} is missing") from None
+    except OSError as error:
+        raise StorageError.of(error, "reading the keystore") from None
+
+
+def read_if_there(root: Path, relative: str) -> bytes | None:
+    """As ``read``, None when there is no such file (a dangling link counts as none)."""
+    try:
+        return _read(root / relative, _flags(root, relative))
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise StorageError.of(error, "reading the keystore") from None
+
+
+def read_private(root: Path, relative: str) -> bytes:
+    """As ``read``, for key material: also refuses foreign owners and files that others can write."""
+    refuse_unsafe_private(root, relative)
+    return read(root, relative)
+
+
+def _read(path: Path, flags: int) -> bytes:
+    descriptor = os.open(path, flags)
+    try:
+        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
+            raise UnsafeKeystore(f"{printable(path)} is not a regular file; remove it")
+        chunks = []
+        size = 0
+        while chunk := os.read(descriptor, 1 << 16):
+            chunks.append(chunk)
+            size += len(chunk)
+            if size > _MAX_FILE:
+                raise DamagedKeystore(f"{printable(path)} is larger than {_MAX_FILE} bytes")
+        return b"".join(chunks)
+    finally:
+        os.close(descriptor)
+
+
+def _flags(root: Path, relative: str) -> int:
+    """O_NONBLOCK keeps a planted FIFO from hanging us; links are followed only where SROS2 has them."""
+    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
+    target = link_target(root, relative)
+    if target is None:
+        return flags | os.O_NOFOLLOW
+    if target not in allowed_targets(relative):
+        raise strange_link(root, relative, target)
+    return flags
+
+
+def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystore:
+    path = root / relative
+    return UnsafeKeystore(
+        f"{printable(path)} is a link to {printable(target)}, which no keystore has there; "
+        f"look at it and remove it: rm {shlex.quote(str(path))}"
+    )
+
+
+def link_target(root: Path, relative: str) -> str | None:
+    """Where the file points if it is a link, else None (also when it does not exist)."""
+    try:
+        return os.readlink(root / relative)
+    except OSError:
+        return None
+
+
+def allowed_targets(relative: str) -> tuple[str, ...]:
+    """Every link target that may stand at this place of a keystore."""
+    if relative in layout.CA_LINKS:
+        return (layout.CA_LINKS[relative],)
+    directory, _, name = relative.rpartition("/")
+    if not relative.startswith(layout.ENCLAVES + "/") or name not in layout.ENCLAVE_FILES:
+        return ()
+    enclave = "/" + directory.removeprefix(layout.ENCLAVES).lstrip("/")
+    if name == layout.ENCLAVE_CRL:
+        return (layout.crl_link(enclave),)
+    target = layout.enclave_links(enclave).get(name)
+    return (target,) if target else ()
+
+
+def refuse_unsafe_private(root: Path, relative: str) -> None:
+    """Key files and the directory they are in must be ours, and writable by nobody else."""
+    path = root / relative
+    try:
+        found = (path.parent, os.lstat(path.parent)), (path, os.stat(path))
+    except OSError:
+        return  # missing: the read that follows says so
+    for place, info in found:
+        if problem := private_problem(place, info):
+            raise UnsafeKeystore(problem)
+
+
+def private_problem(path: Path, info: os.stat_result) -> str | None:
+    """What is wrong with the owner or mode of a private file or directory, with the repairing command."""
+    quoted = shlex.quote(str(path))
+    if info.st_uid != os.geteuid():
+        return (
+            f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that user, "
+            f"or take it over: chown -R {os.geteuid()} {quoted}"
+        )
+    if info.st_mode & _WRITABLE_BY_OTHERS:
+        return f"{printable(path)} can be written by others (mode {mode_text(info)}): chmod go-w {quoted}"
+    return None
+
+
+def refuse_unsafe_directory(path: Path) -> None:
+    """A directory we are about to write in: a real one, ours, and not open to everybody."""
+    info = os.lstat(path)
+    quoted = shlex.quote(str(path))
+    if stat.S_ISLNK(info.st_mode) or not stat.S_ISDIR(info.st_mode):
+        raise UnsafeKeystore(f"{printable(path)} is not a directory (a link?); remove it: rm {quoted}")
+    if info.st_uid != os.geteuid():
+        raise UnsafeKeystore(private_problem(path, info) or "")
+    if info.st_mode & stat.S_IWOTH:
+        raise UnsafeKeystore(
+            f"everybody can write in {printable(path)} (mode {mode_text(info)}): chmod o-w {quoted}"
+        )
+
+
+def refuse_unsafe_parent(root: Path) -> None:
+    """Whoever can rename the keystore can replace it: its parent must not be open without the sticky bit."""
+    info = os.stat(root.parent)
+    if info.st_mode & stat.S_IWOTH and not info.st_mode & stat.S_ISVTX:
+        raise UnsafeKeystore(
+            f"everybody can rename what is in {printable(root.parent)}: "
+            f"chmod o-w {shlex.quote(str(root.parent))}, or put the keystore elsewhere"
+        )
+
+
+def mode_text(info: os.stat_result) -> str:
+    return f"{stat.S_IMODE(info.st_mode):04o}"
