@@ -19,7 +19,7 @@ Tree = TypeVar("Tree")
 Stamp = tuple[str, int, int, int]  # path, device and inode mixed in by ino, mtime in ns, size
 
 
-class LaunchFileTooLarge(ValueError):  # noqa: N818
+class LaunchFileTooLarge(ValueError):
     """A file beyond ``MAX_CHARACTERS``."""
 
 
@@ -49,7 +49,7 @@ class LaunchFile:
     def open(self) -> TextIO:
         """The text as a file, for front ends that want one."""
         file = io.StringIO(self.text)
-        file.name = self.name  # type: ignore[misc]  # what open() gives has it, and front ends look at it
+        file.name = self.name  # as a file from open() has it; front ends look at it
         return file
 
 

@@ -18,7 +18,7 @@ from enclave_launch.source_location import SourceLocation
 MODULE_NAME = "python_launch_file"
 
 
-class PythonRefused(RuntimeError):  # noqa: N818
+class PythonRefused(RuntimeError):
     """``--no-python`` is in force."""
 
 

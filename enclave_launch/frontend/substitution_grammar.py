@@ -22,7 +22,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TypeAlias
 
-MAX_NESTING = 64  # upstream's own parser gives up (RecursionError) at about this depth
+MAX_NESTING = 128  # where upstream ends in a RecursionError, too
 
 TemplatePart: TypeAlias = "str | Call"
 Template: TypeAlias = tuple[TemplatePart, ...]
@@ -45,7 +45,7 @@ class TemplateSyntaxError(ValueError):
         self.template = template
 
 
-class UnexpectedCharacters(TemplateSyntaxError):  # noqa: N818  (the name that upstream's users know)
+class UnexpectedCharacters(TemplateSyntaxError):
     """A character that cannot stand at ``position`` (index into the text)."""
 
     def __init__(self, template: str, position: int, expected: str):
@@ -62,7 +62,7 @@ class UnexpectedCharacters(TemplateSyntaxError):  # noqa: N818  (the name that u
         )
 
 
-class UnexpectedEOF(TemplateSyntaxError):  # noqa: N818
+class UnexpectedEOF(TemplateSyntaxError):
     """The text ends inside ``$(...)``."""
 
     def __init__(self, template: str, expected: str):

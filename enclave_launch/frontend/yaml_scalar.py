@@ -18,7 +18,7 @@ _FLOAT = re.compile(r"[-+]?[0-9]{1,17}\.[0-9]{0,17}")
 _NOT_TEXT: dict[str, bool | None] = {
     **{word: True for text in ("yes", "true", "on") for word in (text, text.title(), text.upper())},
     **{word: False for text in ("no", "false", "off") for word in (text, text.title(), text.upper())},
-    **{word: None for word in ("null", "Null", "NULL")},
+    **dict.fromkeys(("null", "Null", "NULL")),
 }
 
 

@@ -1,8 +1,9 @@
 """YAML text -> plain Python values, with the line of each mapping and list. Pure.
 
 Values are those of ``yaml.safe_load``: libyaml reads the text where it can, PyYAML's own scanner decides
-about what libyaml rejects, so that the same files load with the same errors as upstream's. Anchors and aliases
-work; a text whose aliases stand for an excessive number of values, or that nests excessively, is refused.
+about what libyaml rejects, so that the same files load with the same errors as upstream's. Anchors and
+aliases work; a text whose aliases stand for an excessive number of values, or that nests excessively, is
+refused.
 """
 
 from __future__ import annotations
@@ -14,15 +15,15 @@ from typing import Any
 
 import yaml
 
-MAX_NESTING = 100  # upstream's recursion ends at about 150
+MAX_NESTING = 250  # upstream's recursion ends at about this depth
 MAX_EXPANDED_NODES = 4_000_000  # values in a document once each alias is written out
 
 _SafeLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CParser: Any = getattr(yaml, "CLoader", yaml.Loader)
-_MAYBE_DEEP = re.compile(r"^(?: {%d}|(?:[-?:] +){%d})" % (MAX_NESTING, MAX_NESTING // 2), re.MULTILINE)
+_MAYBE_DEEP = re.compile(rf"^(?: {{{MAX_NESTING}}}|.*(?:[-?:]\s+){{{MAX_NESTING // 2}}})", re.MULTILINE)
 
 
-class RefusedYaml(ValueError):  # noqa: N818
+class RefusedYaml(ValueError):
     """Well-formed, but made to exhaust memory or the stack."""
 
 
@@ -88,24 +89,36 @@ _loaders: dict[Any, Any] = {}
 
 def _refuse_many_aliases(root: Any) -> None:
     """Count the nodes of the document with every alias written out; each distinct node is visited once."""
-    if _expanded_size(root, {}) > MAX_EXPANDED_NODES:
+    sizes: dict[int, int] = {}
+    pending = [root]
+    while pending:
+        node = pending[-1]
+        parts = _parts(node)
+        if id(node) not in sizes:
+            sizes[id(node)] = _UNFINISHED
+            pending += [part for part in parts if _is_unsized(part, sizes)]
+            continue
+        pending.pop()
+        if sizes[id(node)] == _UNFINISHED:
+            sizes[id(node)] = 1 + sum(sizes[id(part)] for part in parts)
+    if sizes[id(root)] > MAX_EXPANDED_NODES:
         raise RefusedYaml(f"aliases stand for more than {MAX_EXPANDED_NODES} values")
 
 
-def _expanded_size(node: Any, sizes: dict[int, int]) -> int:
-    known = sizes.get(id(node))
-    if known is not None:
-        if known == 0:
-            raise RefusedYaml(f"a value contains itself: line {node.start_mark.line + 1}")
-        return known
-    sizes[id(node)] = 0
+_UNFINISHED = 0  # size of a node whose parts are being counted
+
+
+def _is_unsized(node: Any, sizes: dict[int, int]) -> bool:
+    size = sizes.get(id(node))
+    if size == _UNFINISHED:
+        raise RefusedYaml(f"a value contains itself: line {node.start_mark.line + 1}")
+    return size is None
+
+
+def _parts(node: Any) -> list[Any]:
     if isinstance(node, yaml.MappingNode):
-        parts = [part for pair in node.value for part in pair]
-    else:
-        parts = node.value if isinstance(node, yaml.SequenceNode) else []
-    size = 1 + sum(_expanded_size(part, sizes) for part in parts)
-    sizes[id(node)] = size
-    return size
+        return [part for pair in node.value for part in pair]
+    return node.value if isinstance(node, yaml.SequenceNode) else []
 
 
 def _refuse_deep_nesting(text: str) -> None:
@@ -118,9 +131,7 @@ def _refuse_deep_nesting(text: str) -> None:
             if isinstance(event, yaml.CollectionStartEvent):
                 depth += 1
                 if depth > MAX_NESTING:
-                    raise RefusedYaml(
-                        f"values are nested more than {MAX_NESTING} deep: line {event.start_mark.line + 1}"
-                    )
+                    raise RefusedYaml(f"values are nested more than {MAX_NESTING} deep")
             elif isinstance(event, yaml.CollectionEndEvent):
                 depth -= 1
     except yaml.YAMLError:

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.source_location import SourceLocation
-
 from enclave_launch.description.launch.frontend import Entity as BaseEntity
 from enclave_launch.description.launch.frontend.type_utils import check_is_list_entity
 from enclave_launch.description.launch.utilities.type_utils import get_typed_value
+from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.frontend.xml_tree import XmlElement
@@ -59,7 +58,7 @@ class Entity(BaseEntity):
         if unread := element.attrib.keys() - self._read_attributes:
             raise ValueError(f"Unexpected attribute(s) found in `{element.tag}`: {unread}")
 
-    def get_attr(  # type: ignore[override]  # the overloads of the base class describe the result
+    def get_attr(
         self, name: str, *, data_type: Any = str, optional: bool = False, can_be_str: bool = True
     ) -> Any:
         if data_type is not str and check_is_list_entity(data_type):

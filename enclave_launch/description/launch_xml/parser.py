@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TextIO
 
+from enclave_launch.description.launch.frontend import Parser as BaseParser
+from enclave_launch.description.launch.frontend.parser import FilePath
+from enclave_launch.description.launch_xml.entity import Entity
 from enclave_launch.frontend import launch_file
 from enclave_launch.frontend.error_location import mark_at
 from enclave_launch.frontend.xml_tree import parse_xml
 from enclave_launch.source_location import SourceLocation
-
-from enclave_launch.description.launch.frontend import Parser as BaseParser
-from enclave_launch.description.launch.frontend.parser import FilePath
-from enclave_launch.description.launch_xml.entity import Entity
 
 
 class Parser(BaseParser):

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from enclave_launch.source_location import SourceLocation
-
 from enclave_launch.description.launch.frontend import Entity as BaseEntity
 from enclave_launch.description.launch.frontend.type_utils import check_is_list_entity
 from enclave_launch.description.launch.utilities.type_utils import is_instance_of
+from enclave_launch.source_location import SourceLocation
 
 _NO_LINES: Mapping[int, int] = {}
 
@@ -17,7 +16,16 @@ _NO_LINES: Mapping[int, int] = {}
 class Entity(BaseEntity):
     """One YAML value under the key that names it; attributes must already have their type."""
 
-    __slots__ = ("_children_called", "_element", "_file", "_line", "_lines", "_parent", "_read_keys", "_type_name")
+    __slots__ = (
+        "_children_called",
+        "_element",
+        "_file",
+        "_line",
+        "_lines",
+        "_parent",
+        "_read_keys",
+        "_type_name",
+    )
 
     def __init__(
         self,
@@ -99,7 +107,7 @@ class Entity(BaseEntity):
         if unread:
             raise ValueError(f"Unexpected key(s) found in `{self._type_name}`: {unread}")
 
-    def get_attr(  # type: ignore[override]  # the overloads of the base class describe the result
+    def get_attr(
         self, name: str, *, data_type: Any = str, optional: bool = False, can_be_str: bool = True
     ) -> Any:
         if name not in self._element:

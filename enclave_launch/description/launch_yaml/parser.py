@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, TextIO
 
-from enclave_launch.frontend import launch_file
-from enclave_launch.frontend.error_location import mark_at
-from enclave_launch.source_location import SourceLocation
-
 from enclave_launch.description.launch.frontend import Parser as BaseParser
 from enclave_launch.description.launch.frontend.parser import FilePath
 from enclave_launch.description.launch_yaml.entity import Entity
+from enclave_launch.frontend import launch_file
+from enclave_launch.frontend.error_location import mark_at
+from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.frontend.yaml_tree import YamlDocument

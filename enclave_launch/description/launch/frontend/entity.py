@@ -1,4 +1,4 @@
-"""``Entity``: one element of a markup launch file, whatever its syntax (API of ``launch.frontend.Entity``)."""
+"""``Entity``: one element of a markup launch file in any syntax (API of ``launch.frontend.Entity``)."""
 
 from __future__ import annotations
 
@@ -58,8 +58,8 @@ class Entity:
         """Read attribute ``name`` as ``data_type``.
 
         ``data_type``: ``str``, ``int``, ``float``, ``bool``, a ``List`` of one of them, ``None`` for YAML
-        typing, or ``List[Entity]`` for the child elements called ``name``. With ``can_be_str`` text stays text
-        where it has not the type, because it may hold substitutions.
+        typing, or ``List[Entity]`` for the child elements called ``name``. With ``can_be_str`` text without
+        the type stays text, because it may hold substitutions.
 
         Raises ``AttributeError`` when absent and not ``optional`` (else returns ``None``), ``TypeError`` for
         a value of the wrong type.

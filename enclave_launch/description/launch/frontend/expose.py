@@ -18,10 +18,10 @@ from enclave_launch.frontend import error_location, extensions
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.action import Action
-    from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
-    from enclave_launch.description.launch.substitution import Substitution
     from enclave_launch.description.launch.frontend.entity import Entity
     from enclave_launch.description.launch.frontend.parser import Parser
+    from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
+    from enclave_launch.description.launch.substitution import Substitution
 
 ParseMethod = Callable[..., tuple[type, dict[str, Any]]]
 Exposed = TypeVar("Exposed")

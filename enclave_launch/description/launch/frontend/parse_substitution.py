@@ -1,7 +1,7 @@
 """Text -> substitution objects (API of ``launch.frontend.parse_substitution``).
 
-The grammar is in ``enclave_launch.frontend.substitution_grammar``. Launch files repeat themselves, and our own
-substitutions never change once built, so what a text gave is kept and its objects are shared.
+The grammar is in ``enclave_launch.frontend.substitution_grammar``. Launch files repeat themselves, and our
+own substitutions never change once built, so what a text gave is kept and its objects are shared.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.launch.frontend import expose
 from enclave_launch.evaluation.host import current_release
 from enclave_launch.frontend.substitution_grammar import (
     Call,
@@ -18,8 +19,6 @@ from enclave_launch.frontend.substitution_grammar import (
     parse_template,
     unescape,
 )
-
-from enclave_launch.description.launch.frontend import expose
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.substitution import Substitution
@@ -36,8 +35,8 @@ def replace_escaped_characters(data: str) -> str:
 def parse_substitution(string_value: str) -> list[Substitution]:
     """Text -> its substitutions, in a new list.
 
-    Raises ``UnexpectedCharacters``, ``UnexpectedEOF``, or ``VisitError`` for an unknown name and for arguments
-    that the substitution refuses.
+    Raises ``UnexpectedCharacters``, ``UnexpectedEOF``, or ``VisitError`` for an unknown name and for
+    arguments that the substitution refuses.
     """
     global _shared_for
     release = current_release()
@@ -81,7 +80,7 @@ def _parse_if(value: Any) -> Any:
 
 @lru_cache(maxsize=16384)
 def _parse_shared(string_value: str) -> tuple[Substitution, ...] | None:
-    """The substitutions of a text; ``None`` when a foreign class takes part, whose objects may have a state."""
+    """The substitutions of a text; ``None`` if a foreign class takes part, whose objects may have a state."""
     template = parse_template(string_value)
     if not all(expose.is_ours(name) for name in called_names(template)):
         return None

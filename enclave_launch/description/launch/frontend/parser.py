@@ -7,11 +7,10 @@ import os
 import warnings
 from typing import TYPE_CHECKING, Any, TextIO
 
-from enclave_launch.frontend import extensions, launch_file
-
-from enclave_launch.description.launch.invalid_launch_file_error import InvalidLaunchFileError
 from enclave_launch.description.launch.frontend import expose, parse_substitution
 from enclave_launch.description.launch.frontend.entity import Entity
+from enclave_launch.description.launch.invalid_launch_file_error import InvalidLaunchFileError
+from enclave_launch.frontend import extensions, launch_file
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.action import Action
@@ -64,9 +63,8 @@ class Parser:
 
     def parse_description(self, entity: Entity) -> LaunchDescription:
         """Root element -> ``LaunchDescription``; ``RuntimeError`` unless it is ``launch``."""
-        from enclave_launch.frontend.error_location import mark
-
         from enclave_launch.description.launch.launch_description import LaunchDescription
+        from enclave_launch.frontend.error_location import mark
 
         try:
             if entity.type_name != "launch":

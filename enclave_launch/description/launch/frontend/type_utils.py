@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, List, get_args  # noqa: UP035  (upstream's identifiers name typing.List)
 
-from enclave_launch.description.launch.utilities.type_utils import is_typing_list
 from enclave_launch.description.launch.frontend.entity import Entity
+from enclave_launch.description.launch.utilities.type_utils import is_typing_list
 
 _TYPE_OF_IDENTIFIER: dict[str, Any] = {
     "str": str,

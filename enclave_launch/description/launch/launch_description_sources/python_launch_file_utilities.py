@@ -24,8 +24,8 @@ def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleTyp
 def get_launch_description_from_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
     """Call the file's ``generate_launch_description()`` and return whatever it returns.
 
-    Raises ``InvalidPythonLaunchFileError`` without that function, ``PythonRefused`` under ``--no-python``, and
-    whatever the file raises, with the place in the file noted on it (``error_location``).
+    Raises ``InvalidPythonLaunchFileError`` without that function, ``PythonRefused`` under ``--no-python``,
+    and whatever the file raises, with the place in the file noted on it (``error_location``).
     """
     try:
         module = load_python_launch_file_as_module(python_launch_file_path)

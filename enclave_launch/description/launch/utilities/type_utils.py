@@ -12,15 +12,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any, List, TypeAlias, Union  # noqa: UP035  (upstream names typing.List)
 
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
-from enclave_launch.frontend import yaml_scalar
-
 from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
 from enclave_launch.description.launch.substitution import Substitution
 from enclave_launch.description.launch.utilities.ensure_argument_type_impl import ensure_argument_type
-from enclave_launch.description.launch.utilities.normalize_to_list_of_substitutions_impl import normalize_to_list_of_substitutions
+from enclave_launch.description.launch.utilities.normalize_to_list_of_substitutions_impl import (
+    normalize_to_list_of_substitutions,
+)
 from enclave_launch.description.launch.utilities.perform_substitutions_impl import perform_substitutions
+from enclave_launch.evaluation.distro import Feature
+from enclave_launch.evaluation.host import current_release
+from enclave_launch.frontend import yaml_scalar
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
@@ -71,7 +72,7 @@ def extract_type(data_type: Any) -> tuple[Any, bool]:
 
 
 def is_instance_of_valid_type(value: Any, *, can_be_str: bool = False) -> bool:
-    """Whether ``value`` is an allowed scalar or a uniform list; with ``can_be_str`` text may stand among others.
+    """Whether ``value`` is an allowed scalar or a uniform list, with ``can_be_str`` also mixed with text.
 
     The first item that is not text decides the type; a bool passes as int but not the other way round.
     """
@@ -290,9 +291,10 @@ def _perform_list(context: LaunchContext, value: list[Any], data_type: Any) -> l
         for item in value
     ]
     if not is_instance_of(result, data_type):
+        if scalar_type is None:
+            raise ValueError("The output list is not uniform")
         raise ValueError(
-            "The output list is not uniform"
-            if scalar_type is None
-            else f"The output list does not match the expected type Got value='{value}', expected type {scalar_type}."
+            f"The output list does not match the expected type Got value='{value}', "
+            f"expected type {scalar_type}."
         )
     return result
