@@ -106,7 +106,7 @@ class Child:
     def __init__(self, tree: ProcessTree, identifier: int, stdin: int, pumps: tuple[OutputPump, ...]) -> None:
         loop = asyncio.get_running_loop()
         self._tree = tree
-        self._identifier = identifier
+        self.identifier = identifier
         self._stdin = stdin
         self.pumps = pumps
         self.started: asyncio.Future[int] = loop.create_future()
@@ -123,12 +123,13 @@ class Child:
     def signal(self, number: int) -> None:
         """To the whole process group. Nothing happens once the process has ended."""
         if self.running:
-            self._tree.send("signal", self._identifier, int(number))
+            self._tree.send("signal", self.identifier, int(number))
 
     def write_stdin(self, data: bytes) -> None:
         """As much as the pipe takes; a process that does not read its stdin must not block the launch."""
-        with contextlib.suppress(BlockingIOError, BrokenPipeError):
-            os.write(self._stdin, data)
+        if self._stdin >= 0:
+            with contextlib.suppress(BlockingIOError, BrokenPipeError):
+                os.write(self._stdin, data)
 
     async def wait(self) -> int:
         """The exit status, after all that the process itself wrote has been received."""
@@ -139,12 +140,23 @@ class Child:
 
     def sweep(self) -> None:
         """Kill what the ended process left running, so that a successor finds its devices free."""
-        self._tree.send("sweep", self._identifier, self.pid)
+        self._tree.send("sweep", self.identifier, self.pid)
+
+    def retire(self) -> None:
+        """It has ended; what it left running may write on until the launch ends."""
+        if all(pump.closed for pump in self.pumps):
+            self.release()
+        else:
+            self._close_stdin()
 
     def release(self) -> None:
-        """Close our ends of its streams."""
+        """Close our ends of its streams; the tree forgets it."""
+        self._tree.forget(self.identifier)
         for pump in self.pumps:
             pump.close()
+        self._close_stdin()
+
+    def _close_stdin(self) -> None:
         if self._stdin >= 0:
             os.close(self._stdin)
             self._stdin = -1
@@ -175,6 +187,7 @@ class ProcessTree:
         self._buffer = b""
         self._children: dict[int, Child] = {}
         self._count = 0
+        self._paused = False
         self._loop: asyncio.AbstractEventLoop | None = None
         self.lost: asyncio.Future[None] | None = None
 
@@ -224,12 +237,31 @@ class ProcessTree:
                 os.close(descriptor)
         try:
             await asyncio.shield(child.started)
-        except OSError:
+        except BaseException:  # cancelled: whatever may have started has no owner
+            self.send("signal", child.identifier, int(signal.SIGKILL))
             child.release()
             raise
-        for pump in pumps:
-            pump.resume()
+        if not self._paused:
+            for pump in pumps:
+                pump.resume()
         return child
+
+    def pause_output(self) -> None:
+        """Read nothing more from any child, present or coming, until ``resume_output``."""
+        self._paused = True
+        for child in self._children.values():
+            for pump in child.pumps:
+                pump.pause()
+
+    def resume_output(self) -> None:
+        self._paused = False
+        for child in self._children.values():
+            if child.started.done():
+                for pump in child.pumps:
+                    pump.resume()
+
+    def forget(self, identifier: int) -> None:
+        self._children.pop(identifier, None)
 
     def send(self, *message: Message, descriptors: Sequence[int] = ()) -> None:
         data = marshal.dumps(message)
@@ -247,11 +279,10 @@ class ProcessTree:
         self._socket.close()
         loop = asyncio.get_running_loop()
         await asyncio.shield(loop.run_in_executor(None, self._process.wait))
-        for child in self._children.values():
+        for child in list(self._children.values()):
             child.release()
             if not child.exited.done():
                 child.exited.cancel()
-        self._children.clear()
 
     def _receive(self) -> None:
         try:
@@ -270,7 +301,8 @@ class ProcessTree:
                 break
             kind, identifier, *rest = marshal.loads(self._buffer[HEADER.size : end])
             self._buffer = self._buffer[end:]
-            self._on_message(kind, self._children[identifier], rest)
+            if identifier in self._children:
+                self._on_message(kind, self._children[identifier], rest)
 
     def _on_message(self, kind: str, child: Child, rest: list[object]) -> None:
         if kind == "started":
@@ -286,7 +318,7 @@ class ProcessTree:
         """The warden was killed. Its children died with it; end what they had started in their groups."""
         if self._loop is not None:
             self._loop.remove_reader(self._socket)
-        for child in self._children.values():
+        for child in list(self._children.values()):
             if child.running:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.killpg(child.pid, signal.SIGKILL)

@@ -28,6 +28,12 @@ class LifeRules:
     respawn: bool = False
     respawn_delay: float = 0.0
     max_retries: int = -1
+
+
+@dataclass(frozen=True, slots=True)
+class Patience:
+    """Seconds from SIGINT to SIGTERM, and from there to SIGKILL."""
+
     sigterm_timeout: float = 5.0
     sigkill_timeout: float = 5.0
 
@@ -75,7 +81,7 @@ class SupervisedProcess:
         self._child: Child | None = None
         self._ending = asyncio.Event()
         self._timers: list[asyncio.TimerHandle] = []
-        self._sigint_on_start: bool | None = None
+        self._owed: tuple[Patience, bool] | None = None  # an end asked for before there was a child
 
     @property
     def child(self) -> Child | None:
@@ -91,24 +97,21 @@ class SupervisedProcess:
                     break
                 if await self._ending_within(self._rules.respawn_delay):
                     break
+                self._clear_away()
                 retries += 1
             return Outcome(returncode, self._ending.is_set())
         finally:
             self._cancel_timers()
-            if self._child is not None:
-                self._child.release()
 
-    def end(self, *, quiet: bool = False) -> None:
-        """SIGINT now, SIGTERM and SIGKILL when it does not help. ``quiet``: the user knows, it was his
-        Ctrl-C.
-        """
+    def end(self, patience: Patience, *, quiet: bool = False) -> None:
+        """SIGINT now, SIGTERM and SIGKILL when it does not help. ``quiet``: the user knows, it was his Ctrl-C."""
         if self._ending.is_set():
             return
         self._ending.set()
         if self._child is None:
-            self._sigint_on_start = quiet
+            self._owed = patience, quiet
         else:
-            self._begin_escalation(quiet)
+            self._begin_escalation(patience, quiet)
 
     def signal(self, number: Signals, *, quiet: bool = False) -> None:
         if self._child is None or not self._child.running:
@@ -131,14 +134,19 @@ class SupervisedProcess:
         self._child = child
         self._log("INFO", f"process started with pid [{child.pid}]")
         self._watcher.on_started(child.pid)
-        if self._sigint_on_start is not None:  # asked to end while it was being started
-            self._begin_escalation(self._sigint_on_start)
+        if self._owed is not None:
+            self._begin_escalation(*self._owed)
         returncode = await child.wait()
         self._report_exit(child.pid, returncode, spec)
-        child.sweep()
-        child.release()
-        self._child = None
+        child.retire()
         return returncode
+
+    def _clear_away(self) -> None:
+        """A successor must not meet what its predecessor left running."""
+        if self._child is not None:
+            self._child.sweep()
+            self._child.release()
+            self._child = None
 
     def _report_exit(self, pid: int, returncode: int, spec: ProcessSpec) -> None:
         self._cancel_timers()
@@ -159,10 +167,10 @@ class SupervisedProcess:
                 await asyncio.wait_for(self._ending.wait(), seconds)
         return self._ending.is_set()
 
-    def _begin_escalation(self, quiet: bool) -> None:
+    def _begin_escalation(self, patience: Patience, quiet: bool) -> None:
         loop = asyncio.get_running_loop()
-        first = self._rules.sigterm_timeout
-        both = first + self._rules.sigkill_timeout
+        first = patience.sigterm_timeout
+        both = first + patience.sigkill_timeout
         self.signal(SIGINT, quiet=quiet)
         self._timers = [
             loop.call_later(first, self._escalate, first, SIGINT, SIGTERM),

@@ -281,9 +281,7 @@ def test_killing_the_launcher_ends_children_grandchildren_and_daemons(tmp_path: 
 
 def test_killing_the_warden_ends_its_children_and_is_noticed(tmp_path: Path) -> None:
     async def body(tree: ProcessTree) -> None:
-        child = await tree.spawn(
-            shell(f"sh -c 'echo $$ > {tmp_path}/pid; exec sleep 60'; true"), Recorder()
-        )
+        child = await tree.spawn(shell(f"sh -c 'echo $$ > {tmp_path}/pid; exec sleep 60'; true"), Recorder())
         inner = await asyncio.to_thread(read_pid, tmp_path / "pid")
         os.kill(tree.warden_pid, signal.SIGKILL)
         assert await child.wait() == -signal.SIGKILL

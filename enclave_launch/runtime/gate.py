@@ -1,0 +1,135 @@
+"""Between a process and its start stands its enclave: complete on disk, and no more than the plan foresaw.
+
+The runtime knows only ``EnclaveGate``; what makes keys and permissions sits behind it. ``PlannedGate`` holds every
+process of a live run against the plan that was signed: plans are fixed before the first process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from enclave_launch.errors import RuntimeFailure
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+
+
+@dataclass(frozen=True, slots=True)
+class Grant:
+    """What a process gets for its enclave: ``arguments`` end its command line, ``environment`` is laid over."""
+
+    arguments: tuple[str, ...] = ()
+    environment: Mapping[str, str] = field(default_factory=dict)
+
+
+class EnclaveGate(Protocol):
+    """Called before every start, in a worker thread, one call at a time."""
+
+    def ensure(self, process: ResolvedProcess) -> Grant:
+        """Return once the enclave of ``process`` is complete on disk; idempotent.
+
+        :raises EnclaveLaunchError: it cannot be; nothing that depends on it is started.
+        """
+
+    def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
+        """The same for components about to be loaded into a container that runs already."""
+
+    def launcher(self) -> Grant | None:
+        """For our own ROS node, where the plan has calls for it to make."""
+
+
+class Provider(Protocol):
+    """What makes enclaves complete: implemented over a plan and a keystore."""
+
+    def ensure(self, process: ResolvedProcess) -> Grant: ...
+
+    def ensure_late(self, process: ResolvedProcess) -> Grant:
+        """Extend the plan by a process it did not have, and provision that."""
+
+    def launcher(self) -> Grant | None: ...
+
+
+class LateProcess(RuntimeFailure):
+    """An action that only exists at run time wants permissions that nobody signed."""
+
+
+def identity(process: ResolvedProcess) -> tuple[object, ...]:
+    """What decides the permissions of a process. Not its number, its command line or its parameter files, which
+    differ between a dry run and a live one."""
+    return (
+        process.kind,
+        process.package,
+        process.executable,
+        process.fqn,
+        process.enclave,
+        tuple((rule.source, rule.target) for rule in process.remaps),
+        process.parameters.get("use_sim_time"),  # subscribes /clock
+    )
+
+
+def component_identity(component: ResolvedComponent) -> tuple[object, ...]:
+    return (
+        component.container,
+        component.package,
+        component.plugin,
+        component.fqn,
+        tuple((rule.source, rule.target) for rule in component.remaps),
+        component.parameters.get("use_sim_time"),
+    )
+
+
+class PlannedGate:
+    """``say_late`` is told of each process that ``allow_late`` lets through."""
+
+    def __init__(
+        self,
+        processes: Iterable[ResolvedProcess],
+        components: Iterable[ResolvedComponent],
+        provider: Provider,
+        *,
+        allow_late: bool,
+        say_late: Callable[[str], None],
+    ) -> None:
+        self._processes = {identity(process) for process in processes}
+        self._components = {component_identity(component) for component in components}
+        self._provider = provider
+        self._allow_late = allow_late
+        self._say_late = say_late
+
+    def ensure(self, process: ResolvedProcess) -> Grant:
+        if identity(process) in self._processes:
+            return self._provider.ensure(process)
+        if process.kind == "executable" and process.enclave.attribute is None:
+            return Grant()  # no ROS process as far as the launch file tells: nothing to sign
+        if not self._allow_late:
+            raise LateProcess(_refusal(f"{_named(process)} at {process.location}"))
+        self._say_late(
+            f"{_named(process)} at {process.location} was not foreseen: provisioned now (--allow-late)"
+        )
+        grant = self._provider.ensure_late(process)
+        self._processes.add(identity(process))
+        return grant
+
+    def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
+        """A container reads its permissions once, at its start: what comes late cannot be granted any more."""
+        for component in components:
+            if component_identity(component) not in self._components:
+                raise LateProcess(
+                    _refusal(
+                        f"component {component.package}/{component.plugin} for {component.container} at "
+                        f"{component.location}",
+                        remedy="; the container has read its permissions: name the component in the launch file",
+                    )
+                )
+
+    def launcher(self) -> Grant | None:
+        return self._provider.launcher()
+
+
+def _named(process: ResolvedProcess) -> str:
+    what = f"{process.package}/{process.executable}" if process.package else process.executable
+    return f"{what} ({process.fqn})" if process.fqn else what
+
+
+def _refusal(what: str, remedy: str = "; --allow-late provisions it when it appears") -> str:
+    return f"refused: {what} only exists at run time and goes beyond the permissions signed before the launch{remedy}"

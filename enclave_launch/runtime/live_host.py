@@ -1,0 +1,149 @@
+"""The evaluation's seam to the world, live: what ``start_process`` gets is started.
+
+Takes what the visit of the description decides, one action at a time; each process starts in a task of its own, as
+launch does it, and only once the gate has said that its enclave is complete.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.evaluation.host import BaseHost
+from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
+from enclave_launch.runtime.gate import EnclaveGate, Grant
+from enclave_launch.runtime.launch_log import LaunchLog
+from enclave_launch.runtime.live_process import LiveProcess
+from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.runtime.ros_services import RosServices
+
+
+class LiveHost(BaseHost):
+    """``secrets``: variables that no child may see. ``fail`` is told why the launch cannot go on."""
+
+    def __init__(
+        self,
+        tree: ProcessTree,
+        log: LaunchLog,
+        gate: EnclaveGate | None,
+        *,
+        secrets: frozenset[str],
+        fail: Callable[[EnclaveLaunchError], None],
+        services: RosServices | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(**options)
+        self._loop = asyncio.get_running_loop()
+        self._tree = tree
+        self._log = log
+        self._gate = gate
+        self._gate_free = asyncio.Lock()
+        self._secrets = secrets
+        self._fail = fail
+        self._services = services
+        self._parameter_directory: Path | None = None
+        self._parameter_files: dict[str, str] = {}
+        self._tasks: set[asyncio.Task[None]] = set()
+        self.processes: list[LiveProcess] = []
+        self.failed: list[str] = []  # names of processes that ended badly on their own
+
+    @property
+    def loop(self) -> asyncio.AbstractEventLoop:
+        return self._loop
+
+    def write_parameter_file(self, text: str) -> str:
+        """Readable by us alone, and kept until the launch ends: a respawned node reads it again."""
+        if self._parameter_directory is None:
+            self._parameter_directory = Path(tempfile.mkdtemp(prefix="launch_params_"))
+        path = self._parameter_directory / f"{len(self._parameter_files) + 1}.yaml"
+        path.write_text(text, encoding="utf-8")
+        self._parameter_files[str(path)] = text
+        return str(path)
+
+    def parameter_file(self, path: str) -> str | None:
+        return self._parameter_files.get(path)
+
+    def start_process(
+        self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext
+    ) -> asyncio.Future[None]:
+        base = dict((action.process_details or {}).get("env") or {})
+        live = LiveProcess(
+            action, process, context, self._tree, self._log, lambda tty: self._prepare(process, base, tty)
+        )
+        self.processes.append(live)
+        completed: asyncio.Future[None] = self._loop.create_future()
+        task = self._loop.create_task(self._run(live, completed), name=process.process_name)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return completed
+
+    def load_components(self, components: Sequence[ResolvedComponent], context: LaunchContext) -> None:
+        if not components:
+            return
+        if self._gate is not None:
+            self._gate.ensure_components(components)
+        assert (
+            self._services is not None
+        )  # the service refuses to start without, where the plan has components
+        context.add_completion_future(self._services.load(components))
+
+    def launcher_call(self, call: LauncherCall) -> None:
+        """Noted in the plan; made by ``ros_services``."""
+
+    def unforeseeable(self, item: Unforeseeable) -> None:
+        """Only a plan has to say so; here it simply happens."""
+
+    def warn(self, text: str) -> None:
+        if text not in self.warnings:
+            super().warn(text)
+            self._log.log("WARNING", "launch", text)
+
+    def log_directory(self) -> str:
+        return str(self._log.directory)
+
+    async def close(self) -> None:
+        for task in list(self._tasks):
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._parameter_directory is not None:
+            shutil.rmtree(self._parameter_directory, ignore_errors=True)
+
+    async def _run(self, live: LiveProcess, completed: asyncio.Future[None]) -> None:
+        try:
+            outcome = await live.run()
+            if outcome.returncode != 0 and not outcome.asked_to_end:
+                self.failed.append(live.process.process_name)
+        except EnclaveLaunchError as error:
+            self._fail(error)
+        finally:
+            self.processes.remove(live)
+            if not completed.done():
+                completed.set_result(None)
+
+    async def _prepare(
+        self, process: ResolvedProcess, base: Mapping[str, str], emulate_tty: bool
+    ) -> ProcessSpec:
+        grant = await self._granted(process)
+        environment = {name: value for name, value in base.items() if name not in self._secrets}
+        return ProcessSpec(
+            cmd=(*process.cmd, *grant.arguments),
+            environment={**environment, **grant.environment},
+            cwd=process.cwd,
+            shell=process.shell,
+            emulate_tty=emulate_tty,
+        )
+
+    async def _granted(self, process: ResolvedProcess) -> Grant:
+        if self._gate is None:
+            return Grant()
+        async with self._gate_free:
+            return await asyncio.to_thread(self._gate.ensure, process)

@@ -1,0 +1,171 @@
+"""One process action of a live run: its supervision on one side, the launch's events on the other.
+
+Comes from ``LiveHost.start_process``. What happens to the process becomes launch events; the events that launch
+addresses to processes (shutdown, signal, stdin) become calls on it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from signal import Signals
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.launch.conditions import evaluate_condition_expression
+from enclave_launch.description.launch.event_handler import EventHandler
+from enclave_launch.description.launch.event_handlers import OnShutdown
+from enclave_launch.description.launch.events import Shutdown
+from enclave_launch.description.launch.events.process import (
+    ProcessExited,
+    ProcessStarted,
+    ProcessStderr,
+    ProcessStdin,
+    ProcessStdout,
+    ShutdownProcess,
+    SignalProcess,
+)
+from enclave_launch.description.launch.utilities import (
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.process import ResolvedProcess
+from enclave_launch.runtime.launch_log import LaunchLog, Level
+from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree, Stream
+from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter, OutputSetting, output_routes
+from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
+    from enclave_launch.description.launch.launch_context import LaunchContext
+
+Prepare = Callable[[ResolvedProcess], Awaitable[ProcessSpec]]
+
+
+class LiveProcess:
+    """:raises ValueError: an output setting or ``emulate_tty`` value that launch does not know."""
+
+    def __init__(
+        self,
+        action: ExecuteLocal,
+        process: ResolvedProcess,
+        context: LaunchContext,
+        tree: ProcessTree,
+        log: LaunchLog,
+        prepare: Callable[[bool], Awaitable[ProcessSpec]],
+    ) -> None:
+        self.process = process
+        self._action = action
+        self._context = context
+        self._log = log
+        self._details: dict[str, Any] = action.process_details or {}
+        self._router = OutputRouter(
+            log, process.process_name, output_routes(_output_setting(action, context)), _line_renderer(action)
+        )
+        emulate_tty = _emulate_tty(action, context)
+        self._supervised = SupervisedProcess(
+            process.process_name,
+            lambda: prepare(emulate_tty),
+            tree,
+            LifeRules(bool(action.respawn), action.respawn_delay or 0.0, action.respawn_max_retries),
+            self,
+            self._say,
+        )
+        for handler in self._handlers():
+            context.register_event_handler(handler)
+
+    async def run(self) -> Outcome:
+        if self._action.log_cmd:
+            command = " ".join(word for word in self.process.cmd if word.strip())
+            self._say("INFO", f"process details: cmd='{command}', cwd='{self.process.cwd}', custom_env?=True")
+        return await self._supervised.run()
+
+    def interrupt_again(self) -> None:
+        """The user pressed Ctrl-C once more; a terminal would have passed that on."""
+        self._supervised.signal(Signals.SIGINT, quiet=True)
+
+    # Watcher
+
+    def on_started(self, pid: int) -> None:
+        self._details["pid"] = pid
+        self._context.emit_event_sync(ProcessStarted(**self._details))
+
+    def on_output(self, stream: Stream, data: bytes) -> None:
+        self._router.feed(stream, data)
+        if self._action.cached_output:
+            self._action.captured_output[stream == "stderr"].append(data.decode(errors="replace"))
+        event = (ProcessStdout if stream == "stdout" else ProcessStderr)(text=data, **self._details)
+        if self._context.would_handle_event(event):
+            self._context.emit_event_sync(event)
+
+    def on_exited(self, pid: int, returncode: int) -> None:
+        self._router.flush()
+        self._action.final_return_code = returncode
+        self._context.emit_event_sync(ProcessExited(returncode=returncode, **self._details))
+
+    # Events to it
+
+    def _handlers(self) -> list[Any]:
+        def addressed(cls: type) -> Callable[[Any], bool]:
+            return lambda event: isinstance(event, cls) and event.process_matcher(self._action)
+
+        return [
+            Reaction(ShutdownProcess, addressed(ShutdownProcess), lambda _: self._end(quiet=False)),
+            Reaction(SignalProcess, addressed(SignalProcess), self._on_signal),
+            Reaction(ProcessStdin, lambda event: event.action is self._action, self._on_stdin),
+            OnShutdown(on_shutdown=self._on_shutdown),
+        ]
+
+    def _on_signal(self, event: Any) -> None:
+        self._supervised.signal(Signals[event.signal_name])
+
+    def _on_stdin(self, event: Any) -> None:
+        child = self._supervised.child
+        if child is not None:
+            child.write_stdin(event.text)
+
+    def _on_shutdown(self, event: Shutdown, context: LaunchContext) -> None:
+        self._end(quiet=event.due_to_sigint and not context.noninteractive)
+
+    def _end(self, *, quiet: bool) -> None:
+        patience = Patience(
+            self._seconds(self._action.sigterm_timeout), self._seconds(self._action.sigkill_timeout)
+        )
+        self._supervised.end(patience, quiet=quiet)
+
+    def _seconds(self, substitutions: Any) -> float:
+        return float(perform_substitutions(self._context, substitutions))
+
+    def _say(self, level: Level, message: str) -> None:
+        self._log.log(level, self.process.process_name, message)
+
+
+class Reaction(EventHandler):
+    """Calls a function at an event; there is nothing to visit."""
+
+    def __init__(self, cls: type, matcher: Callable[[Any], bool], react: Callable[[Any], None]) -> None:
+        super().__init__(matcher=matcher)
+        self.event_class = cls
+        self._react = react
+
+    def handle(self, event: Any, context: LaunchContext) -> None:
+        super().handle(event, context)
+        self._react(event)
+
+
+def _output_setting(action: ExecuteLocal, context: LaunchContext) -> OutputSetting:
+    output: Any = action.output
+    return output if isinstance(output, dict) else perform_substitutions(context, output)
+
+
+def _emulate_tty(action: ExecuteLocal, context: LaunchContext) -> bool:
+    """The launch configuration ``emulate_tty`` overrides what the action says."""
+    if "emulate_tty" not in context.launch_configurations:
+        return bool(action.emulate_tty)
+    text = context.launch_configurations["emulate_tty"]
+    return evaluate_condition_expression(context, normalize_to_list_of_substitutions(text))
+
+
+def _line_renderer(action: ExecuteLocal) -> Callable[[str], str] | None:
+    if action.output_format == DEFAULT_FORMAT:
+        return None
+    return lambda line: action.output_format.format(line=line, this=action)

@@ -1,0 +1,185 @@
+"""What only a ROS node can do for a launch: load components, ask for lifecycle transitions, hear of state changes.
+
+Needs rclpy, which is imported when a launch needs it and never otherwise. The node has a context of its own, in the
+launcher's own enclave, and spins in a thread of its own; results come back as futures of the launch's loop.
+Source of the calls: launch_ros/actions/load_composable_nodes.py, lifecycle_node.py, ros_adapters.py.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+from enclave_launch.errors import RuntimeFailure
+from enclave_launch.process import ParameterValue, ResolvedComponent
+from enclave_launch.runtime.gate import Grant
+from enclave_launch.runtime.launch_log import Level
+
+ALTERNATIVE = (
+    "it needs ROS services (loading components, lifecycle transitions), and rclpy is not importable here. "
+    "Source a ROS 2 workspace, or launch with ROS's own engine: "
+    "ros2 launch --secure --keystore KEYSTORE PACKAGE LAUNCH_FILE"
+)
+
+
+def rclpy_available() -> bool:
+    import importlib.util
+
+    return importlib.util.find_spec("rclpy") is not None
+
+
+class RosServices:
+    """:raises RuntimeFailure: no rclpy; said before anything starts."""
+
+    def __init__(self, grant: Grant | None, say: Callable[[Level, str], None]) -> None:
+        if not rclpy_available():
+            raise RuntimeFailure(f"cannot run this launch file: {ALTERNATIVE}")
+        import rclpy
+        import rclpy.executors
+
+        self._say = say
+        self._loop = asyncio.get_running_loop()
+        self._closing = threading.Event()
+        grant = grant or Grant()
+        with _environment(grant.environment):
+            self._ros = rclpy.Context()
+            rclpy.init(args=["--ros-args", *_without_marker(grant.arguments)], context=self._ros)
+            self._node = rclpy.create_node(f"launch_ros_{os.getpid()}", context=self._ros)
+        self._executor = rclpy.executors.SingleThreadedExecutor(context=self._ros)
+        self._executor.add_node(self._node)
+        self._thread = threading.Thread(target=self._spin, name="ros-services", daemon=True)
+        self._thread.start()
+
+    def load(self, components: Sequence[ResolvedComponent]) -> asyncio.Future[None]:
+        """One after another; a component that cannot be loaded is logged, as launch does, and the rest goes on."""
+        return self._loop.run_in_executor(None, self._load_all, tuple(components))
+
+    def change_state(self, node: str, transition: int) -> asyncio.Future[bool]:
+        """``transition``: a constant of ``lifecycle_msgs/msg/Transition``."""
+        return self._loop.run_in_executor(None, self._change_state, node, transition)
+
+    def watch_state(self, node: str, on_transition: Callable[[Any], None]) -> None:
+        """``on_transition`` gets each ``lifecycle_msgs/msg/TransitionEvent`` of ``node``, in the launch's loop."""
+        from lifecycle_msgs.msg import TransitionEvent
+
+        self._node.create_subscription(
+            TransitionEvent,
+            f"{node}/transition_event",
+            lambda message: self._loop.call_soon_threadsafe(on_transition, message),
+            10,
+        )
+
+    def close(self) -> None:
+        import rclpy
+
+        self._closing.set()
+        self._executor.shutdown()
+        self._thread.join(5.0)
+        self._node.destroy_node()
+        rclpy.shutdown(context=self._ros)
+
+    def _spin(self) -> None:
+        while not self._closing.is_set():
+            self._executor.spin_once(timeout_sec=0.1)
+
+    def _load_all(self, components: tuple[ResolvedComponent, ...]) -> None:
+        from composition_interfaces.srv import LoadNode
+
+        for component in components:
+            response = self._call(
+                LoadNode, f"{component.container}/_container/load_node", _load_request(component)
+            )
+            if response is None:
+                return
+            self._report_load(component, response)
+
+    def _report_load(self, component: ResolvedComponent, response: Any) -> None:
+        name = response.full_node_name or component.name
+        if response.success:
+            self._tell("INFO", f"Loaded node '{name}' in container '{component.container}'")
+        else:
+            self._tell(
+                "ERROR",
+                f"Failed to load node '{name}' of type '{component.plugin}' in container "
+                f"'{component.container}': {response.error_message}",
+            )
+
+    def _change_state(self, node: str, transition: int) -> bool:
+        from lifecycle_msgs.srv import ChangeState
+
+        request = ChangeState.Request()
+        request.transition.id = transition
+        response = self._call(ChangeState, f"{node}/change_state", request)
+        if response is not None and not response.success:
+            self._tell("ERROR", f"Failed to make transition '{transition}' for LifecycleNode '{node}'")
+        return response is not None and bool(response.success)
+
+    def _call(self, kind: Any, service: str, request: Any) -> Any:
+        """The response; None when the launch ended first."""
+        client = self._node.create_client(kind, service)
+        try:
+            while not client.wait_for_service(timeout_sec=0.5):
+                if self._closing.is_set():
+                    self._tell("WARNING", f"Abandoning wait for the '{service}' service, due to shutdown.")
+                    return None
+            answered = threading.Event()
+            future = client.call_async(request)
+            future.add_done_callback(lambda _: answered.set())
+            while not answered.wait(0.5):
+                if self._closing.is_set():
+                    self._tell(
+                        "WARNING", f"Abandoning wait for the '{service}' service response, due to shutdown."
+                    )
+                    return None
+            return future.result()
+        finally:
+            self._node.destroy_client(client)
+
+    def _tell(self, level: Level, message: str) -> None:
+        self._loop.call_soon_threadsafe(self._say, level, message)
+
+
+def _load_request(component: ResolvedComponent) -> Any:
+    from composition_interfaces.srv import LoadNode
+
+    request = LoadNode.Request()
+    request.package_name = component.package
+    request.plugin_name = component.plugin
+    request.node_name = component.name
+    request.node_namespace = component.namespace
+    request.remap_rules = [f"{rule.source}:={rule.target}" for rule in component.remaps]
+    request.parameters = _parameters(component.parameters)
+    request.extra_arguments = _parameters(component.extra_arguments)
+    return request
+
+
+def _parameters(values: Mapping[str, ParameterValue]) -> list[Any]:
+    from rclpy.parameter import Parameter
+
+    return [
+        Parameter(name, value=list(value) if isinstance(value, tuple) else value).to_parameter_msg()
+        for name, value in values.items()
+    ]
+
+
+def _without_marker(arguments: Sequence[str]) -> list[str]:
+    return [word for word in arguments if word != "--ros-args"]
+
+
+@contextmanager
+def _environment(variables: Mapping[str, str]) -> Iterator[None]:
+    """rcl reads the security variables from our own environment, at ``init`` and at node creation."""
+    before = {name: os.environ.get(name) for name in variables}
+    os.environ.update(variables)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

@@ -1,0 +1,285 @@
+"""The live launch: one event loop that drives evaluation, processes, timers and signals until all is over.
+
+    run_launch(description, ...)         blocks, takes the signals, returns the exit status
+    run_launch_async(description, ...)   the same inside a running loop, cancel-safe
+
+Semantics of launch/launch_service.py: the description is visited while one event is handled; then events, newest
+handler first, until nothing is left to wait for. Stricter than there: SIGTERM, SIGQUIT and SIGHUP shut down in
+order and leave no orphans; what ended badly on its own shows in the exit status.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AsyncExitStack, contextmanager
+from dataclasses import dataclass, field
+from datetime import datetime
+from signal import SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIG_IGN, Signals, getsignal
+from typing import Any, TextIO
+
+from enclave_launch.description.launch.event_handlers import OnIncludeLaunchDescription, OnShutdown
+from enclave_launch.description.launch.events import IncludeLaunchDescription, Shutdown
+from enclave_launch.description.launch.launch_context import LaunchContext
+from enclave_launch.description.launch.launch_description import LaunchDescription
+from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
+from enclave_launch.evaluation.environment import environment_untouched
+from enclave_launch.evaluation.events import handle_next
+from enclave_launch.evaluation.host import active_host
+from enclave_launch.evaluation.location import place_of
+from enclave_launch.runtime.gate import EnclaveGate
+from enclave_launch.runtime.launch_log import LaunchLog, Level
+from enclave_launch.runtime.live_host import LiveHost
+from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
+from enclave_launch.runtime.process_tree import ProcessTree
+from enclave_launch.runtime.ros_services import RosServices
+from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
+
+
+@dataclass(frozen=True, slots=True)
+class RunOptions:
+    """How to run; what to run is decided elsewhere.
+
+    ``host_options`` go to the evaluation's host (distribution, seed of anonymous names, ...), the same as the
+    plan's. ``secrets``: environment variables no child may see. ``notices`` are said once, at the start.
+    """
+
+    noninteractive: bool = False
+    debug: bool = False
+    shutdown_when_idle: bool = True
+    arguments: tuple[str, ...] = ()
+    screen: TextIO | None = None
+    secrets: frozenset[str] = frozenset()
+    notices: tuple[str, ...] = ()
+    needs_ros_services: bool = False
+    host_options: dict[str, Any] = field(default_factory=dict)
+
+
+def run_launch(
+    description: LaunchDescription, *, gate: EnclaveGate | None = None, options: RunOptions | None = None
+) -> int:
+    """Run to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
+
+    :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed.
+    """
+
+    async def main() -> int:
+        service = LaunchService(description, gate=gate, options=options or RunOptions())
+        with _signals_to(service):
+            return await service.run()
+
+    return asyncio.run(main())
+
+
+async def run_launch_async(
+    description: LaunchDescription, *, gate: EnclaveGate | None = None, options: RunOptions | None = None
+) -> int:
+    """As ``run_launch``; signals stay the caller's. Cancelling it shuts down, in order, before it returns."""
+    return await LaunchService(description, gate=gate, options=options or RunOptions()).run()
+
+
+class LaunchService:
+    """One run. ``shut_down`` may be called from the loop at any time."""
+
+    def __init__(
+        self, description: LaunchDescription, *, gate: EnclaveGate | None, options: RunOptions
+    ) -> None:
+        self._description = description
+        self._gate = gate
+        self._options = options
+        self._wake = asyncio.Event()
+        self._futures: list[asyncio.Future[Any]] = []
+        self._shutting_down = False
+        self._interrupted = False
+        self._failed = False
+        self._log: LaunchLog
+        self._host: LiveHost
+        self._context: LaunchContext
+
+    async def run(self) -> int:
+        async with AsyncExitStack() as stack:
+            tree = ProcessTree()  # first: the warden starts up while we go on
+            await stack.enter_async_context(tree)
+            services = self._ros_services()
+            if services is not None:
+                stack.callback(services.close)
+            self._log = self._open_log(tree)
+            stack.callback(self._log.close)
+            stack.enter_context(environment_untouched())
+            self._host = LiveHost(
+                tree,
+                self._log,
+                self._gate,
+                secrets=self._options.secrets,
+                fail=self._on_failure,
+                services=services,
+                **self._options.host_options,
+            )
+            stack.push_async_callback(self._host.close)
+            stack.enter_context(active_host(self._host))
+            return await self._run_until_over(tree)
+
+    def shut_down(self, reason: str, *, due_to_sigint: bool = False) -> None:
+        """Queue the ``Shutdown`` event, once; nothing new is started from here on."""
+        if not self._shutting_down:
+            self._context.emit_event_sync(Shutdown(reason=reason, due_to_sigint=due_to_sigint))
+        self._shutting_down = True
+        self._context._set_is_shutdown(True)
+
+    def on_signal(self, number: Signals) -> None:
+        if number is not SIGINT:
+            self._say("ERROR", f"received {number.name}, shutting down")
+            self._failed = True
+            self.shut_down(f"signal {number.name}")
+        elif self._interrupted:
+            self._say("WARNING", "user interrupted with ctrl-c (SIGINT) again, passing it on...")
+            for process in self._host.processes:
+                process.interrupt_again()
+        else:
+            self._interrupted = True
+            self._say("WARNING", "user interrupted with ctrl-c (SIGINT)")
+            self.shut_down("ctrl-c (SIGINT)", due_to_sigint=True)
+
+    async def _run_until_over(self, tree: ProcessTree) -> int:
+        self._say("INFO", f"All log files can be found below {self._log.directory}")
+        self._say("INFO", f"Default logging verbosity is set to {'DEBUG' if self._options.debug else 'INFO'}")
+        for notice in self._options.notices:
+            self._say("WARNING", notice)
+        self._begin()
+        if tree.lost is not None:
+            tree.lost.add_done_callback(self._on_warden_lost)
+        cancelled: asyncio.CancelledError | None = None
+        while True:
+            try:
+                await self._turn()
+            except _Over:
+                break
+            except asyncio.CancelledError as error:
+                cancelled = error
+                self.shut_down("cancelled")
+            except Exception as error:  # noqa: BLE001  # launch files run code of their own: any error ends the launch
+                self._on_error(error)
+        if cancelled is not None:
+            raise cancelled
+        return self._exit_status()
+
+    def _begin(self) -> None:
+        self._context = LaunchContext(
+            argv=self._options.arguments, noninteractive=self._options.noninteractive, host=self._host
+        )
+        self._context._event_queue.wake = self._wake.set
+        self._context.register_event_handler(OnIncludeLaunchDescription())
+        self._context.register_event_handler(OnShutdown(on_shutdown=self._on_shutdown_event))
+        self._context.emit_event_sync(IncludeLaunchDescription(self._description))
+
+    async def _turn(self) -> None:
+        """Handle one event, or wait for something to happen. Raises ``_Over`` when there is nothing more."""
+        queue = self._context._event_queue
+        if not queue.empty():
+            self._futures += [future for _, future in handle_next(self._context, lambda *_: None)]
+            await asyncio.sleep(0)
+            return
+        pending = self._pending()
+        if not pending and self._shutting_down:
+            raise _Over
+        if not pending and self._options.shutdown_when_idle:
+            self.shut_down("idle")
+            return
+        await self._wait_for(pending)
+
+    def _pending(self) -> list[asyncio.Future[Any]]:
+        self._futures += self._context._completion_futures
+        self._context._completion_futures = []
+        done = [future for future in self._futures if future.done()]
+        self._futures = [future for future in self._futures if not future.done()]
+        for future in done:
+            if not future.cancelled() and future.exception() is not None:
+                raise future.exception() or RuntimeError()
+        return self._futures
+
+    async def _wait_for(self, pending: Sequence[asyncio.Future[Any]]) -> None:
+        self._wake.clear()
+        if not self._context._event_queue.empty():
+            return
+        waker = asyncio.ensure_future(self._wake.wait())
+        try:
+            await asyncio.wait([waker, *pending], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            waker.cancel()
+
+    def _on_shutdown_event(self, event: Shutdown, context: LaunchContext) -> None:
+        self._shutting_down = True
+        self._context._set_is_shutdown(True)
+
+    def _on_error(self, error: Exception) -> None:
+        """As launch does, with the place in the launch file where evaluation knows it."""
+        self._failed = True
+        place = place_of(error)
+        where = f"{place}: " if place is not None and not isinstance(error, EnclaveLaunchError) else ""
+        message = f"Caught exception in launch (see debug for traceback): {where}{error}"
+        if self._options.debug:
+            import traceback
+
+            self._say("DEBUG", "".join(traceback.format_exception(error)))
+        self._say("ERROR", message)
+        self.shut_down(message)
+
+    def _on_failure(self, error: EnclaveLaunchError) -> None:
+        """A process could not be secured: nothing that depends on it is started, the launch ends."""
+        self._failed = True
+        self._say("CRITICAL", str(error))
+        self.shut_down(str(error))
+
+    def _on_warden_lost(self, _: object) -> None:
+        self._on_failure(RuntimeFailure("the warden process was killed, and all processes with it"))
+
+    def _exit_status(self) -> int:
+        if self._host.failed:
+            self._say("ERROR", f"ended badly on their own: {', '.join(self._host.failed)}")
+        return 1 if self._failed or self._host.failed else 0
+
+    def _ros_services(self) -> RosServices | None:
+        if not self._options.needs_ros_services:
+            return None
+        return RosServices(self._gate.launcher() if self._gate is not None else None, self._late_say)
+
+    def _late_say(self, level: Level, message: str) -> None:
+        self._say(level, message)
+
+    def _open_log(self, tree: ProcessTree) -> LaunchLog:
+        loop = asyncio.get_running_loop()
+        directory = make_log_directory(
+            log_base_directory(os.environ), datetime.now(), socket.gethostname(), os.getpid()
+        )
+        writer = SinkWriter(tree.pause_output, lambda: loop.call_soon_threadsafe(tree.resume_output))
+        return LaunchLog(
+            directory, ScreenSink(self._options.screen or sys.stdout), writer, os.environ, self._options.debug
+        )
+
+    def _say(self, level: Level, message: str) -> None:
+        self._log.log(level, "launch", message)
+
+
+class _Over(Exception):
+    """Nothing is left to wait for."""
+
+
+@contextmanager
+def _signals_to(service: LaunchService) -> Iterator[None]:
+    """SIGHUP only where nobody (nohup) asked us to ignore it."""
+    loop = asyncio.get_running_loop()
+    numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if _wanted(number)]
+    for number in numbers:
+        loop.add_signal_handler(number, service.on_signal, number)
+    try:
+        yield
+    finally:
+        for number in numbers:
+            loop.remove_signal_handler(number)
+
+
+def _wanted(number: Signals) -> bool:
+    return number is not SIGHUP or getsignal(number) is not SIG_IGN

@@ -1,0 +1,208 @@
+"""One process over its life: respawn, escalation, and the messages that launch writes."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import signal
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.errors import ProvisionError
+from enclave_launch.runtime.launch_log import Level
+from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree, Stream
+from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
+from tests.runtime.conftest import alive, eventually, read_pid
+
+STUBBORN = "trap '' INT TERM; echo ready; while true; do sleep 0.05; done"
+QUICK = Patience(0.2, 0.2)
+
+
+class Story:
+    """What happened to one process, in order."""
+
+    def __init__(self) -> None:
+        self.pids: list[int] = []
+        self.exits: list[int] = []
+        self.output = b""
+        self.lines: list[tuple[Level, str]] = []
+
+    def on_started(self, pid: int) -> None:
+        self.pids.append(pid)
+
+    def on_output(self, stream: Stream, data: bytes) -> None:
+        self.output += data
+
+    def on_exited(self, pid: int, returncode: int) -> None:
+        self.exits.append(returncode)
+
+    def say(self, level: Level, message: str) -> None:
+        self.lines.append(
+            (level, re.sub(r"pid \[?\d+", lambda found: found[0].rstrip("0123456789") + "PID", message))
+        )
+
+    async def until(self, condition: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + 10
+        while not condition():
+            assert time.monotonic() < deadline, self.lines
+            await asyncio.sleep(0.005)
+
+
+Steps = Callable[[SupervisedProcess, Story], Awaitable[None]]
+
+
+def lived(script: str, rules: LifeRules | None = None, steps: Steps | None = None) -> tuple[Outcome, Story]:
+    story = Story()
+
+    async def prepare() -> ProcessSpec:
+        return ProcessSpec((script,), dict(os.environ), shell=True)
+
+    async def main() -> Outcome:
+        async with ProcessTree() as tree:
+            process = SupervisedProcess("a-1", prepare, tree, rules or LifeRules(), story, story.say)
+            running = asyncio.create_task(process.run())
+            if steps is not None:
+                await steps(process, story)
+            return await asyncio.wait_for(running, 20)
+
+    return asyncio.run(main()), story
+
+
+def test_a_clean_end() -> None:
+    outcome, story = lived("true")
+    assert outcome == Outcome(0, asked_to_end=False)
+    assert story.lines == [
+        ("INFO", "process started with pid [PID]"),
+        ("INFO", "process has finished cleanly [pid PID]"),
+    ]
+
+
+def test_a_bad_end() -> None:
+    outcome, story = lived("exit 7")
+    assert outcome == Outcome(7, asked_to_end=False)
+    assert story.lines[-1] == ("ERROR", "process has died [pid PID, exit code 7, cmd 'exit 7'].")
+
+
+def test_a_program_that_cannot_be_started() -> None:
+    story = Story()
+
+    async def prepare() -> ProcessSpec:
+        return ProcessSpec(("/no/such/program",), {})
+
+    async def main() -> Outcome:
+        async with ProcessTree() as tree:
+            return await SupervisedProcess(
+                "a-1", prepare, tree, LifeRules(respawn=True), story, story.say
+            ).run()
+
+    assert asyncio.run(main()) == Outcome(None, asked_to_end=False)
+    assert story.lines == [("ERROR", "cannot start process: No such file or directory: '/no/such/program'")]
+
+
+def test_respawn_until_the_retries_are_used_up() -> None:
+    outcome, story = lived("exit 1", LifeRules(respawn=True, max_retries=2))
+    assert story.exits == [1, 1, 1]
+    assert len(set(story.pids)) == 3
+    assert outcome == Outcome(1, asked_to_end=False)
+
+
+def test_respawn_under_kill_9_until_asked_to_end() -> None:
+    async def steps(process: SupervisedProcess, story: Story) -> None:
+        for count in range(1, 6):
+            await story.until(lambda count=count: len(story.pids) == count)  # type: ignore[misc]
+            os.kill(story.pids[-1], signal.SIGKILL)
+        await story.until(lambda: len(story.pids) == 6)
+        process.end(QUICK)
+
+    outcome, story = lived("exec sleep 60", LifeRules(respawn=True), steps)
+    assert story.exits == [-9] * 5 + [-2]
+    assert outcome.asked_to_end
+
+
+def test_the_delay_before_a_respawn_is_kept_and_cut_short_by_the_end() -> None:
+    async def steps(process: SupervisedProcess, story: Story) -> None:
+        await story.until(lambda: bool(story.exits))
+        await asyncio.sleep(0.2)
+        assert len(story.pids) == 1
+        process.end(QUICK)
+
+    start = time.monotonic()
+    _, story = lived("true", LifeRules(respawn=True, respawn_delay=30.0), steps)
+    assert len(story.pids) == 1
+    assert time.monotonic() - start < 10
+
+
+def test_a_successor_does_not_meet_what_its_predecessor_left(tmp_path: Path) -> None:
+    script = f"cp {tmp_path}/now {tmp_path}/before; sleep 60 >/dev/null & echo $! > {tmp_path}/now"
+    survived: list[bool] = []
+
+    async def steps(process: SupervisedProcess, story: Story) -> None:
+        await story.until(lambda: len(story.exits) == 2)
+        first = await asyncio.to_thread(read_pid, tmp_path / "before")
+        gone = await asyncio.to_thread(eventually, lambda: not alive(first))
+        survived.append(not gone)
+
+    (tmp_path / "now").write_text("0")
+    lived(script, LifeRules(respawn=True, max_retries=1, respawn_delay=0.05), steps)
+    assert survived == [False]
+
+
+def test_sigint_ends_it_and_says_so() -> None:
+    async def steps(process: SupervisedProcess, story: Story) -> None:
+        await story.until(lambda: story.output == b"ready\n")
+        process.end(Patience())
+
+    _, story = lived("trap 'exit 0' INT; echo ready; while true; do sleep 0.05; done", steps=steps)
+    assert story.lines[1:] == [
+        ("INFO", "sending signal 'SIGINT' to process[a-1]"),
+        ("INFO", "process has finished cleanly [pid PID]"),
+    ]
+
+
+def test_a_child_that_ignores_sigint_and_sigterm_is_killed() -> None:
+    async def steps(process: SupervisedProcess, story: Story) -> None:
+        await story.until(lambda: story.output == b"ready\n")
+        process.end(QUICK, quiet=True)
+
+    outcome, story = lived(STUBBORN, steps=steps)
+    assert outcome == Outcome(-9, asked_to_end=True)
+    assert story.lines[1:-1] == [
+        (
+            "ERROR",
+            "process[a-1] failed to terminate '0.2' seconds after receiving 'SIGINT', escalating to 'SIGTERM'",
+        ),
+        ("INFO", "sending signal 'SIGTERM' to process[a-1]"),
+        (
+            "ERROR",
+            "process[a-1] failed to terminate '0.4' seconds after receiving 'SIGTERM', escalating to 'SIGKILL'",
+        ),
+        ("INFO", "sending signal 'SIGKILL' to process[a-1]"),
+    ]
+
+
+def test_asked_to_end_before_it_was_started() -> None:
+    async def steps(process: SupervisedProcess, story: Story) -> None:
+        process.end(QUICK)
+
+    outcome, story = lived("exec sleep 60", steps=steps)
+    assert outcome.asked_to_end
+    assert story.exits in ([], [-2])
+
+
+def test_a_refusal_to_prepare_starts_nothing_and_reaches_the_caller() -> None:
+    story = Story()
+
+    async def prepare() -> ProcessSpec:
+        raise ProvisionError("keystore is read-only")
+
+    async def main() -> None:
+        async with ProcessTree() as tree:
+            await SupervisedProcess("a-1", prepare, tree, LifeRules(), story, story.say).run()
+
+    with pytest.raises(ProvisionError, match="read-only"):
+        asyncio.run(main())
+    assert story.pids == []
