@@ -21,6 +21,7 @@ from nodl import ament_index
 if TYPE_CHECKING:
     from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
     from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.launch_ros.actions.lifecycle_node import LifecycleNode
     from enclave_launch.evaluation.loading import LoadCache
     from enclave_launch.process import (
         LauncherCall,
@@ -93,6 +94,9 @@ class Host(Protocol):
 
     def launcher_call(self, call: LauncherCall) -> None:
         """Note a ROS service that launch itself must call."""
+
+    def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
+        """Ask a started lifecycle node for a transition. Does not wait."""
 
     def unforeseeable(self, item: Unforeseeable) -> None:
         """Note something only known at run time."""
@@ -239,6 +243,9 @@ class PlanHost(BaseHost):
 
     def launcher_call(self, call: LauncherCall) -> None:
         self.calls.append(call)
+
+    def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
+        """Nothing is started in a dry run, so nothing changes its state."""
 
     def unforeseeable(self, item: Unforeseeable) -> None:
         self.unforeseen.append(item)

@@ -1,0 +1,59 @@
+"""Extensions of ``Node`` by other packages: entry points ``launch_ros.node_action``."""
+
+from __future__ import annotations
+
+import os
+import sys
+import warnings
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.launch_ros.utilities import plugin_support
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.launch_ros.actions.node import Node
+
+_GROUP = "launch_ros.node_action"
+_REPLACED = frozenset({"ros2launch_security"})  # its enclave per node is what --enclave-scope node gives
+
+
+class NodeActionExtension:
+    """Base of extensions; exported by ``launch_ros.actions.node``."""
+
+    NAME: str | None = None
+    EXTENSION_POINT_VERSION = "0.1"
+
+    def __init__(self) -> None:
+        plugin_support.satisfies_version(self.EXTENSION_POINT_VERSION, "^0.1")
+
+    def prepare_for_execute(
+        self, context: LaunchContext, ros_specific_arguments: dict[str, Any], node_action: Node
+    ) -> tuple[list[Any], dict[str, Any]]:
+        """Words to append to the command line, and the (changed) local ROS arguments."""
+        return [], ros_specific_arguments
+
+
+@lru_cache(maxsize=1)
+def installed_extensions() -> tuple[NodeActionExtension, ...]:
+    """One instance of each. One that cannot be loaded is a warning, as upstream.
+
+    Extensions extend an installed launch_ros; without one the look-up (50 ms) is spared.
+    """
+    if not any(os.path.isdir(os.path.join(folder, "launch_ros")) for folder in sys.path):
+        return ()
+    import importlib.metadata
+
+    found = importlib.metadata.entry_points(group=_GROUP)
+    loaded = [_instantiate(entry) for entry in found if entry.name not in _REPLACED]
+    return tuple(extension for extension in loaded if extension is not None)
+
+
+def _instantiate(entry_point: Any) -> NodeActionExtension | None:
+    try:
+        extension: NodeActionExtension = entry_point.load()()
+    except Exception as error:  # foreign code: it may raise anything, and must not stop the launch
+        warnings.warn(f"Failed to load the node extension {entry_point.name}: {error}", stacklevel=2)
+        return None
+    extension.NAME = entry_point.name
+    return extension

@@ -1,0 +1,26 @@
+"""How often each fully qualified node name was used in this launch, to warn about repeats."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+from enclave_launch.description.launch.launch_context import LaunchContext
+
+_GLOBAL = "unique_ros_node_names"
+
+
+def add_node_name(context: LaunchContext, node_name: str) -> None:
+    _counts(context)[node_name] += 1
+
+
+def get_node_name_count(context: LaunchContext, node_name: str) -> int:
+    return _counts(context)[node_name]
+
+
+def _counts(context: LaunchContext) -> Counter[str]:
+    """The table lives in the context's globals, where third-party code may look for it."""
+    counts: Counter[str] | None = getattr(context.locals, _GLOBAL, None)
+    if counts is None:
+        counts = Counter()
+        context.extend_globals({_GLOBAL: counts})
+    return counts

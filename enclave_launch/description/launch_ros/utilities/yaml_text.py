@@ -1,0 +1,65 @@
+"""YAML between launch and its nodes: constants that need no reading, and the text of parameter files."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Any
+
+from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
+
+# What PyYAML writes without quotes and reads back as the same text: no word of YAML 1.1's booleans and
+# nulls, nothing that starts like a number, no space at which a long line would be folded.
+_PLAIN_TEXT = re.compile(
+    r"(?!(?i:y|n|yes|no|on|off|true|false|null)\Z)[A-Za-z_/][A-Za-z0-9_/.+-]*\Z", re.ASCII
+)
+
+
+class YamlConstant(TextSubstitution):
+    """A value given in Python. launch writes it as YAML and reads it back; the value is the same."""
+
+    def __init__(self, value: str | int | float):
+        self.value = value
+        super().__init__(text="" if isinstance(value, str) else str(value))
+
+    @property
+    def text(self) -> str:
+        return dump(self.value)
+
+    def perform(self, context: Any) -> str:
+        return self.text
+
+
+def load(text: str) -> Any:
+    """YAML 1.1 as PyYAML reads it. Raises ``yaml.YAMLError``."""
+    import yaml
+
+    return yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+
+
+def dump(value: Any) -> str:
+    """YAML as PyYAML writes it by default, Python tags included; block style, sorted keys."""
+    import yaml
+
+    return str(yaml.dump(value, default_flow_style=False))
+
+
+def parameter_file(section: str, parameters: Mapping[str, Any]) -> str:
+    """The parameter file launch writes for one dict: ``section`` is a node's full name or ``/**``."""
+    if not parameters:
+        return dump({section: {"ros__parameters": {}}})
+    lines = [_entry(name, parameters[name]) for name in sorted(parameters)]
+    if all(lines) and (section == "/**" or _PLAIN_TEXT.match(section)):
+        return f"{section}:\n  ros__parameters:\n" + "".join(f"    {line}\n" for line in lines)
+    return dump({section: {"ros__parameters": dict(parameters)}})
+
+
+def _entry(name: str, value: Any) -> str:
+    """``name: value`` when both need no quoting, else empty: then the real writer is asked."""
+    if not _PLAIN_TEXT.match(name) or len(name) > 100:
+        return ""
+    if value is True or value is False:
+        return f"{name}: {str(value).lower()}"
+    if type(value) is int or (type(value) is str and _PLAIN_TEXT.match(value)):
+        return f"{name}: {value}"
+    return ""

@@ -1,0 +1,82 @@
+"""What rcl finds on a node's command line: remap rules, parameter sources, the enclave.
+
+Command line in, values out; pure. launch never looks into ``args`` and ``ros_args``, but the process does.
+Rules from ros2/rcl ``arguments.c``: ROS arguments stand between ``--ros-args`` and ``--`` (or the end);
+outside of them a word with ``:=`` is still taken as a remap rule (deprecated there).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+_REMAP = ("-r", "--remap")
+_PARAMETER = ("-p", "--param")
+_PARAMETER_FILE = ("--params-file",)
+_ENCLAVE = ("-e", "--enclave")
+_OTHER_WITH_VALUE = ("--log-level", "--log-config-file", "--log-file-name")
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterFile:
+    """``--params-file PATH``."""
+
+    path: str
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterRule:
+    """``-p [NODE:]NAME:=VALUE``; ``value`` is YAML."""
+
+    name: str
+    value: str
+    node: str | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RosArguments:
+    """In command-line order. Of remap rules the first match wins, of parameters and enclaves the last."""
+
+    remaps: tuple[str, ...] = ()
+    parameters: tuple[ParameterFile | ParameterRule, ...] = ()
+    enclave: str | None = None
+
+
+def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
+    """Read the words after the executable. What rcl would refuse is skipped: the process says so itself."""
+    remaps: list[str] = []
+    parameters: list[ParameterFile | ParameterRule] = []
+    enclave: str | None = None
+    for flag, value in _flags(arguments):
+        if flag in _REMAP:
+            remaps.append(value)
+        elif flag in _PARAMETER_FILE:
+            parameters.append(ParameterFile(value))
+        elif flag in _ENCLAVE:
+            enclave = value
+        elif flag in _PARAMETER and ":=" in value:
+            parameters.append(_parameter_rule(value))
+    return RosArguments(tuple(remaps), tuple(parameters), enclave)
+
+
+def _flags(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """``(flag, value)`` of each ROS argument; a deprecated bare rule comes as ``-r``."""
+    inside = False
+    words = iter(arguments)
+    for word in words:
+        if word == "--ros-args":
+            inside = True
+        elif inside and word == "--":
+            inside = False
+        elif inside and word in (*_REMAP, *_PARAMETER, *_PARAMETER_FILE, *_ENCLAVE, *_OTHER_WITH_VALUE):
+            value = next(words, None)
+            if value is not None:
+                yield word, value
+        elif not inside and ":=" in word:
+            yield _REMAP[0], word
+
+
+def _parameter_rule(text: str) -> ParameterRule:
+    target, _, value = text.partition(":=")
+    node, colon, name = target.rpartition(":")
+    return ParameterRule(name, value, node if colon else None)
