@@ -1,8 +1,8 @@
-"""Import the modules that register elements and substitutions, step by step, only as far as needed.
+"""Import what registers an element or a substitution, when its name is first met.
 
-Upstream imports every installed extension before the first file is parsed. We ask for the next step each
-time a name is still unknown: our ``launch``, our ``launch_ros``, then the entry points of other installed
-packages. The result is the same, without the 60 ms that looking up entry points takes.
+Upstream imports every installed extension before the first file is parsed. Here a name that is not registered
+yet brings in the one module of ours that has it (the ``TAGS`` of its package), then all of ours, then the
+entry points of other installed packages. The result is the same, without the 60 ms that entry points take.
 """
 
 from __future__ import annotations
@@ -10,43 +10,56 @@ from __future__ import annotations
 import importlib
 import warnings
 from collections.abc import Callable, Iterator
+from functools import partial
 
-OUR_MODULES = (
-    "enclave_launch.description.launch.actions",
-    "enclave_launch.description.launch.substitutions",
-    "enclave_launch.description.launch_ros.actions",
-    "enclave_launch.description.launch_ros.substitutions",
-)
+OUR_PACKAGES = {
+    "action": ("enclave_launch.description.launch.actions", "enclave_launch.description.launch_ros.actions"),
+    "substitution": (
+        "enclave_launch.description.launch.substitutions",
+        "enclave_launch.description.launch_ros.substitutions",
+    ),
+}
 EXTENSION_GROUP = "launch.frontend.launch_extension"
 OUR_EXTENSIONS = frozenset({"launch_ros"})
 
-
-def load_next_registrations() -> bool:
-    """Import one more source of registrations; ``False`` when none is left."""
-    step = next(_steps, None)
-    if step is None:
-        return False
-    step()
-    return True
+_entry_points_loaded = False
 
 
-def load_all_registrations() -> None:
-    """Import everything that can register a name."""
-    while load_next_registrations():
-        pass
+def registrations_of(kind: str, name: str) -> Iterator[Callable[[], object]]:
+    """Steps that may each register ``name``; the caller stops as soon as one has.
 
-
-def _pending() -> Iterator[Callable[[], object]]:
-    yield lambda: [importlib.import_module(module) for module in OUR_MODULES[:2]]
-    yield lambda: [importlib.import_module(module) for module in OUR_MODULES[2:]]
+    ``kind``: ``action`` or ``substitution``.
+    """
+    for package in OUR_PACKAGES[kind]:
+        tags: dict[str, str] = getattr(importlib.import_module(package), "TAGS", {})
+        if name in tags:
+            yield partial(importlib.import_module, f"{package}.{tags[name]}")
+    for package in OUR_PACKAGES[kind]:
+        yield partial(_import_all, package)
     yield _load_entry_points
 
 
-_steps = _pending()
+def load_all() -> None:
+    """Import everything that can register a name."""
+    for packages in OUR_PACKAGES.values():
+        for package in packages:
+            _import_all(package)
+    _load_entry_points()
+
+
+def _import_all(package: str) -> None:
+    """The packages import lazily: touching each name imports its module."""
+    module = importlib.import_module(package)
+    for name in module.__all__:
+        getattr(module, name)
 
 
 def _load_entry_points() -> None:
-    """Load installed third-party extensions; one that fails is a warning, as upstream."""
+    """Load installed third-party extensions, once; one that fails is a warning, as upstream."""
+    global _entry_points_loaded
+    if _entry_points_loaded:
+        return
+    _entry_points_loaded = True
     import importlib.metadata
 
     for entry_point in importlib.metadata.entry_points(group=EXTENSION_GROUP):

@@ -103,7 +103,9 @@ def test_unexpected_characters_count_lines() -> None:
     assert str(caught.value).splitlines()[2:4] == ["two $(var x )", "            ^"]
 
 
-@pytest.mark.parametrize("text", ["$(", "$(var", "$(var ", "$(var x", "$(var 'x", r"$(var 'x\')", "a $(f $(g)"])
+@pytest.mark.parametrize(
+    "text", ["$(", "$(var", "$(var ", "$(var x", "$(var 'x", r"$(var 'x\')", "a $(f $(g)"]
+)
 def test_text_that_ends_early(text: str) -> None:
     with pytest.raises(UnexpectedEOF, match="Unexpected end-of-input"):
         parse_template(text)
@@ -138,7 +140,7 @@ def test_excessive_nesting_is_an_error_and_no_recursion() -> None:
 
 
 GRAMMAR_TEXT = st.lists(
-    st.sampled_from(["$(", ")", "(", " ", "'", '"', "\\", "$", "a", "b-c", "$(v ", "$(v '", "\n", "\t", "é", "1"]),
+    st.sampled_from(["$(", *"() '\"\\$a1é\n\t", "b-c", "$(v ", "$(v '"]),
     max_size=30,
 ).map("".join)
 
@@ -186,7 +188,7 @@ def test_a_template_prints_as_text_that_parses_to_it(template: tuple[str | Call,
     ids=["no part", "backslash before a call", "bad name", "two texts in a row"],
 )
 def test_what_no_text_stands_for_cannot_be_printed(template: tuple[str | Call, ...]) -> None:
-    with pytest.raises(ValueError, match="no text stands for|Unexpected|No terminal"):
+    with pytest.raises(ValueError, match=r"no text stands for|No terminal"):
         print_template(template)
 
 

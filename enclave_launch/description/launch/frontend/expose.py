@@ -1,8 +1,8 @@
 """Registries of the actions and substitutions that XML and YAML can name (API of ``launch.frontend.expose``).
 
 ``parse`` methods are registered by decorator when their module is imported; ``instantiate_*`` calls them.
-The modules that register ours are imported when the first unknown name is met, and only then; entry points of
-installed packages (``launch.frontend.launch_extension``) are looked up when the name is still unknown.
+A name that is not registered yet is looked for in our own modules, then in other installed packages
+(``enclave_launch.frontend.extensions``).
 """
 
 from __future__ import annotations
@@ -91,12 +91,20 @@ def expose_substitution(name: str, *, feature: Feature | None = None) -> Callabl
 
 
 def _lookup(kind: str, name: str) -> ParseMethod | None:
-    methods = _METHODS[kind]
-    method = methods.get(name)
-    while method is None and extensions.load_next_registrations():
-        method = methods.get(name)
+    """The registered parse method, imported if need be; ``None`` if the release in force has none."""
     gate = _gates.get((kind, name))
-    return None if gate is not None and not current_release().has(gate) else method
+    if gate is not None and not current_release().has(gate):
+        return None
+    method = _METHODS[kind].get(name)
+    return _import_and_lookup(kind, name) if method is None else method
+
+
+def _import_and_lookup(kind: str, name: str) -> ParseMethod | None:
+    for register in extensions.registrations_of(kind, name):
+        register()
+        if name in _METHODS[kind]:
+            return _lookup(kind, name)
+    return None
 
 
 def _exposer(kind: str, name: str, gate: Feature | None) -> Callable[[Exposed], Exposed]:

@@ -88,7 +88,7 @@ def _parse_shared(string_value: str) -> tuple[Substitution, ...] | None:
 
 
 def _instantiate(template: Template, text: str) -> list[Substitution]:
-    from enclave_launch.description.launch.substitutions import TextSubstitution
+    from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
 
     return [
         _instantiate_call(part, text) if isinstance(part, Call) else TextSubstitution(text=part)

@@ -33,7 +33,7 @@ class Parser:
     @classmethod
     def load_launch_extensions(cls) -> None:
         """Import everything that registers actions and substitutions."""
-        extensions.load_all_registrations()
+        extensions.load_all()
         cls.extensions_loaded = True
 
     @classmethod
