@@ -1,0 +1,44 @@
+"""For colcon (build type ament_python); pip and everything else read pyproject.toml.
+
+Adds what an ament index wants installed. setuptools before 61, as on Ubuntu 22.04 with ROS 2 Humble, does not read
+pyproject.toml: there the same metadata is given here, and a test holds the two together.
+"""
+
+import setuptools
+
+NAME = "enclave_launch"
+DATA_FILES = [
+    ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
+    (f"share/{NAME}", ["package.xml"]),
+]
+VERSION = "0.1.0"
+REQUIRES = ["lxml>=4.9", "pyyaml>=6.0", "cryptography>=42", "pydantic>=2.5"]
+PACKAGE_DATA = {
+    "enclave_launch": ["py.typed"],
+    "nodl": ["py.typed", "schemas/*"],
+    "keystore": ["py.typed", "schemas/*"],
+}
+ENTRY_POINTS = {
+    "console_scripts": [
+        "secure-launch = enclave_launch.verb.secure_launch:main",
+        "secure-keystore = keystore.verb:main",
+        "secure-nodl = nodl.verb:main",
+    ],
+    "launch.frontend.launch_extension": ["enclave_launch = enclave_launch.ros2.attributes"],
+    "launch_ros.node_action": ["security_enclaves = enclave_launch.ros2.node_action:EnclaveNodeActionExtension"],
+    "ros2launch.option": ["security_enclaves = enclave_launch.ros2.option:EnclaveOption"],
+}
+
+if int(setuptools.__version__.split(".")[0]) >= 61:
+    setuptools.setup(data_files=DATA_FILES)
+else:
+    setuptools.setup(
+        name=NAME,
+        version=VERSION,
+        packages=setuptools.find_packages(include=["enclave_launch*", "nodl*", "keystore*"]),
+        package_data=PACKAGE_DATA,
+        data_files=DATA_FILES,
+        install_requires=REQUIRES,
+        entry_points=ENTRY_POINTS,
+        zip_safe=False,
+    )
