@@ -70,26 +70,33 @@ def dds(request: pytest.FixtureRequest) -> Probe:
     return probe
 
 
+@pytest.fixture(scope="session")
+def patched_dds() -> Path:
+    """To preload into an attacker: a DDS library that believes everything."""
+    if shutil.which("gcc") is None:
+        missing("A C compiler", "apt-get install gcc libc6-dev")
+    return _built([HERE / "patched_attacker.c"], ["gcc", "-shared", "-fPIC"], ["-ldl"])
+
+
 def _built_fastdds_probe() -> Path:
-    """Compiled once per version of its source, also when several test processes come at once."""
     if shutil.which("g++") is None or not Path("/usr/include/fastdds/dds").is_dir():
         missing("Fast DDS", "apt-get install g++ libfastrtps-dev")
     sources = sorted((HERE / "fastdds_probe").iterdir())
+    return _built(sources, ["g++", "-std=c++17", "-O1"], ["-lfastrtps", "-lfastcdr"])
+
+
+def _built(sources: list[Path], compiler: list[str], libraries: list[str]) -> Path:
+    """Compiled once per version of its source, also when several test processes come at once."""
     version = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
-    folder = Path(tempfile.gettempdir()) / f"enclave-launch-fastdds-probe-{os.getuid()}"
+    folder = Path(tempfile.gettempdir()) / f"enclave-launch-dds-tests-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
-    program = folder / version
+    result, unfinished = folder / version, folder / f"{version}.unfinished"
     with open(folder / f"{version}.lock", "w") as lock:
         fcntl.flock(lock, fcntl.LOCK_EX)
-        if not program.exists():
-            _compile([source for source in sources if source.suffix == ".cpp"], program)
-    return program
-
-
-def _compile(sources: list[Path], program: Path) -> None:
-    unfinished = program.with_suffix(".unfinished")
-    libraries = ["-lfastrtps", "-lfastcdr"]
-    command = ["g++", "-std=c++17", "-O1", "-o", str(unfinished), *map(str, sources), *libraries]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=300)
-    assert result.returncode == 0, result.stderr
-    unfinished.rename(program)
+        if not result.exists():
+            units = [str(source) for source in sources if source.suffix in (".c", ".cpp")]
+            command = [*compiler, "-o", str(unfinished), *units, *libraries]
+            run = subprocess.run(command, capture_output=True, text=True, timeout=300)
+            assert run.returncode == 0, run.stderr
+            unfinished.rename(result)
+    return result

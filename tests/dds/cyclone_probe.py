@@ -1,8 +1,8 @@
 """The Cyclone DDS half of the probe; the job and its answers are described in ``probe.py``.
 
 Run by path, as a process of its own: ``python cyclone_probe.py JOBFILE``. Each participant lives in a
-forked process: Cyclone DDS 0.10 judges the endpoints of all participants of one process by the
-permissions of the first.
+forked process; together they would not do: Cyclone DDS 0.10 judges the endpoints of all participants of
+one process by the permissions of the first.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 DEMO_NODES = Path(__file__).parents[2] / "fixtures" / "demo_ws" / "lib" / "demo_nodes"
@@ -84,61 +85,70 @@ class Participant:
         return fresh
 
 
-def run(participant: Participant, longest: float, quiet: float) -> None:
-    start = last_news = time.monotonic()
-    any_news = False
-    while time.monotonic() - start < longest:
+def run(participant: Participant, seconds: float) -> None:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
         participant.talk()
         for topic, text in participant.listen():
             answer(participant.label, "heard", topic, text)
-            last_news, any_news = time.monotonic(), True
-        if quiet and any_news and time.monotonic() - last_news > quiet:
-            return
         time.sleep(0.1)
 
 
-def carry_out(lines: list[list[str]], domain: int) -> None:
-    """One participant, alone in its process."""
+@dataclass
+class Job:
+    """One participant and what it shall try."""
+
+    label: str
+    directory: str
+    environment: dict[str, str]
+    attempts: list[list[str]]
+
+
+def carry_out(job: Job, domain: int) -> None:
+    """In a process of its own."""
+    os.environ.update(job.environment)
     keep = Domain(domain, LOOPBACK_ONLY)
-    (_, label, directory), *rest = lines
+    label = job.label
     try:
-        participant = Participant(label, directory, domain)
+        participant = Participant(label, job.directory, domain)
     except DDSException as error:
         print(f"{label}: {error}", file=sys.stderr)
         answer(label, "participant", "-", "refused")
         return
     answer(label, "participant", "-", "allowed")
-    for verb, *words in rest:
+    for verb, *words in job.attempts:
         if verb == "run":
-            run(participant, float(words[0]), float(words[1]))
+            run(participant, float(words[0]))
         else:
             allowed = participant.publish(*words) if verb == "publish" else participant.subscribe(*words)
             answer(label, verb, words[0], "allowed" if allowed else "refused")
     del keep
 
 
-def split(job: list[list[str]]) -> tuple[int, list[list[list[str]]]]:
-    """The domain, and for each participant its lines; ``run`` is for all."""
-    domain, groups = 0, list[list[list[str]]]()
-    for line in job:
+def split(lines: list[list[str]]) -> tuple[int, list[Job]]:
+    """The domain, and a job for each participant; ``run`` is for all."""
+    domain, jobs, environment = 0, list[Job](), dict[str, str]()
+    for line in lines:
         if line[0] == "domain":
             domain = int(line[1])
+        elif line[0] == "environment":
+            environment[line[1]] = line[2]
         elif line[0] == "participant":
-            groups.append([line])
-        elif line[0] == "run":
-            groups = [[*group, line] for group in groups]
+            jobs.append(Job(line[1], line[2], environment, []))
+            environment = {}
         else:
-            groups[-1].append(line)
-    return domain, groups
+            for job in jobs if line[0] == "run" else jobs[-1:]:
+                job.attempts.append(line)
+    return domain, jobs
 
 
 def main(job_file: str) -> int:
-    domain, groups = split([line.split("\t") for line in Path(job_file).read_text().splitlines() if line])
+    domain, jobs = split([line.split("\t") for line in Path(job_file).read_text().splitlines() if line])
     children = []
-    for lines in groups:
+    for job in jobs:
         children.append(os.fork())
         if children[-1] == 0:
-            carry_out(lines, domain)
+            carry_out(job, domain)
             sys.stdout.flush()
             os._exit(0)
     return max((os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) != 0 for child in children), default=0)

@@ -1,16 +1,17 @@
-"""Asks a real DDS implementation who may do what: one process, many participants, one answer per attempt.
+"""Asks a real DDS implementation who may do what: many participants, one answer per attempt.
 
 Two probes speak the same protocol: ``cyclone_probe.py`` (Cyclone DDS) and ``fastdds_probe/`` (Fast DDS).
-A job is a file of tab-separated lines, carried out in order:
+A job is a file of tab-separated lines:
 
-    domain N                        the DDS domain of the participants that follow
+    domain N                        the DDS domain of all participants
+    environment NAME VALUE          for the process of the next participant
     participant LABEL DIRECTORY     with the six security files of DIRECTORY; "-": without security
     publish TOPIC, subscribe TOPIC  an endpoint of std_msgs/msg/String on the participant above
-    run LONGEST QUIET               all publishers say their LABEL, all subscriptions listen, for LONGEST
-                                    seconds or until nothing new was heard for QUIET (0: never)
+    run SECONDS                     all publishers say their LABEL, all subscriptions listen
 
 and is answered with lines ``LABEL what detail result``: participant, publish and subscribe are
 ``allowed`` or ``refused``, ``heard`` tells the topic and what was said for the first time there.
+Each participant lives in a process of its own, as ROS processes do.
 """
 
 from __future__ import annotations
@@ -19,12 +20,13 @@ import contextlib
 import os
 import signal
 import subprocess
-import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+import time
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
-STARTUP_SECONDS = 60.0  # for a machine that does much else; only a hanging probe ever takes so long
+LONGEST_SECONDS = 60.0  # for a machine that does much else; only a hanging probe ever takes so long
 
 
 @dataclass(frozen=True)
@@ -35,11 +37,12 @@ class Participant:
     directory: Path | None
     publish: tuple[str, ...] = ()
     subscribe: tuple[str, ...] = ()
+    environment: tuple[tuple[str, str], ...] = ()
 
     def lines(self) -> list[str]:
-        head = f"participant\t{self.label}\t{self.directory or '-'}"
         return [
-            head,
+            *(f"environment\t{name}\t{value}" for name, value in self.environment),
+            f"participant\t{self.label}\t{self.directory or '-'}",
             *(f"publish\t{topic}" for topic in self.publish),
             *(f"subscribe\t{topic}" for topic in self.subscribe),
         ]
@@ -55,13 +58,13 @@ class Answers:
     log: str = field(repr=False)
 
     @classmethod
-    def parse(cls, output: str, log: str) -> Answers:
+    def parse(cls, output: str, log: str = "") -> Answers:
         participants: dict[str, bool] = {}
         endpoints: dict[tuple[str, str, str], bool] = {}
         heard = set()
-        for line in output.splitlines():
-            words = line.split("\t")
-            if len(words) != 4:
+        for line in output.splitlines(keepends=True):
+            words = line.rstrip("\n").split("\t")
+            if len(words) != 4 or not line.endswith("\n"):
                 continue
             label, what, detail, result = words
             if what == "participant":
@@ -76,69 +79,103 @@ class Answers:
         """An endpoint that could not even be tried, for want of a participant, was refused."""
         return self.endpoints.get((label, verb, topic), False)
 
-    def speakers(self, listener: str, topic: str) -> set[str]:
-        return {said for label, where, said in self.heard if label == listener and where == topic}
+    @property
+    def voices(self) -> set[str]:
+        """Everybody who was heard."""
+        return {said for _, _, said in self.heard}
 
 
 @dataclass(frozen=True)
 class Probe:
-    """One DDS implementation. ``environment`` is added to that of the test."""
+    """One DDS implementation."""
 
     name: str
     command: tuple[str, ...]
-    environment: Mapping[str, str] = field(default_factory=dict)
 
     def try_endpoints(self, domain: int, participants: Iterable[Participant]) -> Answers:
         """Create everything, talk to nobody."""
-        with self._start(domain, participants, None) as process:
-            output, log = process.communicate(timeout=STARTUP_SECONDS)
-        assert process.returncode == 0, f"{self.name} probe ended with {process.returncode}\n{log}"
-        return Answers.parse(output, log)
+        with self._running(domain, participants) as run:
+            run.process.wait(LONGEST_SECONDS)
+            answers = run.answers()
+            assert run.process.returncode == 0, f"{self.name} probe ended badly\n{answers.log}"
+        return answers
 
     def talk(
         self,
         domain: int,
         listener: Participant,
         talkers: Sequence[Participant],
-        longest: float = 15.0,
-        quiet: float = 2.0,
+        expected: Collection[str],
+        settle: float = 2.0,
+        environment: Mapping[str, str] | None = None,
     ) -> tuple[Answers, Answers]:
-        """Talkers in one process, the listener in another: answers of the listener, then of the talkers.
+        """Let all talk: answers of the listener, then of the talkers.
 
-        ``quiet`` is how long the listener stays on after the last new voice. Let one of the talkers be
-        honest: when that one is heard, silence of the others means something.
+        Ends ``settle`` seconds after all ``expected`` voices were heard, at the latest after a minute. Let
+        one of the talkers be honest and expected: then the silence of the others means something.
+        ``environment`` is added to the talkers' environment.
         """
         with (
-            self._start(domain, talkers, (longest + STARTUP_SECONDS, 0.0)) as speaking,
-            self._start(domain, [listener], (longest, quiet)) as listening,
+            self._running(domain, talkers, LONGEST_SECONDS, environment) as talking,
+            self._running(domain, [listener], LONGEST_SECONDS) as listening,
         ):
-            try:
-                output, log = listening.communicate(timeout=longest + STARTUP_SECONDS)
-            finally:
-                _end(listening)
-                _end(speaking)
-            speaking_output, speaking_log = speaking.communicate(timeout=STARTUP_SECONDS)
-        return Answers.parse(output, log), Answers.parse(speaking_output, speaking_log)
+            listening.wait_for_voices(expected)
+            time.sleep(settle)
+            return listening.answers(), talking.answers()
 
-    def _start(
-        self, domain: int, participants: Iterable[Participant], run: tuple[float, float] | None
-    ) -> subprocess.Popen[str]:
+    @contextlib.contextmanager
+    def _running(
+        self,
+        domain: int,
+        participants: Iterable[Participant],
+        seconds: float | None = None,
+        environment: Mapping[str, str] | None = None,
+    ) -> Iterator[_Run]:
         lines = [f"domain\t{domain}", *(line for participant in participants for line in participant.lines())]
-        if run is not None:
-            lines.append(f"run\t{run[0]}\t{run[1]}")
-        with tempfile.NamedTemporaryFile("w", suffix=".job", delete=False) as job:
-            job.write("\n".join(lines) + "\n")
-        return subprocess.Popen(
-            [*self.command, job.name],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            env={**os.environ, **self.environment},
-            start_new_session=True,
+        if seconds is not None:
+            lines.append(f"run\t{seconds}")
+        with TemporaryDirectory(prefix="dds-probe-") as name:
+            folder = Path(name)
+            (folder / "job").write_text("\n".join(lines) + "\n", encoding="utf-8")
+            run = _Run.start([*self.command, str(folder / "job")], folder, environment or {})
+            try:
+                yield run
+            finally:
+                run.end()
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A probe at work; what it says goes to files, which can be read at any time."""
+
+    process: subprocess.Popen[bytes]
+    folder: Path
+
+    @classmethod
+    def start(cls, command: list[str], folder: Path, environment: Mapping[str, str]) -> _Run:
+        with open(folder / "output", "wb") as output, open(folder / "log", "wb") as log:
+            process = subprocess.Popen(
+                command,
+                stdout=output,
+                stderr=log,
+                env={**os.environ, **environment},
+                start_new_session=True,
+            )
+        return cls(process, folder)
+
+    def answers(self) -> Answers:
+        output, log = (
+            (self.folder / name).read_text(encoding="utf-8", errors="replace") for name in ("output", "log")
         )
+        return Answers.parse(output, log)
 
+    def wait_for_voices(self, expected: Collection[str]) -> None:
+        end = time.monotonic() + LONGEST_SECONDS
+        while time.monotonic() < end and not set(expected) <= self.answers().voices:
+            time.sleep(0.1)
 
-def _end(process: subprocess.Popen[str]) -> None:
-    """The probe and all it started."""
-    with contextlib.suppress(ProcessLookupError):
-        os.killpg(process.pid, signal.SIGKILL)
+    def end(self) -> None:
+        """The probe and all it started."""
+        with contextlib.suppress(ProcessLookupError):
+            os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.wait()

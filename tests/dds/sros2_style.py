@@ -35,6 +35,16 @@ class Credential:
         assert isinstance(key, ec.EllipticCurvePrivateKey)
         return cls(key, x509.load_pem_x509_certificate((directory / "cert.pem").read_bytes()))
 
+    @classmethod
+    def of_ca(cls, keystore: Path) -> Credential:
+        """The identity CA of a keystore with its key on disk."""
+        key = serialization.load_pem_private_key(
+            (keystore / "private/identity_ca.key.pem").read_bytes(), None
+        )
+        assert isinstance(key, ec.EllipticCurvePrivateKey)
+        certificate = (keystore / "public/identity_ca.cert.pem").read_bytes()
+        return cls(key, x509.load_pem_x509_certificate(certificate))
+
     @property
     def key_pem(self) -> bytes:
         return self.key.private_bytes(
@@ -123,7 +133,7 @@ PERMISSIONS = """<?xml version="1.0" encoding="UTF-8"?>
 
 @dataclass(frozen=True)
 class Grant:
-    """DDS topic names."""
+    """ROS topic names, absolute."""
 
     publish: tuple[str, ...] = ()
     subscribe: tuple[str, ...] = ()
@@ -134,7 +144,8 @@ class Grant:
 
 
 def _rule(verb: str, topics: tuple[str, ...]) -> str:
-    listed = "\n".join(_LISTED.format(topic) for topic in ("ros_discovery_info", *topics))
+    names = ("ros_discovery_info", *(f"rt{topic}" for topic in topics))
+    listed = "\n".join(_LISTED.format(name) for name in names)
     return f"        <{verb}>\n            <topics>\n{listed}\n            </topics>\n        </{verb}>"
 
 

@@ -2,18 +2,20 @@
 //
 //   fastdds_probe JOBFILE
 
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
 #include <chrono>
+#include <cstdlib>
 #include <fstream>
 #include <iostream>
-#include <memory>
 #include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
 
 #include <fastdds/dds/log/Log.hpp>
-#include <fastdds/dds/log/StdoutErrConsumer.hpp>
-#include <fastrtps/xmlparser/XMLProfileManager.h>
 
 #include "participant.hpp"
 
@@ -21,61 +23,81 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 using Seconds = std::chrono::duration<double>;
-using Participants = std::vector<std::unique_ptr<probe::Participant>>;
+using Words = std::vector<std::string>;
 
+// One participant and what it shall try.
+struct Job {
+  std::string label;
+  std::string directory;
+  std::vector<Words> environment;
+  std::vector<Words> attempts;
+};
+
+// One write per line: the processes of a probe share their output.
 void answer(const std::string& label, const std::string& what, const std::string& detail,
             const std::string& result) {
-  std::cout << label << '\t' << what << '\t' << detail << '\t' << result << std::endl;
+  std::cout << label + '\t' + what + '\t' + detail + '\t' + result + '\n' << std::flush;
 }
 
 std::string verdict(bool allowed) { return allowed ? "allowed" : "refused"; }
 
-// Everybody talks and listens for `longest` seconds, or until nothing new was heard for `quiet` (0: never).
-void run(Participants& participants, double longest, double quiet) {
+void run(probe::Participant& participant, double seconds) {
   const auto start = Clock::now();
-  auto last_news = start;
-  bool any_news = false;
-  while (Seconds(Clock::now() - start).count() < longest) {
-    for (auto& participant : participants) {
-      participant->talk();
-      for (auto& [topic, text] : participant->listen()) {
-        answer(participant->label(), "heard", topic, text);
-        last_news = Clock::now();
-        any_news = true;
-      }
+  while (Seconds(Clock::now() - start).count() < seconds) {
+    participant.talk();
+    for (auto& [topic, text] : participant.listen()) {
+      answer(participant.label(), "heard", topic, text);
     }
-    if (quiet > 0 && any_news && Seconds(Clock::now() - last_news).count() > quiet) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(100));
   }
 }
 
-// One line of the job. Lines about a participant that was refused are skipped: there is nobody to try them.
-void carry_out(const std::vector<std::string>& words, uint32_t& domain, Participants& participants) {
-  const std::string& verb = words.at(0);
-  if (verb == "domain") {
-    domain = static_cast<uint32_t>(std::stoul(words.at(1)));
-  } else if (verb == "participant") {
-    participants.push_back(std::make_unique<probe::Participant>(words.at(1), words.at(2), domain));
-    answer(words.at(1), "participant", "-", verdict(participants.back()->allowed()));
-  } else if (verb == "run") {
-    for (auto it = participants.begin(); it != participants.end();) {
-      it = (*it)->allowed() ? it + 1 : participants.erase(it);
+// In a process of its own.
+void carry_out(const Job& job, uint32_t domain) {
+  for (auto& entry : job.environment) setenv(entry.at(1).c_str(), entry.at(2).c_str(), 1);
+  probe::Participant participant(job.label, job.directory, domain);
+  answer(job.label, "participant", "-", verdict(participant.allowed()));
+  if (!participant.allowed()) return;
+  for (auto& words : job.attempts) {
+    if (words.at(0) == "run") {
+      run(participant, std::stod(words.at(1)));
+      continue;
     }
-    answer("-", "ready", "-", "-");
-    run(participants, std::stod(words.at(1)), std::stod(words.at(2)));
-  } else if (participants.back()->allowed()) {
-    auto& participant = *participants.back();
+    const std::string& topic = words.at(1);
     const bool allowed =
-        verb == "publish" ? participant.publish(words.at(1)) : participant.subscribe(words.at(1));
-    answer(participant.label(), verb, words.at(1), verdict(allowed));
+        words.at(0) == "publish" ? participant.publish(topic) : participant.subscribe(topic);
+    answer(job.label, words.at(0), topic, verdict(allowed));
   }
 }
 
-std::vector<std::string> split(const std::string& line) {
-  std::vector<std::string> words;
+Words split(const std::string& line) {
+  Words words;
   std::istringstream stream(line);
   for (std::string word; std::getline(stream, word, '\t');) words.push_back(word);
   return words;
+}
+
+// The jobs of a file; `run` is for all participants.
+std::vector<Job> read_jobs(std::istream& lines, uint32_t& domain) {
+  std::vector<Job> jobs;
+  std::vector<Words> environment;
+  for (std::string line; std::getline(lines, line);) {
+    const Words words = split(line);
+    if (words.empty()) continue;
+    if (words[0] == "domain") {
+      domain = static_cast<uint32_t>(std::stoul(words.at(1)));
+    } else if (words[0] == "environment") {
+      environment.push_back(words);
+    } else if (words[0] == "participant") {
+      jobs.push_back({words.at(1), words.at(2), environment, {}});
+      environment.clear();
+    } else if (words[0] == "run") {
+      for (auto& job : jobs) job.attempts.push_back(words);
+    } else {
+      jobs.back().attempts.push_back(words);
+    }
+  }
+  return jobs;
 }
 
 }  // namespace
@@ -85,18 +107,22 @@ int main(int argc, char** argv) {
     std::cerr << "usage: fastdds_probe JOBFILE" << std::endl;
     return 2;
   }
-  // Participants of one process talk over the (secured) network like everybody else.
-  eprosima::fastrtps::LibrarySettingsAttributes settings;
-  settings.intraprocess_delivery = eprosima::fastrtps::INTRAPROCESS_OFF;
-  eprosima::fastrtps::xmlparser::XMLProfileManager::library_settings(settings);
-
   uint32_t domain = 0;
-  Participants participants;
-  std::ifstream job(argv[1]);
-  for (std::string line; std::getline(job, line);) {
-    if (!line.empty()) carry_out(split(line), domain, participants);
+  std::ifstream file(argv[1]);
+  std::vector<pid_t> children;
+  for (auto& job : read_jobs(file, domain)) {
+    children.push_back(fork());
+    if (children.back() == 0) {
+      carry_out(job, domain);
+      eprosima::fastdds::dds::Log::Flush();
+      std::exit(0);
+    }
   }
-  participants.clear();
-  eprosima::fastdds::dds::Log::Flush();
-  return 0;
+  int worst = 0;
+  for (pid_t child : children) {
+    int status = 0;
+    waitpid(child, &status, 0);
+    worst = std::max(worst, WIFEXITED(status) ? WEXITSTATUS(status) : 1);
+  }
+  return worst;
 }

@@ -1,0 +1,129 @@
+"""The attacker who holds one enclave, on real DDS: succeeds against SROS2's keystores, not against ours.
+
+Each test tries the same on both, so that it can fail. What is accepted of an SROS2-style keystore is what
+the two implementations are known to accept (Cyclone DDS 0.10: CVE-2023-24011 and subjects compared as bags;
+Fast DDS 2.9.1: CVE-2023-24010).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+from tests.dds import attacks, our_keystore, sros2_style
+from tests.dds.attacks import ENCLAVES, GRANTS, HONEST, VICTIM, Attempt, Workshop, borrowed_label
+from tests.dds.probe import Probe
+
+pytestmark = pytest.mark.dds
+
+HONEST_VOICE = f"honest {HONEST}"
+
+
+@pytest.fixture
+def sros2(tmp_path: Path, domain_id: int) -> Workshop:
+    sros2_style.create(tmp_path / "sros2", domain_id, GRANTS)
+    return _workshop(tmp_path, "sros2")
+
+
+@pytest.fixture
+def ours(tmp_path: Path, domain_id: int) -> Workshop:
+    our_keystore.create(tmp_path / "ours", domain_id, GRANTS)
+    return _workshop(tmp_path, "ours")
+
+
+def _workshop(tmp_path: Path, name: str) -> Workshop:
+    attempts = tmp_path / f"attempts-{name}"
+    attempts.mkdir()
+    return Workshop(tmp_path / name, attempts)
+
+
+def voices(
+    dds: Probe,
+    domain_id: int,
+    workshop: Workshop,
+    attempts: Sequence[Attempt],
+    expected: set[str],
+    patched: Path | None = None,
+) -> set[str]:
+    """Who of ``attempts`` the victim hears beside an honest talker; ``patched``: preloaded into attackers."""
+    talkers = [workshop.honest(HONEST), *attempts]
+    listener, talking = dds.talk(
+        domain_id,
+        attacks.victim(workshop.enclave(VICTIM)),
+        [attempt.participant(patched is not None) for attempt in talkers],
+        expected | {HONEST_VOICE},
+        environment={"LD_PRELOAD": str(patched)} if patched else None,
+    )
+    assert HONEST_VOICE in listener.voices, f"the victim heard not even the honest talker\n{listener.log}"
+    if patched:
+        turned_down = sorted(label for label, allowed in talking.participants.items() if not allowed)
+        assert not turned_down, f"the patched library still refuses {turned_down}"
+    return listener.voices - {HONEST_VOICE}
+
+
+def batches(attempts: Sequence[Attempt], size: int = 7) -> Iterator[Sequence[Attempt]]:
+    """Attackers authenticate with each other as well; too many at once keep the victim waiting."""
+    return (attempts[start : start + size] for start in range(0, len(attempts), size))
+
+
+def subject_bag(enclave: str) -> set[str]:
+    """What Cyclone DDS makes of ``CN=<enclave>``."""
+    return set(f"CN={enclave}".replace("CN=/", "CN=|/").replace("/", "|").split("|"))
+
+
+def bag_matches() -> set[str]:
+    return {
+        borrowed_label(borrower, lender)
+        for borrower, lender in itertools.permutations(ENCLAVES, 2)
+        if subject_bag(borrower) <= subject_bag(lender)
+    }
+
+
+def test_permissions_cannot_be_borrowed(
+    dds: Probe, sros2: Workshop, ours: Workshop, domain_id: int, patched_dds: Path
+) -> None:
+    """All ordered pairs: the identity of one enclave with the permissions of another."""
+    assert len(bag_matches()) == 11
+    accepted = bag_matches() if dds.name == "Cyclone DDS" else set[str]()
+
+    assert voices(dds, domain_id, sros2, list(sros2.borrowed()), accepted) == accepted
+
+    attempts = list(ours.borrowed())
+    assert voices(dds, domain_id, ours, attempts, set()) == set()
+    for batch in batches(attempts):
+        assert voices(dds, domain_id, ours, batch, set(), patched_dds) == set()
+
+
+def test_an_enclave_cannot_sign_its_own_documents(
+    dds: Probe, sros2: Workshop, ours: Workshop, domain_id: int, patched_dds: Path
+) -> None:
+    def forged(workshop: Workshop) -> list[Attempt]:
+        signers = ("/", "/a")
+        return [workshop.self_signed_permissions(path) for path in signers] + [
+            workshop.self_signed_governance(path) for path in signers
+        ]
+
+    attempts = forged(sros2)
+    everyone = {attempt.label for attempt in attempts}
+    assert voices(dds, domain_id, sros2, attempts, everyone) == everyone
+
+    attempts = forged(ours)
+    assert voices(dds, domain_id, ours, attempts, set()) == set()
+    assert voices(dds, domain_id, ours, attempts, set(), patched_dds) == set()
+
+
+def test_false_expired_and_tampered_credentials_are_refused(
+    dds: Probe, ours: Workshop, domain_id: int, patched_dds: Path
+) -> None:
+    """What DDS itself sees through, whoever made the keystore. The untouched enclave is heard."""
+    attempts = [
+        ours.honest("/a"),
+        ours.tampered_permissions("/a"),
+        ours.unknown_authority("/a"),
+        ours.expired_identity("/a", sros2_style.Credential.of_ca(ours.keystore)),
+    ]
+    assert voices(dds, domain_id, ours, attempts, {"honest /a"}) == {"honest /a"}
+    assert voices(dds, domain_id, ours, attempts, {"honest /a"}, patched_dds) == {"honest /a"}
