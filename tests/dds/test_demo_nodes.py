@@ -1,4 +1,4 @@
-"""The demo nodes under security, each as a process of its own: what rcl would let through, and what DDS refuses."""
+"""The demo nodes under security, each its own process: what rcl would let through, what DDS refuses."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_a_listener_without_an_enclave_hears_nothing(secured: Path, domain_id: i
 
 
 def test_the_enclave_is_looked_up_exactly(secured: Path, domain_id: int) -> None:
-    """No fall-back to a parent, and no start without an enclave when security is enforced (rcl security.c)."""
+    """No fall-back to a parent; no start without an enclave when security is enforced (rcl security.c)."""
     env = environment(domain_id, secured)
     for arguments in (enclave("/talker/deeper"), ()):
         ended = Node("talker", env, *arguments, *parameters(seconds=1)).end()
@@ -169,7 +169,7 @@ def test_an_incomplete_enclave_is_not_used(secured: Path, domain_id: int, missin
     assert ended.says(f"lacks {missing}"), ended.output
 
 
-def test_a_copied_keystore_works_without_its_private_part(secured: Path, domain_id: int, tmp_path: Path) -> None:
+def test_a_copy_works_without_the_private_part(secured: Path, domain_id: int, tmp_path: Path) -> None:
     """What is deployed to a robot: links kept, CA keys left behind."""
     robot = tmp_path / "robot"
     shutil.copytree(secured, robot, symlinks=True, ignore=shutil.ignore_patterns("private"))
