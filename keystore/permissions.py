@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
-from xml.sax.saxutils import escape, quoteattr
+from html import escape
 
 from keystore.domains import Domains
 from keystore.errors import printable
@@ -87,7 +87,7 @@ def permissions_document(
     domain_set = domains.xml()
     parts = [
         _HEAD,
-        f"<grant name={quoteattr(_line(policy.path))}>\n",
+        f'<grant name="{escape(_line(policy.path))}">\n',
         f"<subject_name>{escape(_line(subject))}</subject_name>\n",
         f"<validity><not_before>{_utc(validity.not_before)}</not_before>"
         f"<not_after>{_utc(validity.not_after)}</not_after></validity>\n",
@@ -122,9 +122,7 @@ def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
     return _resolve_denials(allowed, denied)
 
 
-def _resolve_denials(
-    allowed: tuple[set[str], set[str]], denied: tuple[set[str], set[str]]
-) -> DdsRules:
+def _resolve_denials(allowed: tuple[set[str], set[str]], denied: tuple[set[str], set[str]]) -> DdsRules:
     """Take away what is denied, and keep a denial only where a wildcard still grants what it names.
 
     Cyclone DDS before 11.0 lets the first rule that mentions a topic *in either direction* decide about

@@ -10,9 +10,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import escape, quoteattr
 
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import InvalidEnclaveName, InvalidInput, printable
@@ -229,7 +229,7 @@ def policy_xml(policy: Policy) -> bytes:
         raise InvalidInput("a policy needs at least one enclave")
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'<policy version="{VERSION}">', "  <enclaves>"]
     for enclave in sorted(policy.enclaves):
-        lines.append(f"    <enclave path={quoteattr(enclave.path)}>")
+        lines.append(f'    <enclave path="{escape(enclave.path)}">')
         lines.append("      <profiles>")
         placeholder = Profile("/", enclave.path.rpartition("/")[2] or "root", ())
         for profile in sorted(enclave.profiles) or [placeholder]:
@@ -240,7 +240,7 @@ def policy_xml(policy: Policy) -> bytes:
 
 
 def _profile_lines(profile: Profile) -> list[str]:
-    head = f"        <profile ns={quoteattr(profile.ns)} node={quoteattr(profile.node)}"
+    head = f'        <profile ns="{escape(profile.ns)}" node="{escape(profile.node)}"'
     if not profile.rules:
         return [f"{head}/>"]
     lines = [f"{head}>"]

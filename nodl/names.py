@@ -19,6 +19,7 @@ MAX_NAME_LENGTH = 247
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(rf"{_TOKEN}\Z")
 _ABSOLUTE = re.compile(rf"(?:/{_TOKEN})+\Z")
+_PLAIN = re.compile(rf"(~/)?{_TOKEN}(?:/{_TOKEN})*\Z")  # what nearly every name looks like
 _SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
 _WILDCARDS = frozenset("*?[]")
 
@@ -115,6 +116,11 @@ def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> 
     """
     if is_full_name(name):
         return name
+    plain = _PLAIN.match(name)
+    if plain:
+        quick = f"{join(namespace, node)}{name[1:]}" if plain[1] else join(namespace, name)
+        if is_full_name(quick):
+            return quick
     validate_name(name, what)
     expanded = name
     if expanded[0] == "~":

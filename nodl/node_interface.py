@@ -47,6 +47,7 @@ class Endpoint:
     type: str
     source: SourceRef
     certainty: Certainty = Certainty.EXACT
+    written: str = ""  # the text in the source where a reader took it for another name, else empty
 
 
 @dataclass(frozen=True, slots=True)

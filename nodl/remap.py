@@ -126,6 +126,10 @@ class NodeNames:
         """The fully qualified name before remapping."""
         return expand_name(name, namespace=self.namespace, node=self.node, what=what)
 
+    def rule_matching(self, full_name: str) -> ParsedRule | None:
+        """The name rule, of whichever kind, that matches ``full_name``."""
+        return self._topics.get(full_name) or self._services.get(full_name)
+
     def topic(self, name: str) -> Resolved:
         return self._resolve(self.expand(name, "topic name"), self._topics)
 

@@ -57,11 +57,10 @@ def node_of(manifest: ManifestNode) -> Node:
         name=_v1_name(manifest),
         executable=interface.executable or interface.plugin or "",
         topics=[
-            Topic(name=e.name.text, message_type=e.type, role=PubSubRole(e.kind.value))
-            for e in kinds["topic"]
+            Topic(name=_name(e), message_type=e.type, role=PubSubRole(e.kind.value)) for e in kinds["topic"]
         ],
-        services=[Service(name=e.name.text, service_type=e.type, role=_role(e)) for e in kinds["service"]],
-        actions=[Action(name=e.name.text, action_type=e.type, role=_role(e)) for e in kinds["action"]],
+        services=[Service(name=_name(e), service_type=e.type, role=_role(e)) for e in kinds["service"]],
+        actions=[Action(name=_name(e), action_type=e.type, role=_role(e)) for e in kinds["action"]],
         parameters=[Parameter(name=n, parameter_type=t) for n, t in manifest.parameter_types.items()],
     )
 
@@ -74,6 +73,10 @@ _FAMILY: dict[EndpointKind, tuple[str, str]] = {
     EndpointKind.ACTION_SERVER: ("action", "server"),
     EndpointKind.ACTION_CLIENT: ("action", "client"),
 }
+
+
+def _name(endpoint: Endpoint) -> str:
+    return endpoint.written or endpoint.name.text
 
 
 def _role(endpoint: Endpoint) -> ServerClientRole:

@@ -107,6 +107,7 @@ def _node(element: etree._Element, file: str, package: str | None) -> ManifestNo
         )
     if not len(element):
         raise InvalidNoDLDocumentError.at(_at(element, file), f"node {name} describes no interface at all")
+    own_prefix = f"{(namespace or '').rstrip('/')}/{name}/"
     endpoints: dict[Endpoint, None] = {}
     parameters: dict[str, str] = {}
     for child in element:
@@ -114,7 +115,7 @@ def _node(element: etree._Element, file: str, package: str | None) -> ManifestNo
             _expect(child, "parameter", ("name", "type"), file)
             parameters[child.get("name", "")] = child.get("type", "")
         elif child.tag in _ROLES:
-            endpoints.update(dict.fromkeys(_endpoints(child, file)))
+            endpoints.update(dict.fromkeys(_endpoints(child, file, own_prefix)))
         else:
             raise InvalidNodeChildError.at(
                 _at(child, file),
@@ -148,7 +149,8 @@ def _node_name(element: etree._Element, file: str) -> tuple[str | None, str]:
         raise InvalidElementError.at(_at(element, file), f"<node> {error}") from None
 
 
-def _endpoints(element: etree._Element, file: str) -> list[Endpoint]:
+def _endpoints(element: etree._Element, file: str, own_prefix: str) -> list[Endpoint]:
+    """``/node_name/x`` is v1's habit of writing the private name ``~/x``, and is taken as that."""
     tag = str(element.tag)
     _expect(element, tag, ("name", "type", "role"), file)
     name, role = element.get("name", ""), element.get("role", "")
@@ -161,8 +163,13 @@ def _endpoints(element: etree._Element, file: str) -> list[Endpoint]:
     except InvalidNameError as error:
         raise InvalidElementError.at(_at(element, file), str(error)) from None
     source = _at(element, file)
-    type_name = element.get("type", "")
-    return [Endpoint(kind, NameTemplate.literal(name), type_name, source) for kind in _ROLES[tag][role]]
+    private = name.startswith(own_prefix)
+    template = NameTemplate.literal(f"~/{name[len(own_prefix) :]}" if private else name)
+    written = name if private else ""
+    return [
+        Endpoint(kind, template, element.get("type", ""), source, written=written)
+        for kind in _ROLES[tag][role]
+    ]
 
 
 def _once(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:

@@ -1,0 +1,182 @@
+"""The smallest policy that lets every node of a launch work, with a reason for each permission.
+
+Takes the running nodes, gives a ``DerivedPolicy``; next are the plan, the reports and the keystore. Pure.
+All nodes of one enclave are united (that is what DDS enforces), each keeps its own profile (that is what
+a person reviews). Sorted and free of repetitions: the same launch gives the same bytes, and taking a node
+away takes exactly its permissions away. Time is linear in nodes and interfaces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+from enclave_launch.policy.node_permissions import NodePermissions, Permission, Reason, node_permissions
+from enclave_launch.policy.policy_file import merge_policy_file
+from enclave_launch.policy.running_node import RunningNode
+from keystore.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore.policy_xml import PolicyDocument
+
+# Distributions whose rcl remaps the name of an action as a whole (ros2/rcl pull request 1170).
+_REMAPS_ACTION_NAMES = frozenset({"kilted", "lyrical", "rolling"})
+
+# How the operations are called where names are listed for people and programs.
+LIST_NAMES: dict[Operation, str] = {
+    Operation.PUBLISH: "publish",
+    Operation.SUBSCRIBE: "subscribe",
+    Operation.REQUEST: "call_services",
+    Operation.REPLY: "serve_services",
+    Operation.CALL: "call_actions",
+    Operation.EXECUTE: "serve_actions",
+}
+
+Reasons = dict[Rule, list[Reason]]
+ProfileKey = tuple[str, str]  # namespace and node name
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyOptions:
+    """``accept_patterns``: partly known names become wildcards, each with a warning.
+
+    ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: whether rcl remaps action
+    names; by default what the distribution does.
+    """
+
+    accept_patterns: bool = False
+    policy_file: PolicyDocument | None = None
+    actions_as_a_whole: bool | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class DerivedPolicy:
+    """``reasons``: enclave path -> rule (name absolute) -> why, sorted by node.
+
+    ``problems`` are what ``--secure`` must refuse: a name that is not known or cannot exist.
+    """
+
+    policy: Policy
+    reasons: Mapping[str, Mapping[Rule, tuple[Reason, ...]]]
+    nodes: Mapping[str, tuple[RunningNode, ...]]  # by enclave path
+    problems: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def built_in_names(self, enclave: str) -> frozenset[tuple[str, str]]:
+        """What every node has: pairs (list name, name) that no manifest or policy file asks for."""
+        return frozenset(
+            (LIST_NAMES[rule.operation], rule.expression)
+            for rule, reasons in self.reasons.get(enclave, {}).items()
+            if all(reason.origin == "built-in" for reason in reasons)
+        )
+
+
+def derive_policy(
+    nodes: Iterable[RunningNode],
+    *,
+    distro: str,
+    options: PolicyOptions | None = None,
+    also: Iterable[str] = (),
+) -> DerivedPolicy:
+    """The policy of all ``nodes``; ``also``: enclaves that must exist though no node in them is known.
+
+    Raises ``ValueError`` for an unknown distribution.
+    """
+    chosen = options or PolicyOptions()
+    whole = chosen.actions_as_a_whole
+    collection = _Collection({path: {} for path in also})
+    for node in nodes:
+        collection.add(
+            node_permissions(
+                node,
+                distro=distro,
+                actions_as_a_whole=distro in _REMAPS_ACTION_NAMES if whole is None else whole,
+                accept_patterns=chosen.accept_patterns,
+            ),
+            chosen.policy_file,
+        )
+    derived = collection.result()
+    if chosen.policy_file is None:
+        return derived
+    merged = merge_policy_file(derived.policy, derived.reasons, chosen.policy_file)
+    return replace(
+        derived,
+        policy=merged.policy,
+        reasons=merged.reasons,
+        warnings=_unique((*derived.warnings, *merged.warnings)),
+    )
+
+
+@dataclass(slots=True)
+class _Collection:
+    """Permissions by enclave and profile while they come in."""
+
+    profiles: dict[str, dict[ProfileKey, set[Rule]]]
+    reasons: dict[str, Reasons] = field(default_factory=dict)
+    nodes: dict[str, list[RunningNode]] = field(default_factory=dict)
+    problems: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def add(self, found: NodePermissions, policy_file: PolicyDocument | None) -> None:
+        node = found.node
+        self.nodes.setdefault(node.enclave, []).append(node)
+        profiles = self.profiles.setdefault(node.enclave, {})
+        rules = profiles.setdefault((node.namespace, node.name), set())
+        reasons = self.reasons.setdefault(node.enclave, {})
+        for permission in found.permissions:
+            _note(permission, rules, reasons)
+        self.warnings.extend(found.warnings)
+        for unresolved in found.unresolved:
+            if unresolved.operation and _answered(policy_file, node, unresolved.operation):
+                self.warnings.append(f"{unresolved.text}; the policy file says what it may do")
+            else:
+                self.problems.append(f"{unresolved.text}; {_remedy(node)}")
+
+    def result(self) -> DerivedPolicy:
+        enclaves = tuple(
+            EnclavePolicy(
+                path,
+                tuple(
+                    Profile(ns, name, tuple(sorted(rules))) for (ns, name), rules in sorted(profiles.items())
+                ),
+            )
+            for path, profiles in sorted(self.profiles.items())
+        )
+        reasons = {
+            path: {rule: tuple(_in_order(why)) for rule, why in sorted(by_rule.items())}
+            for path, by_rule in self.reasons.items()
+        }
+        nodes = {path: tuple(each) for path, each in self.nodes.items()}
+        return DerivedPolicy(Policy(enclaves), reasons, nodes, _unique(self.problems), _unique(self.warnings))
+
+
+def _note(permission: Permission, rules: set[Rule], reasons: Reasons) -> None:
+    rule = Rule(permission.operation, Qualifier.ALLOW, permission.name)
+    rules.add(rule)
+    known = reasons.setdefault(rule, [])
+    if permission.reason not in known:
+        known.append(permission.reason)
+
+
+def _in_order(reasons: Iterable[Reason]) -> list[Reason]:
+    return sorted(reasons, key=lambda reason: (reason.node, reason.origin, reason.place, reason.written))
+
+
+def _answered(document: PolicyDocument | None, node: RunningNode, operation: Operation) -> bool:
+    """Whether the policy file has rules of this operation for exactly this node of this enclave."""
+    return document is not None and any(
+        rule.operation is operation
+        for enclave in document.policy.enclaves
+        if enclave.path == node.enclave
+        for profile in enclave.profiles
+        if (profile.ns, profile.node) == (node.namespace, node.name)
+        for rule in profile.rules
+    )
+
+
+def _remedy(node: RunningNode) -> str:
+    interface = node.interface
+    program = f"{interface.package}/{interface.executable or interface.plugin}"
+    return f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
+
+
+def _unique(texts: Iterable[str]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(texts))

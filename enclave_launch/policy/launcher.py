@@ -1,0 +1,56 @@
+"""The launcher's own node: where a launch must load components or change lifecycle states, it talks too.
+
+Takes the calls that evaluation found, gives a ``RunningNode`` like any other: exactly these calls and
+what every rclpy node has. Its name is fixed, so that its permissions are (``launch_ros_<pid>``, as real
+launch calls its node, would need wildcards).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from enclave_launch.policy.running_node import RunningNode
+from enclave_launch.process import LauncherCall
+from nodl.name_template import NameTemplate
+from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
+from nodl.remap import RemapRules
+from nodl.source_ref import SourceRef
+
+LAUNCHER_NODE = "launcher"
+LAUNCHER_ENCLAVE = "/launcher"
+_CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
+_TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
+
+
+def launcher_node(
+    calls: Sequence[LauncherCall], *, enclave: str = LAUNCHER_ENCLAVE, name: str = LAUNCHER_NODE
+) -> RunningNode:
+    """The node that makes ``calls`` (at least one).
+
+    Who asks a node for transitions also follows its ``transition_event`` (launch_ros lifecycle_node.py).
+    """
+    endpoints: list[Endpoint] = []
+    for call in calls:
+        source = SourceRef(call.location.file, call.location.line)
+        endpoints.append(_endpoint(EndpointKind.SERVICE_CLIENT, call.service, call.type, source))
+        node, _, service = call.service.rpartition("/")
+        if service == "change_state" and call.type == _CHANGE_STATE:
+            event = f"{node}/transition_event"
+            endpoints.append(_endpoint(EndpointKind.SUBSCRIPTION, event, _TRANSITION_EVENT, source))
+    interface = NodeInterface(
+        package=None,
+        executable=name,
+        plugin=None,
+        name=name,
+        namespace="/",
+        endpoints=tuple(dict.fromkeys(endpoints)),
+        source=SourceRef(calls[0].location.file, calls[0].location.line),
+        library=ClientLibrary.RCLPY,
+    )
+    return RunningNode(
+        interface, name, name, "/", RemapRules(), {}, enclave, calls[0].location, role="launcher"
+    )
+
+
+def _endpoint(kind: EndpointKind, name: str, type_name: str, source: SourceRef) -> Endpoint:
+    return Endpoint(kind, NameTemplate.literal(name), type_name, source)

@@ -1,0 +1,210 @@
+"""What one running node needs: each of its names, final, with the reason.
+
+Takes a ``RunningNode``, gives ``NodePermissions``; ``derivation`` collects them by enclave. Pure.
+Order of things as in rcl: the name's parameters are filled in, it is expanded under the node's final name
+and namespace, then the first matching remap rule replaces it (``nodl.remap``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Literal
+
+from enclave_launch.policy.builtin_interfaces import BuiltIn, built_in_interfaces
+from enclave_launch.policy.running_node import RunningNode
+from keystore.policy import Operation
+from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
+from nodl.names import InvalidNameError, validate_namespace, validate_node_name
+from nodl.node_interface import Certainty, Endpoint, EndpointKind
+from nodl.remap import NodeNames, ParsedRule, Resolved
+
+Origin = Literal["declared", "built-in", "policy file"]
+
+_OPERATIONS: dict[EndpointKind, Operation] = {
+    EndpointKind.PUBLISHER: Operation.PUBLISH,
+    EndpointKind.SUBSCRIPTION: Operation.SUBSCRIBE,
+    EndpointKind.SERVICE_SERVER: Operation.REPLY,
+    EndpointKind.SERVICE_CLIENT: Operation.REQUEST,
+    EndpointKind.ACTION_SERVER: Operation.EXECUTE,
+    EndpointKind.ACTION_CLIENT: Operation.CALL,
+}
+_TOPICS = (Operation.PUBLISH, Operation.SUBSCRIBE)
+_SERVICES = (Operation.REPLY, Operation.REQUEST)
+# What serving or calling an action means for its services and its topics.
+_PARTS = {
+    Operation.EXECUTE: (Operation.REPLY, Operation.PUBLISH),
+    Operation.CALL: (Operation.REQUEST, Operation.SUBSCRIBE),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Reason:
+    """Why a permission is there. ``place``: file:line of the manifest, source or policy, or a table row.
+
+    ``written`` is the name as found there; ``rules`` the remap rules that changed it; ``note`` what else
+    a reader should know.
+    """
+
+    node: str
+    origin: Origin
+    place: str
+    written: str
+    rules: tuple[ParsedRule, ...] = ()
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Permission:
+    operation: Operation
+    name: str
+    reason: Reason
+
+
+@dataclass(frozen=True, slots=True)
+class Unresolved:
+    """An interface whose name is not (wholly) known: no permission follows from it. ``text`` for a person."""
+
+    operation: Operation | None
+    text: str
+
+
+@dataclass(slots=True)
+class NodePermissions:
+    """``permissions`` in the order found, with repetitions; ``unresolved`` must not be passed over."""
+
+    node: RunningNode
+    permissions: list[Permission] = field(default_factory=list)
+    unresolved: list[Unresolved] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+def node_permissions(
+    node: RunningNode, *, distro: str, actions_as_a_whole: bool, accept_patterns: bool
+) -> NodePermissions:
+    """All that ``node`` needs under its final name. Raises ``ValueError`` for an unknown distribution."""
+    return _Collector(node, distro, actions_as_a_whole, accept_patterns).collect()
+
+
+class _Collector:
+    def __init__(self, node: RunningNode, distro: str, actions_as_a_whole: bool, accept_patterns: bool):
+        self._node = node
+        self._fqn = node.fqn
+        self._distro = distro
+        self._whole = actions_as_a_whole
+        self._accept_patterns = accept_patterns
+        self._names = NodeNames(node.name, node.namespace, node.rules)
+        self._result = NodePermissions(node)
+
+    def collect(self) -> NodePermissions:
+        try:
+            validate_node_name(self._node.name)
+            validate_namespace(self._node.namespace)
+        except InvalidNameError as error:
+            self._unresolved(None, str(self._node.location), str(error))
+            return self._result
+        for endpoint in self._node.interface.endpoints:
+            self._endpoint(endpoint)
+        for row in built_in_interfaces(self._node, self._distro):
+            self._built_in(row)
+        for gap in self._node.interface.gaps:
+            self._unresolved(None, str(gap.source), gap.why)
+        return self._result
+
+    def _endpoint(self, endpoint: Endpoint) -> None:
+        operation = _OPERATIONS[endpoint.kind]
+        place = str(endpoint.source)
+        template = endpoint.name
+        note = f"{endpoint.written} is taken as the private name {template}" if endpoint.written else ""
+        if not template.is_literal:
+            note = _parameter_note(template, self._node)
+            template = template.fill(self._node.parameters)
+        elif endpoint.certainty is Certainty.FROM_DEFAULT:
+            note = "from a default value in the source"
+        written = endpoint.written or str(endpoint.name)
+        if not template.is_literal:
+            self._pattern(operation, template, place, written)
+            return
+        try:
+            for final_operation, resolved in self._resolve(operation, template.text, place):
+                reason = Reason(self._fqn, "declared", place, written, resolved.rules, note)
+                self._result.permissions.append(Permission(final_operation, resolved.name, reason))
+        except InvalidNameError as error:
+            self._unresolved(operation, place, str(error))
+
+    def _built_in(self, row: BuiltIn) -> None:
+        resolved = self._plain(row.operation, row.name)
+        reason = Reason(self._fqn, "built-in", str(row), row.name, resolved.rules)
+        self._result.permissions.append(Permission(row.operation, resolved.name, reason))
+
+    def _resolve(self, operation: Operation, name: str, place: str) -> Iterator[tuple[Operation, Resolved]]:
+        """The final names: one, or five where the parts of an action were remapped one by one."""
+        if operation not in _PARTS:
+            yield operation, self._plain(operation, name)
+            return
+        action = self._names.action(name, as_a_whole=self._whole)
+        if not self._whole:
+            self._warn_of_idle_rule(action.name, place)
+        parts = self._names.action_parts(action.name)
+        if not parts.remapped:
+            yield operation, action
+            return
+        service, topic = _PARTS[operation]
+        for operation_of_part, resolved in (
+            *((service, part) for part in parts.services.values()),
+            *((topic, part) for part in parts.topics.values()),
+        ):
+            yield operation_of_part, Resolved(resolved.name, (*action.rules, *resolved.rules))
+
+    def _plain(self, operation: Operation, name: str) -> Resolved:
+        return self._names.topic(name) if operation in _TOPICS else self._names.service(name)
+
+    def _warn_of_idle_rule(self, action: str, place: str) -> None:
+        rule = self._names.rule_matching(action)
+        if rule is not None:
+            self._result.warnings.append(
+                f"{rule.origin or place}: remap rule {rule.text} has no effect on action {action} of node "
+                f"{self._fqn}: {self._distro} remaps only the five names below {action}/_action/, one by one"
+            )
+
+    def _pattern(self, operation: Operation, template: NameTemplate, place: str, written: str) -> None:
+        """Only a part of the name is known: unresolved, unless patterns are accepted and it has text."""
+        text = template.text
+        why = "; ".join(p.why for p in template.parts if isinstance(p, UnknownPart) and p.why)
+        if not self._accept_patterns or not text.replace("*", "").strip("/~"):
+            self._unresolved(
+                operation,
+                place,
+                f"the name of what it would {operation.value} is not known ({template}: {why})",
+            )
+            return
+        try:
+            name = _expand_pattern(self._names, text)
+        except InvalidNameError as error:
+            self._unresolved(operation, place, str(error))
+            return
+        note = (
+            f"a pattern, because {why or 'only a part of the name is known'}; accepted by --accept-patterns"
+        )
+        reason = Reason(self._fqn, "declared", place, written, (), note)
+        self._result.permissions.append(Permission(operation, name, reason))
+        self._result.warnings.append(f"{place}: node {self._fqn} may {operation.value} {name}: {note}")
+
+    def _unresolved(self, operation: Operation | None, place: str, why: str) -> None:
+        text = f"{place}: node {self._fqn}: {why}"
+        self._result.unresolved.append(Unresolved(operation, text))
+
+
+def _parameter_note(template: NameTemplate, node: RunningNode) -> str:
+    notes = []
+    for part in template.parts:
+        if isinstance(part, ParameterPart):
+            origin = "set by launch" if part.name in node.parameters else "its default"
+            notes.append(f"parameter {part.name}, {origin}")
+    return "; ".join(notes)
+
+
+def _expand_pattern(names: NodeNames, text: str) -> str:
+    """Expand a name with ``*`` in it as if each were a letter; remap rules cannot be told to match."""
+    stand_in = "STAR_OF_A_PATTERN"
+    return names.expand(text.replace("*", stand_in)).replace(stand_in, "*")

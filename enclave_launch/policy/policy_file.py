@@ -1,0 +1,89 @@
+"""``--policy FILE`` merged over what was derived: more permissions, wildcards, denials. Pure.
+
+Only the enclaves of this launch are taken; the others are named in a warning, since nothing would use
+them. Names become absolute, so that a name written ``chatter`` and a derived ``/chatter`` are one rule.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from enclave_launch.policy.node_permissions import Reason
+from keystore.permissions_names import full_name
+from keystore.permissions_patterns import can_meet
+from keystore.policy import EnclavePolicy, Policy, Profile, Qualifier, Rule
+from keystore.policy_xml import PolicyDocument
+
+ReasonsByEnclave = Mapping[str, Mapping[Rule, tuple[Reason, ...]]]
+
+
+@dataclass(frozen=True, slots=True)
+class MergedPolicy:
+    policy: Policy
+    reasons: ReasonsByEnclave
+    warnings: tuple[str, ...]
+
+
+def merge_policy_file(derived: Policy, reasons: ReasonsByEnclave, document: PolicyDocument) -> MergedPolicy:
+    """Union by enclave and profile. Warnings: the document's own, unused enclaves, denials of needs."""
+    theirs = {enclave.path: enclave for enclave in document.policy.enclaves}
+    ours = {enclave.path for enclave in derived.enclaves}
+    warnings = [*document.warnings, *document.notes]
+    warnings += [
+        f"enclave {path} of the policy file is not used by this launch and was left out"
+        for path in theirs
+        if path not in ours
+    ]
+    enclaves: list[EnclavePolicy] = []
+    merged_reasons = {path: dict(by_rule) for path, by_rule in reasons.items()}
+    for enclave in derived.enclaves:
+        other = theirs.get(enclave.path)
+        if other is None:
+            enclaves.append(enclave)
+            continue
+        added = _absolute(other, document)
+        enclaves.append(EnclavePolicy(enclave.path, _union(enclave, added)))
+        known = merged_reasons.setdefault(enclave.path, {})
+        for (ns, node), rules in added.items():
+            for rule, place in rules.items():
+                reason = Reason(f"{ns.rstrip('/')}/{node}", "policy file", place, rule.expression)
+                known[rule] = (*known.get(rule, ()), reason)
+        warnings.extend(_denials(enclave.path, known))
+    return MergedPolicy(Policy(tuple(enclaves)), merged_reasons, tuple(warnings))
+
+
+def _absolute(enclave: EnclavePolicy, document: PolicyDocument) -> dict[tuple[str, str], dict[Rule, str]]:
+    """(namespace, node) -> rule with its full name -> file:line."""
+    return {
+        (profile.ns, profile.node): {
+            Rule(rule.operation, rule.qualifier, full_name(rule.expression, profile)): document.places[
+                enclave.path, profile.ns, profile.node, rule
+            ]
+            for rule in profile.rules
+        }
+        for profile in enclave.profiles
+    }
+
+
+def _union(
+    enclave: EnclavePolicy, added: Mapping[tuple[str, str], Mapping[Rule, str]]
+) -> tuple[Profile, ...]:
+    profiles = {(profile.ns, profile.node): set(profile.rules) for profile in enclave.profiles}
+    for key, rules in added.items():
+        profiles.setdefault(key, set()).update(rules)
+    return tuple(Profile(ns, node, tuple(sorted(rules))) for (ns, node), rules in sorted(profiles.items()))
+
+
+def _denials(path: str, reasons: Mapping[Rule, tuple[Reason, ...]]) -> list[str]:
+    """A warning for each derived permission that a denial takes away: the node will miss it."""
+    denials = [(rule, why) for rule, why in reasons.items() if rule.qualifier is Qualifier.DENY]
+    return [
+        f"{why[0].place}: {denial.operation.value} {denial.expression} is denied in enclave {path}, "
+        f"but node {need.node} needs {rule.operation.value} {rule.expression} ({need.place})"
+        for denial, why in denials
+        for rule, needs in reasons.items()
+        if rule.qualifier is Qualifier.ALLOW and rule.operation is denial.operation
+        for need in needs[:1]
+        if need.origin != "policy file" and can_meet(denial.expression, rule.expression)
+    ]
