@@ -24,6 +24,7 @@ _NAMESPACE = re.compile(rf"/\Z|(?:/{_TOKEN})+/?\Z")
 
 ACTION_SERVICES = ("send_goal", "cancel_goal", "get_result")
 ACTION_TOPICS = ("feedback", "status")
+_LONGEST_PART = "cancel_goal"
 
 
 class RemapKind(str, Enum):
@@ -115,6 +116,7 @@ class NodeNames:
         self.namespace = namespace
         self._topics: dict[str, ParsedRule] = {}
         self._services: dict[str, ParsedRule] = {}
+        self._parts_are_named = False
         for rule in rules.names if rules else ():
             self._add(rule)
 
@@ -145,18 +147,15 @@ class NodeNames:
         expanded = self.expand(name, "action name")
         return self._resolve(expanded, self._topics) if as_a_whole else Resolved(expanded)
 
-    def action_parts(self, action: str) -> ActionParts:
-        """The names that the three services and two topics of the expanded ``action`` really get."""
-        services = {part: self._part(action, part, self._services) for part in ACTION_SERVICES}
-        topics = {part: self._part(action, part, self._topics) for part in ACTION_TOPICS}
+    def action_parts(self, action: str) -> ActionParts | None:
+        """What the parts of the expanded ``action`` get one by one; ``None`` if no rule names any."""
+        validate_full_name(f"{action}/_action/{_LONGEST_PART}", "action name")
+        names = [f"{action}/_action/{part}" for part in (*ACTION_SERVICES, *ACTION_TOPICS)]
+        if not self._parts_are_named or not any(self.rule_matching(name) for name in names):
+            return None
+        services = {part: self.service(name) for part, name in zip(ACTION_SERVICES, names[:3], strict=True)}
+        topics = {part: self.topic(name) for part, name in zip(ACTION_TOPICS, names[3:], strict=True)}
         return ActionParts(services, topics)
-
-    def _part(self, action: str, part: str, rules: dict[str, ParsedRule]) -> Resolved:
-        name = f"{action}/_action/{part}"
-        if name in rules:
-            return self._resolve(name, rules)
-        validate_full_name(name, "action name")
-        return Resolved(name)
 
     def _add(self, rule: ParsedRule) -> None:
         if rule.node not in (None, self.node):
@@ -165,6 +164,7 @@ class NodeNames:
             match = self.expand(rule.match)
         except InvalidNameError:
             return  # rcl skips a rule whose match cannot be expanded
+        self._parts_are_named = self._parts_are_named or "/_action/" in match
         if rule.kind is not RemapKind.SERVICE:
             self._topics.setdefault(match, rule)
         if rule.kind is not RemapKind.TOPIC:
@@ -179,12 +179,10 @@ class NodeNames:
 
 @dataclass(frozen=True, slots=True)
 class ActionParts:
+    """Final names by part (``send_goal``, ``feedback`` ...)."""
+
     services: dict[str, Resolved]
     topics: dict[str, Resolved]
-
-    @property
-    def remapped(self) -> bool:
-        return any(part.rules for part in (*self.services.values(), *self.topics.values()))
 
 
 def parse_rule(text: str, origin: str = "") -> ParsedRule:

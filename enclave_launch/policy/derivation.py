@@ -135,13 +135,14 @@ class _Collection:
             EnclavePolicy(
                 path,
                 tuple(
-                    Profile(ns, name, tuple(sorted(rules))) for (ns, name), rules in sorted(profiles.items())
+                    Profile(ns, name, tuple(sorted(rules, key=_rule_order)))
+                    for (ns, name), rules in sorted(profiles.items())
                 ),
             )
             for path, profiles in sorted(self.profiles.items())
         )
         reasons = {
-            path: {rule: tuple(_in_order(why)) for rule, why in sorted(by_rule.items())}
+            path: {rule: _in_order(by_rule[rule]) for rule in sorted(by_rule, key=_rule_order)}
             for path, by_rule in self.reasons.items()
         }
         nodes = {path: tuple(each) for path, each in self.nodes.items()}
@@ -151,13 +152,19 @@ class _Collection:
 def _note(permission: Permission, rules: set[Rule], reasons: Reasons) -> None:
     rule = Rule(permission.operation, Qualifier.ALLOW, permission.name)
     rules.add(rule)
-    known = reasons.setdefault(rule, [])
-    if permission.reason not in known:
-        known.append(permission.reason)
+    reasons.setdefault(rule, []).append(permission.reason)
 
 
-def _in_order(reasons: Iterable[Reason]) -> list[Reason]:
-    return sorted(reasons, key=lambda reason: (reason.node, reason.origin, reason.place, reason.written))
+def _in_order(reasons: list[Reason]) -> tuple[Reason, ...]:
+    if len(reasons) == 1:
+        return (reasons[0],)
+    by_place = sorted(reasons, key=lambda reason: (reason.node, reason.origin, reason.place, reason.written))
+    return tuple(dict.fromkeys(by_place))
+
+
+def _rule_order(rule: Rule) -> tuple[str, str, str]:
+    """The order of ``Rule`` itself, several times faster."""
+    return rule.operation, rule.qualifier, rule.expression
 
 
 def _answered(document: PolicyDocument | None, node: RunningNode, operation: Operation) -> bool:

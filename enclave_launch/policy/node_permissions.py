@@ -146,7 +146,7 @@ class _Collector:
         if not self._whole:
             self._warn_of_idle_rule(action.name, place)
         parts = self._names.action_parts(action.name)
-        if not parts.remapped:
+        if parts is None:
             yield operation, action
             return
         service, topic = _PARTS[operation]
