@@ -32,9 +32,6 @@ class Distro(str, Enum):
     ROLLING = "rolling"
 
 
-DISTROS = tuple(distro.value for distro in Distro)
-
-
 @dataclass(frozen=True, slots=True)
 class Since:
     """The first version with a feature, per distribution; ``None``: not in that series."""
@@ -175,7 +172,7 @@ class Release:
 
 
 @lru_cache(maxsize=32)
-def release(distro: Distro, launch: Version | None = None, launch_ros: Version | None = None) -> Release:
+def release_of(distro: Distro, launch: Version | None = None, launch_ros: Version | None = None) -> Release:
     """The release of ``distro`` with these versions, by default those of the reference snapshots."""
     default_launch, default_ros = _VERSIONS[distro]
     launch, launch_ros = launch or default_launch, launch_ros or default_ros
@@ -204,7 +201,7 @@ def choose_release(name: str | None, environment_name: str | None, prefixes: Seq
     installed = (_installed_version("launch", prefixes), _installed_version("launch_ros", prefixes))
     default = _VERSIONS[distro]
     same_series = installed[0] is not None and installed[0][:2] == default[0][:2]
-    return release(distro, *installed) if same_series else release(distro)
+    return release_of(distro, *installed) if same_series else release_of(distro)
 
 
 def _installed_version(package: str, prefixes: Sequence[str]) -> Version | None:
@@ -218,10 +215,3 @@ def _installed_version(package: str, prefixes: Sequence[str]) -> Version | None:
         if found:
             return tuple(int(part) for part in found.group(1).split(".") if part)
     return None
-
-
-def at_least(first: str) -> bool:
-    """Is the distribution of the evaluation in progress ``first`` or a later one?"""
-    from enclave_launch.evaluation.host import current_release
-
-    return DISTROS.index(current_release().distro.value) >= DISTROS.index(first)

@@ -61,6 +61,7 @@ class LaunchContext:
         self._completion_futures: list[Any] = []
         self.on_event: str | None = None
         self.includes: tuple[str, ...] = ()
+        self._timer_handler_installed = False
 
     @property
     def host(self) -> Host:

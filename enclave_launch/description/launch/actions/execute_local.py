@@ -1,0 +1,253 @@
+"""The action that starts a process and lets handlers react to it.
+
+Preparing performs all substitutions; starting is the host's business (``Host.start_process``): a dry run
+records, the runtime spawns, pipes output and emits the process events.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.launch.action import Action
+from enclave_launch.description.launch.substitutions.launch_configuration import LaunchConfiguration
+from enclave_launch.description.launch.utilities import (
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.evaluation.environment import changed
+from enclave_launch.evaluation.location import location_of
+from enclave_launch.evaluation.namespaces import enclave_scope
+from enclave_launch.process import EnclaveRequest, ResolvedProcess
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.descriptions.executable import Executable
+    from enclave_launch.description.launch.events.process import ProcessExited
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
+    from enclave_launch.description.launch.some_entities_type import SomeEntitiesType
+    from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
+    from enclave_launch.description.launch.substitution import Substitution
+
+    OnExit = SomeEntitiesType | Callable[[ProcessExited, LaunchContext], SomeEntitiesType | None]
+
+_SIGTERM_TIMEOUT = LaunchConfiguration("sigterm_timeout", default=5)
+_SIGKILL_TIMEOUT = LaunchConfiguration("sigkill_timeout", default=5)
+
+
+class ExecuteLocal(Action):
+    """Starts ``process_description`` when executed; may be executed once.
+
+    ``enclave`` (ours) names the DDS-Security enclave of the process: absolute, or below the scope in force.
+    """
+
+    def __init__(
+        self,
+        *,
+        process_description: Executable,
+        shell: bool = False,
+        sigterm_timeout: SomeSubstitutionsType = _SIGTERM_TIMEOUT,
+        sigkill_timeout: SomeSubstitutionsType = _SIGKILL_TIMEOUT,
+        emulate_tty: bool = False,
+        output: SomeSubstitutionsType | Mapping[str, Any] = "log",
+        output_format: str = "[{this.process_description.final_name}] {line}",
+        cached_output: bool = False,
+        log_cmd: bool = False,
+        on_exit: OnExit | None = None,
+        respawn: bool | SomeSubstitutionsType = False,
+        respawn_delay: float | None = None,
+        respawn_max_retries: int = -1,
+        enclave: SomeSubstitutionsType | None = None,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(**kwargs)
+        self.__process_description = process_description
+        self.__shell = shell
+        self.__sigterm_timeout = normalize_to_list_of_substitutions(sigterm_timeout)
+        self.__sigkill_timeout = normalize_to_list_of_substitutions(sigkill_timeout)
+        self.__emulate_tty = emulate_tty
+        self.__output = _output(os.environ.get("OVERRIDE_LAUNCH_PROCESS_OUTPUT", output))
+        self.__output_format = output_format
+        self.__cached_output = cached_output
+        self.__log_cmd = log_cmd
+        self.__on_exit = on_exit
+        self.__respawn = _respawn(respawn)
+        self.__respawn_delay = respawn_delay
+        self.__respawn_max_retries = respawn_max_retries
+        self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
+        self.__executed = False
+        self.__event_args: dict[str, Any] | None = None
+        self.__completed: Any = None
+        self.captured_output: tuple[list[str], list[str]] = ([], [])
+        self.final_return_code: int | None = None
+
+    @property
+    def process_description(self) -> Executable:
+        return self.__process_description
+
+    @property
+    def shell(self) -> bool:
+        return self.__shell
+
+    @property
+    def emulate_tty(self) -> bool:
+        return self.__emulate_tty
+
+    @property
+    def sigterm_timeout(self) -> list[Substitution]:
+        return self.__sigterm_timeout
+
+    @property
+    def sigkill_timeout(self) -> list[Substitution]:
+        return self.__sigkill_timeout
+
+    @property
+    def output(self) -> list[Substitution] | Mapping[str, Any]:
+        return self.__output
+
+    @property
+    def output_format(self) -> str:
+        return self.__output_format
+
+    @property
+    def cached_output(self) -> bool:
+        return self.__cached_output
+
+    @property
+    def log_cmd(self) -> bool:
+        return self.__log_cmd
+
+    @property
+    def respawn(self) -> Any:
+        """A bool once prepared, before that what was given."""
+        return self.__respawn
+
+    @property
+    def respawn_delay(self) -> float | None:
+        return self.__respawn_delay
+
+    @property
+    def respawn_max_retries(self) -> int:
+        return self.__respawn_max_retries
+
+    @property
+    def process_details(self) -> dict[str, Any] | None:
+        """``action``, ``name``, ``cmd``, ``cwd``, ``env`` and, once started, ``pid``; ``None`` before ``prepare``."""
+        return self.__event_args
+
+    @property
+    def return_code(self) -> int | None:
+        return self.final_return_code
+
+    def get_stdout(self) -> str:
+        """What the process wrote so far. Raises ``RuntimeError`` without ``cached_output``."""
+        return self.__captured(0, "stdout")
+
+    def get_stderr(self) -> str:
+        """As ``get_stdout``."""
+        return self.__captured(1, "stderr")
+
+    def __captured(self, stream: int, name: str) -> str:
+        if not self.__cached_output:
+            raise RuntimeError(
+                f"cached output must be true to be able to get {name}, proc '{self.__process_description.name}'"
+            )
+        return "".join(self.captured_output[stream])
+
+    def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        return self.__on_exit if isinstance(self.__on_exit, list) else []
+
+    def get_asyncio_future(self) -> Any:
+        return self.__completed
+
+    def prepare(self, context: LaunchContext) -> None:
+        """Perform everything that the process needs."""
+        self.__process_description.prepare(context, self)
+        description = self.__process_description
+        self.__event_args = {
+            "action": self,
+            "name": description.final_name,
+            "cmd": description.final_cmd,
+            "cwd": description.final_cwd,
+            "env": description.final_env,
+        }
+        if not isinstance(self.__respawn, bool):
+            from enclave_launch.description.launch.utilities.type_utils import perform_typed_substitution
+
+            self.__respawn = bool(perform_typed_substitution(context, self.__respawn, bool))
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        """Prepare, then start unless the launch is shutting down."""
+        self.prepare(context)
+        if self.__executed:
+            raise RuntimeError(
+                f"ExecuteLocal action '{self.__process_description.final_name}': "
+                f"executed more than once: {self.describe()}"
+            )
+        self.__executed = True
+        if context.is_shutdown:
+            return None
+        if self.__on_exit is not None:
+            self.__register_on_exit(context, self.__on_exit)
+        self.__completed = context.host.start_process(self, self.resolve(context), context)
+        return None
+
+    def __register_on_exit(self, context: LaunchContext, on_exit: OnExit) -> None:
+        from enclave_launch.description.launch.event_handlers.on_process_exit import OnProcessExit
+
+        context.register_event_handler(OnProcessExit(target_action=self, on_exit=on_exit))
+
+    def resolve(self, context: LaunchContext) -> ResolvedProcess:
+        """The prepared process as a value. Subclasses add what they know of the node."""
+        description = self.__process_description
+        name, cmd = description.final_name or "", tuple(description.final_cmd or ())
+        return ResolvedProcess(
+            index=int(name.rpartition("-")[2]),
+            kind="executable",
+            package=None,
+            executable=first_word(cmd),
+            process_name=name,
+            name=None,
+            namespace=None,
+            fqn=None,
+            cmd=cmd,
+            remaps=(),
+            parameters={},
+            environment=self.__changed_environment(context),
+            enclave=self.enclave_request(context),
+            location=location_of(self, context),
+            on_event=context.on_event,
+            cwd=description.final_cwd,
+            shell=bool(self.__shell),
+        )
+
+    def enclave_request(self, context: LaunchContext) -> EnclaveRequest:
+        """What the launch file says about the enclave, without the user's own ROS arguments."""
+        attribute = None if self.__enclave is None else perform_substitutions(context, self.__enclave)
+        return EnclaveRequest(attribute, enclave_scope(context.launch_configurations))
+
+    def __changed_environment(self, context: LaunchContext) -> Mapping[str, str]:
+        final = self.__process_description.final_env
+        environment = context.process_environment
+        if final is environment.snapshot():
+            return environment.changes()
+        return changed(environment.start, final or {})
+
+
+def first_word(cmd: tuple[str, ...]) -> str:
+    """The program of a command that is all one string when run by a shell."""
+    words = cmd[0].split() if cmd else []
+    return words[0] if words else ""
+
+
+def _output(output: Any) -> list[Substitution] | Mapping[str, Any]:
+    return output if isinstance(output, dict) else normalize_to_list_of_substitutions(output)
+
+
+def _respawn(respawn: bool | SomeSubstitutionsType) -> Any:
+    if isinstance(respawn, bool):
+        return respawn
+    from enclave_launch.description.launch.utilities.type_utils import normalize_typed_substitution
+
+    return normalize_typed_substitution(respawn, bool)

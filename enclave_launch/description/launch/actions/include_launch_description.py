@@ -1,0 +1,119 @@
+"""``include``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.launch.action import Action
+from enclave_launch.description.launch.actions.set_launch_configuration import SetLaunchConfiguration
+from enclave_launch.description.launch.frontend.entity import Entity
+from enclave_launch.description.launch.frontend.expose import expose_action
+from enclave_launch.description.launch.launch_description_source import LaunchDescriptionSource
+from enclave_launch.description.launch.utilities import (
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.evaluation.distro import Feature
+from enclave_launch.evaluation.host import current_release
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.frontend.parser import Parser
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
+    from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
+
+Arguments = Iterable[tuple["SomeSubstitutionsType", "SomeSubstitutionsType"]]
+
+
+@expose_action("include")
+class IncludeLaunchDescription(Action):
+    """Loads another description and gives its entities, after setting the arguments one by one.
+
+    This is no scope: whatever the included file sets stays set.
+    """
+
+    def __init__(
+        self,
+        launch_description_source: LaunchDescriptionSource | SomeSubstitutionsType,
+        *,
+        launch_arguments: Arguments | None = None,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(**kwargs)
+        if not isinstance(launch_description_source, LaunchDescriptionSource):
+            from enclave_launch.description.launch.launch_description_sources import (
+                AnyLaunchDescriptionSource,
+            )
+
+            launch_description_source = AnyLaunchDescriptionSource(launch_description_source)
+        self.__source: LaunchDescriptionSource = launch_description_source
+        self.__launch_arguments = () if launch_arguments is None else tuple(launch_arguments)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["launch_description_source"] = parser.parse_substitution(entity.get_attr("file"))
+        tags = ["arg", "let"] if current_release().has(Feature.LET_IN_INCLUDE) else ["arg"]
+        given = [child for tag in tags for child in entity.get_attr(tag, data_type=list[Entity], optional=True) or ()]
+        if given:
+            parse = parser.parse_substitution
+            kwargs["launch_arguments"] = [
+                (parse(child.get_attr("name")), parse(child.get_attr("value"))) for child in given
+            ]
+            for child in given:
+                child.assert_entity_completely_parsed()
+        return cls, kwargs
+
+    @property
+    def launch_description_source(self) -> LaunchDescriptionSource:
+        return self.__source
+
+    @property
+    def launch_arguments(self) -> tuple[tuple[SomeSubstitutionsType, SomeSubstitutionsType], ...]:
+        return self.__launch_arguments
+
+    def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        description = self.__source.try_get_launch_description_without_context()
+        return [] if description is None else [description]
+
+    def argument_names_without_context(self) -> list[str] | None:
+        """The names of the arguments given, ``None`` when one needs a context."""
+        from enclave_launch.description.launch.launch_context import LaunchContext
+
+        context = LaunchContext()
+        try:
+            return self.__argument_names(context)
+        except Exception:  # a name may be any substitution, ours or a third party's
+            return None
+
+    def __argument_names(self, context: LaunchContext) -> list[str]:
+        return [
+            perform_substitutions(context, normalize_to_list_of_substitutions(name))
+            for name, _ in self.__launch_arguments
+        ]
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
+        from enclave_launch.evaluation.include import prepare_include
+
+        description = prepare_include(self, context)
+        if description is None:
+            return []
+        self.__set_file_locals(context)
+        from enclave_launch.evaluation.arguments import check_required_arguments
+
+        check_required_arguments(description, self.__argument_names(context))
+        arguments = [SetLaunchConfiguration(name, value) for name, value in self.__launch_arguments]
+        return [*arguments, description]
+
+    def __set_file_locals(self, context: LaunchContext) -> None:
+        """A description made in a script has no file: both locals are its location then."""
+        path = os.path.abspath(self.__source.location)
+        exists = os.path.exists(path)
+        context.extend_locals(
+            {
+                "current_launch_file_path": path,
+                "current_launch_file_directory": os.path.dirname(path) if exists else self.__source.location,
+            }
+        )

@@ -1,0 +1,17 @@
+"""``PopEnvironment``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from enclave_launch.description.launch.action import Action
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.launch_context import LaunchContext
+
+
+class PopEnvironment(Action):
+    """Close an environment scope."""
+
+    def execute(self, context: LaunchContext) -> None:
+        context._pop_environment()

@@ -1,0 +1,5 @@
+"""The error of a substitution that cannot be performed."""
+
+
+class SubstitutionFailure(RuntimeError):
+    """The message says why."""
