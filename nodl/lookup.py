@@ -61,6 +61,11 @@ class ManifestLookup:
         found = [node for node in installed.nodes if fits(node)]
         return Lookup(_agreed(subject, found), (*self._manifests, *installed.searched))
 
+    def all_of(self, package: str) -> Lookup:
+        """Every node that the documents of ``package`` describe, conflicts included."""
+        installed = self._package(package)
+        return Lookup(tuple(node.interface for node in installed.nodes), installed.searched)
+
     def _chosen_nodes(self) -> tuple[ManifestNode, ...]:
         if self._chosen is None:
             self._chosen = tuple(node for file in self._manifests for node in self._read_manifest(file))

@@ -156,14 +156,13 @@ _REFERENCE = _map(
     {"ref": _text(r"^[a-z][a-z0-9+.-]*://[^\s/][^\s]*$", "a reference such as nodl://package/name")},
     required=("ref",),
 )
+NAME_PATTERN = r"^[A-Za-z]$|^[/~A-Za-z][A-Za-z0-9_/]*[A-Za-z0-9_]$"
+TYPE_PATTERN = r"^[a-zA-Z][a-zA-Z0-9_]*(/(msg|srv|action))?/[A-Z][a-zA-Z0-9]*$"
 _NAME = _text(
-    r"^[A-Za-z]$|^[/~A-Za-z][A-Za-z0-9_/]*[A-Za-z0-9_]$",
+    NAME_PATTERN,
     "a ROS name (letters, digits, '_' and '/', starting with '/', '~' or a letter; no wildcards)",
 )
-_TYPE = _text(
-    r"^[a-zA-Z][a-zA-Z0-9_]*(/(msg|srv|action))?/[A-Z][a-zA-Z0-9]*$",
-    "an interface type such as std_msgs/msg/String",
-)
+_TYPE = _text(TYPE_PATTERN, "an interface type such as std_msgs/msg/String")
 _QOS = _map(
     {
         "history": _one_of("KEEP_LAST", "KEEP_ALL", "SYSTEM_DEFAULT"),

@@ -1,0 +1,168 @@
+"""``ManifestNode`` -> the text of a NoDL document, v1 or v2, sorted as it was read. Pure.
+
+What one version cannot say is returned as a list of notes, never dropped in silence.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+from nodl.document.manifest_node import ManifestNode
+from nodl.document.v2 import CATEGORIES
+from nodl.document.v2_schema import IDENTITY_KEY, NAME_PATTERN, PARAMETER_TYPES, TYPE_PATTERN
+from nodl.errors import InvalidNoDLDocumentError
+from nodl.names import shown
+from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
+
+_DEFAULT_QOS = "{history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
+_PLAIN_SCALAR = re.compile(r"[A-Za-z/][A-Za-z0-9_/.:]*[A-Za-z0-9_]\Z|~/[A-Za-z0-9_/]+\Z")
+_YAML_WORDS = frozenset({"yes", "no", "on", "off", "true", "false", "null", "y", "n"})
+
+# Parameter types as v1 files write them freely -> those of v2.
+_PARAMETER_TYPES = {
+    **{name: name for name in PARAMETER_TYPES},
+    **dict.fromkeys(("boolean",), "bool"),
+    **dict.fromkeys(
+        ("integer", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"), "int"
+    ),
+    **dict.fromkeys(("float", "float32", "float64"), "double"),
+    **dict.fromkeys(("str", "std::string"), "string"),
+    **dict.fromkeys(("integer_array", "int64_array"), "int_array"),
+    **dict.fromkeys(("float_array", "float64_array"), "double_array"),
+    **dict.fromkeys(("boolean_array",), "bool_array"),
+}
+
+# kinds of one v1 element: (role of the first, role of the second)
+_V1_ELEMENTS: dict[str, tuple[tuple[EndpointKind, str], tuple[EndpointKind, str]]] = {
+    "topic": ((EndpointKind.PUBLISHER, "publisher"), (EndpointKind.SUBSCRIPTION, "subscription")),
+    "service": ((EndpointKind.SERVICE_SERVER, "server"), (EndpointKind.SERVICE_CLIENT, "client")),
+    "action": ((EndpointKind.ACTION_SERVER, "server"), (EndpointKind.ACTION_CLIENT, "client")),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """``notes``: what had to be invented or left out, for the person who converts."""
+
+    text: str
+    notes: tuple[str, ...] = ()
+
+
+def v2_yaml(node: ManifestNode) -> Written:
+    """One document. Raises ``InvalidNoDLDocumentError`` for names and types that v2 cannot hold."""
+    interface = node.interface
+    lines = ["nodl_version: 2", *_identity(interface)]
+    if node.parameter_types:
+        lines.append("parameters:")
+        lines += [f"  {_scalar(n)}: {{type: {_v2_type(node, t)}}}" for n, t in node.parameter_types.items()]
+    topics = False
+    for category, kind in CATEGORIES.items():
+        entries = [endpoint for endpoint in interface.endpoints if endpoint.kind is kind]
+        if not entries:
+            continue
+        is_topic = kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+        topics |= is_topic
+        qos = f", qos: {_DEFAULT_QOS}" if is_topic else ""
+        lines.append(f"{category}:")
+        lines += [f"  - {{name: {_v2_name(e)}, type: {_v2_endpoint_type(e)}{qos}}}" for e in entries]
+    note = f"{interface.name}: v1 says nothing of QoS; ROS's default profile was written, check it"
+    return Written("\n".join(lines) + "\n", (note,) if topics else ())
+
+
+def v1_xml(nodes: Sequence[ManifestNode]) -> Written:
+    """One document with all ``nodes``. Raises ``InvalidNoDLDocumentError`` for a node without name."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<interface version="1">']
+    notes: list[str] = []
+    for node in nodes:
+        lines += _v1_node(node)
+        if node.version == 2:
+            notes.append(
+                f"{node.interface.name}: QoS, descriptions and details of parameters have no place in v1"
+            )
+    return Written("\n".join([*lines, "</interface>", ""]), tuple(notes))
+
+
+def _identity(interface: NodeInterface) -> list[str]:
+    """Our section, only when the registered name alone would not tell the same."""
+    fields: dict[str, str] = {}
+    if interface.executable != interface.name:
+        fields |= {"executable": interface.executable or "", "plugin": interface.plugin or ""}
+        fields["node"] = interface.name or ""
+    fields["namespace"] = interface.namespace or ""
+    if interface.library is not ClientLibrary.UNKNOWN:
+        fields["library"] = interface.library.value
+    given = [f"{key}: {_scalar(value)}" for key, value in fields.items() if value]
+    if interface.lifecycle:
+        given.append("lifecycle: true")
+    return ["codegen:", f"  {IDENTITY_KEY}: {{{', '.join(given)}}}"] if given else []
+
+
+def _v2_type(node: ManifestNode, written: str) -> str:
+    known = _PARAMETER_TYPES.get(written.lower())
+    if known is None:
+        raise InvalidNoDLDocumentError.at(
+            node.interface.source,
+            f"parameter type {shown(written)} is unknown in v2; write one of {', '.join(PARAMETER_TYPES)}",
+        )
+    return known
+
+
+def _v2_name(endpoint: Endpoint) -> str:
+    name = endpoint.name.text  # for v1's /node/x this is ~/x, which v2 can say
+    if not endpoint.name.is_literal or not re.search(NAME_PATTERN, name):
+        raise InvalidNoDLDocumentError.at(endpoint.source, f"name {shown(name)} cannot be written in NoDL v2")
+    return _scalar(name)
+
+
+def _v2_endpoint_type(endpoint: Endpoint) -> str:
+    if not re.search(TYPE_PATTERN, endpoint.type):
+        raise InvalidNoDLDocumentError.at(
+            endpoint.source, f"type {shown(endpoint.type)} is no interface type such as std_msgs/msg/String"
+        )
+    return endpoint.type
+
+
+def _scalar(text: str) -> str:
+    if _PLAIN_SCALAR.match(text) and text.lower() not in _YAML_WORDS:
+        return text
+    return json.dumps(text)
+
+
+def _v1_node(node: ManifestNode) -> list[str]:
+    interface = node.interface
+    if not interface.name:
+        raise InvalidNoDLDocumentError.at(
+            interface.source, f"v1 needs a node name; add codegen: {{{IDENTITY_KEY}: {{node: NAME}}}}"
+        )
+    name = (
+        f"{(interface.namespace or '').rstrip('/')}/{interface.name}"
+        if interface.namespace
+        else interface.name
+    )
+    children = [*_v1_interfaces(interface.endpoints)]
+    children += [
+        f'    <parameter name="{escape(n)}" type="{escape(t)}"/>' for n, t in node.parameter_types.items()
+    ]
+    if not children:
+        raise InvalidNoDLDocumentError.at(interface.source, "v1 cannot describe a node without any interface")
+    executable = interface.executable or interface.plugin or ""
+    head = f'  <node name="{escape(name)}" executable="{escape(executable)}">'
+    return [head, *children, "  </node>"]
+
+
+def _v1_interfaces(endpoints: Iterable[Endpoint]) -> Iterable[str]:
+    listed = list(endpoints)
+    for element, kinds in _V1_ELEMENTS.items():
+        roles: dict[tuple[str, str], list[str]] = {}
+        for endpoint in listed:
+            for kind, role in kinds:
+                if endpoint.kind is kind:
+                    key = (endpoint.written or endpoint.name.text, endpoint.type)
+                    roles.setdefault(key, []).append(role)
+        for (name, type_name), given in roles.items():
+            role = "both" if len(given) > 1 else given[0]
+            yield f'    <{element} name="{escape(name)}" type="{escape(type_name)}" role="{role}"/>'

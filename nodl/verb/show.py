@@ -1,0 +1,112 @@
+"""Show what NoDL says about a document, a whole package, or some executables or plugins of it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Iterable, Iterator
+
+from nodl.ament_index import search_prefixes
+from nodl.document import read_document
+from nodl.lookup import ManifestLookup
+from nodl.node_interface import EndpointKind, NodeInterface
+
+HELP = "print the interfaces of a document, package or executable"
+
+_LABELS = {
+    EndpointKind.PUBLISHER: "publishes",
+    EndpointKind.SUBSCRIPTION: "subscribes",
+    EndpointKind.SERVICE_SERVER: "serves",
+    EndpointKind.SERVICE_CLIENT: "calls",
+    EndpointKind.ACTION_SERVER: "serves action",
+    EndpointKind.ACTION_CLIENT: "calls action",
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    from nodl.verb import add_prefix_argument
+
+    parser.add_argument("subject", metavar="PACKAGE|FILE")
+    parser.add_argument("names", nargs="*", metavar="EXECUTABLE|PLUGIN", help="only these of the package")
+    parser.add_argument("--format", choices=("text", "json"), default="text")
+    add_prefix_argument(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    prefixes = search_prefixes(arguments.prefix)
+    missing: list[str] = []
+    if os.path.isfile(arguments.subject):
+        nodes = [node.interface for node in read_document(arguments.subject, prefixes=prefixes)]
+    else:
+        nodes, missing = _of_package(ManifestLookup(prefixes), arguments.subject, arguments.names)
+    if arguments.format == "json":
+        print(json.dumps([_plain(node) for node in nodes], indent=2))
+    else:
+        print("\n".join(line for node in nodes for line in _lines(node)))
+    for text in missing:
+        print(text, file=sys.stderr)
+    return 1 if missing or not nodes else 0
+
+
+def _of_package(
+    lookup: ManifestLookup, package: str, names: Iterable[str]
+) -> tuple[list[NodeInterface], list[str]]:
+    wanted = list(names)
+    if not wanted:
+        everything = lookup.all_of(package)
+        where = (
+            "" if everything else f"no NoDL of package {package}; looked at {_listing(everything.searched)}"
+        )
+        return list(everything.found), [where] if where else []
+    nodes: list[NodeInterface] = []
+    missing: list[str] = []
+    for name in wanted:
+        key = "plugin" if "::" in name else "executable"
+        result = lookup.find(package, **{key: name})
+        nodes.extend(result.found)
+        if not result:
+            missing.append(f"no NoDL for {package}/{name}; looked at {_listing(result.searched)}")
+    return nodes, missing
+
+
+def _listing(places: Iterable[str]) -> str:
+    return ", ".join(places)
+
+
+def _lines(node: NodeInterface) -> Iterator[str]:
+    program = node.executable or node.plugin or "?"
+    where = f"{node.package}/{program}" if node.package else program
+    namespace = f" in {node.namespace}" if node.namespace else ""
+    yield f"node {node.name or '(name not given)'}{namespace}, run by {where}  ({node.source})"
+    for endpoint in node.endpoints:
+        name = endpoint.written or str(endpoint.name)
+        yield f"  {_LABELS[endpoint.kind]:14} {name}  {endpoint.type}  ({endpoint.source})"
+    if node.parameters:
+        yield f"  {'parameters':14} {', '.join(node.parameters)}"
+    for gap in node.gaps:
+        yield f"  {'not known':14} {gap.why}  ({gap.source})"
+
+
+def _plain(node: NodeInterface) -> dict[str, object]:
+    return {
+        "package": node.package,
+        "executable": node.executable,
+        "plugin": node.plugin,
+        "name": node.name,
+        "namespace": node.namespace,
+        "library": node.library.value,
+        "lifecycle": node.lifecycle,
+        "source": str(node.source),
+        "parameters": list(node.parameters),
+        "endpoints": [
+            {
+                "kind": endpoint.kind.value,
+                "name": endpoint.written or str(endpoint.name),
+                "type": endpoint.type,
+                "source": str(endpoint.source),
+            }
+            for endpoint in node.endpoints
+        ],
+    }

@@ -1,0 +1,41 @@
+"""Check NoDL documents, v1 and v2: one line per document, file:line for what is wrong."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from nodl.ament_index import search_prefixes
+from nodl.document import V1_SUFFIX, read_document
+from nodl.errors import NoDLError
+
+HELP = "check documents; errors come with file and line"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    from nodl.verb import add_prefix_argument
+
+    parser.add_argument(
+        "files", nargs="*", metavar="FILE", help="documents (default: all *.nodl.* files of this folder)"
+    )
+    add_prefix_argument(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    files = arguments.files or [str(path) for path in sorted(Path().glob("*.nodl.*"))]
+    if not files:
+        print(f"no documents here; name some, such as package{V1_SUFFIX}", file=sys.stderr)
+        return 2
+    prefixes = search_prefixes(arguments.prefix)
+    wrong = 0
+    for file in files:
+        try:
+            nodes = read_document(file, prefixes=prefixes)
+        except NoDLError as error:
+            wrong += 1
+            print(error, file=sys.stderr)
+        else:
+            names = ", ".join(node.interface.name or "(name not given)" for node in nodes)
+            print(f"{file}: valid NoDL v{nodes[0].version}: {names}")
+    return 1 if wrong else 0
