@@ -29,7 +29,7 @@ def mark(error: BaseException, entity: object) -> None:
 
     An error in a template knows its text, not its place: the attribute with that text is searched for.
     """
-    if location_of(error) is not None:
+    if hasattr(error, _ATTRIBUTE):
         return
     template = getattr(error, "template", None)
     find_text = getattr(entity, "find_text", None)
@@ -39,11 +39,30 @@ def mark(error: BaseException, entity: object) -> None:
 
 def mark_at(error: BaseException, location: SourceLocation | None) -> None:
     """Note the place of ``error`` unless it has one."""
-    if location is not None and location_of(error) is None:
+    if location is not None and not hasattr(error, _ATTRIBUTE):
         setattr(error, _ATTRIBUTE, location)
 
 
 def location_of(error: BaseException) -> SourceLocation | None:
-    """The place noted on ``error``, or on the attempt that an ``InvalidLaunchFileError`` is about."""
-    location: SourceLocation | None = getattr(error, _ATTRIBUTE, None)
+    """The place noted on ``error``, or on the likeliest of the attempts that it lists."""
+    location: SourceLocation | None = getattr(likeliest(error), _ATTRIBUTE, None)
     return location
+
+
+def likeliest(error: BaseException) -> BaseException:
+    """Of the attempts that an ``InvalidLaunchFileError`` lists, the one to show; else ``error`` itself.
+
+    The first, because the file name decides the order, unless it says that the text is no XML at all.
+    """
+    attempts = [likeliest(attempt) for attempt in getattr(error, "likely_errors", ())]
+    if not attempts:
+        return error
+    return attempts[1] if len(attempts) > 1 and _is_no_xml(attempts[0]) else attempts[0]
+
+
+def _is_no_xml(error: BaseException) -> bool:
+    """Whether expat met something else than ``<`` first."""
+    return isinstance(error, SyntaxError) and getattr(error, "code", None) == _XML_ERROR_SYNTAX
+
+
+_XML_ERROR_SYNTAX = 2  # expat's number for it; the module is not imported just for that
