@@ -1,7 +1,8 @@
 """Between a process and its start stands its enclave: complete on disk, and no more than the plan foresaw.
 
-The runtime knows only ``EnclaveGate``; what makes keys and permissions sits behind it. ``PlannedGate`` holds every
-process of a live run against the plan that was signed: plans are fixed before the first process.
+The runtime knows only ``EnclaveGate``; what makes keys and permissions sits behind it. ``PlannedGate``
+holds every process of a live run against the plan that was signed: plans are fixed before the first
+process.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ from enclave_launch.process import ResolvedComponent, ResolvedProcess
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """What a process gets for its enclave: ``arguments`` end its command line, ``environment`` is laid over."""
+    """What a process gets for its enclave: ``arguments`` end its command line, ``environment`` is laid
+    over.
+    """
 
     arguments: tuple[str, ...] = ()
     environment: Mapping[str, str] = field(default_factory=dict)
@@ -54,7 +57,8 @@ class LateProcess(RuntimeFailure):
 
 
 def identity(process: ResolvedProcess) -> tuple[object, ...]:
-    """What decides the permissions of a process. Not its number, its command line or its parameter files, which
+    """What decides the permissions of a process. Not its number, its command line or its parameter files,
+    which
     differ between a dry run and a live one."""
     return (
         process.kind,
@@ -100,7 +104,7 @@ class PlannedGate:
         if identity(process) in self._processes:
             return self._provider.ensure(process)
         if process.kind == "executable" and process.enclave.attribute is None:
-            return Grant()  # no ROS process as far as the launch file tells: nothing to sign
+            return self._provider.ensure_late(process)  # no ROS process by the launch file: nothing to sign
         if not self._allow_late:
             raise LateProcess(_refusal(f"{_named(process)} at {process.location}"))
         self._say_late(
@@ -111,16 +115,15 @@ class PlannedGate:
         return grant
 
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
-        """A container reads its permissions once, at its start: what comes late cannot be granted any more."""
-        for component in components:
-            if component_identity(component) not in self._components:
-                raise LateProcess(
-                    _refusal(
-                        f"component {component.package}/{component.plugin} for {component.container} at "
-                        f"{component.location}",
-                        remedy="; the container has read its permissions: name the component in the launch file",
-                    )
-                )
+        """A container reads its permissions once, at its start: what comes late cannot be granted any
+        more.
+        """
+        late = (item for item in components if component_identity(item) not in self._components)
+        for component in late:
+            what = f"component {component.package}/{component.plugin} for {component.container}"
+            raise LateProcess(
+                _refusal(f"{what} at {component.location}", "its container has read its permissions already")
+            )
 
     def launcher(self) -> Grant | None:
         return self._provider.launcher()
@@ -131,5 +134,7 @@ def _named(process: ResolvedProcess) -> str:
     return f"{what} ({process.fqn})" if process.fqn else what
 
 
-def _refusal(what: str, remedy: str = "; --allow-late provisions it when it appears") -> str:
-    return f"refused: {what} only exists at run time and goes beyond the permissions signed before the launch{remedy}"
+def _refusal(what: str, remedy: str = "--allow-late provisions it when it appears") -> str:
+    return (
+        f"refused: {what} only exists at run time and goes beyond the permissions that were signed; {remedy}"
+    )

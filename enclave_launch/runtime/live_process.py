@@ -1,12 +1,11 @@
 """One process action of a live run: its supervision on one side, the launch's events on the other.
 
-Comes from ``LiveHost.start_process``. What happens to the process becomes launch events; the events that launch
-addresses to processes (shutdown, signal, stdin) become calls on it.
+Comes from ``LiveHost.start_process``. What happens to the process becomes launch events; the events that
+launch addresses to processes (shutdown, signal, stdin) become calls on it.
 """
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable
 from signal import Signals
 from typing import TYPE_CHECKING, Any

@@ -1,8 +1,10 @@
-"""What only a ROS node can do for a launch: load components, ask for lifecycle transitions, hear of state changes.
+"""What only a ROS node can do for a launch: load components, ask for lifecycle transitions, hear of state
+changes.
 
-Needs rclpy, which is imported when a launch needs it and never otherwise. The node has a context of its own, in the
-launcher's own enclave, and spins in a thread of its own; results come back as futures of the launch's loop.
-Source of the calls: launch_ros/actions/load_composable_nodes.py, lifecycle_node.py, ros_adapters.py.
+Needs rclpy, which is imported when a launch needs it and never otherwise. The node has a context of its
+own, in the launcher's own enclave, and spins in a thread of its own; results come back as futures of the
+launch's loop. Source of the calls: launch_ros/actions/load_composable_nodes.py, lifecycle_node.py,
+ros_adapters.py.
 """
 
 from __future__ import annotations
@@ -55,7 +57,9 @@ class RosServices:
         self._thread.start()
 
     def load(self, components: Sequence[ResolvedComponent]) -> asyncio.Future[None]:
-        """One after another; a component that cannot be loaded is logged, as launch does, and the rest goes on."""
+        """One after another; a component that cannot be loaded is logged, as launch does, and the rest
+        goes on.
+        """
         return self._loop.run_in_executor(None, self._load_all, tuple(components))
 
     def change_state(self, node: str, transition: int) -> asyncio.Future[bool]:
@@ -63,7 +67,9 @@ class RosServices:
         return self._loop.run_in_executor(None, self._change_state, node, transition)
 
     def watch_state(self, node: str, on_transition: Callable[[Any], None]) -> None:
-        """``on_transition`` gets each ``lifecycle_msgs/msg/TransitionEvent`` of ``node``, in the launch's loop."""
+        """``on_transition`` gets each ``lifecycle_msgs/msg/TransitionEvent`` of ``node``, in the
+        launch's loop.
+        """
         from lifecycle_msgs.msg import TransitionEvent
 
         self._node.create_subscription(

@@ -3,9 +3,9 @@
     run_launch(description, ...)         blocks, takes the signals, returns the exit status
     run_launch_async(description, ...)   the same inside a running loop, cancel-safe
 
-Semantics of launch/launch_service.py: the description is visited while one event is handled; then events, newest
-handler first, until nothing is left to wait for. Stricter than there: SIGTERM, SIGQUIT and SIGHUP shut down in
-order and leave no orphans; what ended badly on its own shows in the exit status.
+Semantics of launch/launch_service.py: the description is visited while one event is handled; then events,
+newest handler first, until nothing is left to wait for. Stricter than there: SIGTERM, SIGQUIT and SIGHUP
+shut down in order and leave no orphans; what ended badly on its own shows in the exit status.
 """
 
 from __future__ import annotations
@@ -14,11 +14,11 @@ import asyncio
 import os
 import socket
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AsyncExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
-from signal import SIGHUP, SIGINT, SIGQUIT, SIGTERM, SIG_IGN, Signals, getsignal
+from signal import SIG_IGN, SIGHUP, SIGINT, SIGQUIT, SIGTERM, Signals, getsignal
 from typing import Any, TextIO
 
 from enclave_launch.description.launch.event_handlers import OnIncludeLaunchDescription, OnShutdown
@@ -160,7 +160,7 @@ class LaunchService:
             except asyncio.CancelledError as error:
                 cancelled = error
                 self.shut_down("cancelled")
-            except Exception as error:  # noqa: BLE001  # launch files run code of their own: any error ends the launch
+            except Exception as error:  # launch files run code of their own: any error ends the launch
                 self._on_error(error)
         if cancelled is not None:
             raise cancelled

@@ -104,7 +104,9 @@ class SupervisedProcess:
             self._cancel_timers()
 
     def end(self, patience: Patience, *, quiet: bool = False) -> None:
-        """SIGINT now, SIGTERM and SIGKILL when it does not help. ``quiet``: the user knows, it was his Ctrl-C."""
+        """SIGINT now, SIGTERM and SIGKILL when it does not help. ``quiet``: the user knows, it was his
+        Ctrl-C.
+        """
         if self._ending.is_set():
             return
         self._ending.set()

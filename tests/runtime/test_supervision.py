@@ -173,12 +173,14 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed() -> None:
     assert story.lines[1:-1] == [
         (
             "ERROR",
-            "process[a-1] failed to terminate '0.2' seconds after receiving 'SIGINT', escalating to 'SIGTERM'",
+            "process[a-1] failed to terminate '0.2' seconds after receiving 'SIGINT', "
+            "escalating to 'SIGTERM'",
         ),
         ("INFO", "sending signal 'SIGTERM' to process[a-1]"),
         (
             "ERROR",
-            "process[a-1] failed to terminate '0.4' seconds after receiving 'SIGTERM', escalating to 'SIGKILL'",
+            "process[a-1] failed to terminate '0.4' seconds after receiving 'SIGTERM', "
+            "escalating to 'SIGKILL'",
         ),
         ("INFO", "sending signal 'SIGKILL' to process[a-1]"),
     ]

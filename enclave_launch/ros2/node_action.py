@@ -1,0 +1,27 @@
+"""The extension point ``launch_ros.node_action``: each node of upstream's engine gets its enclave before it starts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from launch.substitutions import TextSubstitution
+from launch_ros.actions.node import NodeActionExtension
+
+from enclave_launch.ros2 import attributes  # noqa: F401  # accepted by the time a node is executed, too
+from enclave_launch.ros2.observation import observe_components, observe_node
+from enclave_launch.ros2.session import session_of
+
+
+class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # untyped without ROS
+    """Does nothing in a launch that is not secured by us, so that others (``ros2launch_security``) may."""
+
+    def prepare_for_execute(
+        self, context: Any, ros_specific_arguments: dict[str, Any], node_action: Any
+    ) -> tuple[list[Any], dict[str, Any]]:
+        """:raises EnclaveLaunchError: the node cannot be secured; launch reports it and shuts down."""
+        session = session_of(context)
+        if session is None:
+            return [], ros_specific_arguments
+        process = observe_node(node_action, context, ros_specific_arguments)
+        grant = session.enter(process, observe_components(node_action, context))
+        return [[TextSubstitution(text=word)] for word in grant.arguments], ros_specific_arguments

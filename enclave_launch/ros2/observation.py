@@ -1,0 +1,115 @@
+"""What upstream's actions are about to start, in our terms: a ``ResolvedProcess`` for enclave and policy.
+
+Reads an action of real launch at the moment its extension point is called: names, namespace and remap rules
+are final then. Next: ``session``. Touches nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import launch_ros.actions
+from launch.descriptions import executable as executable_description
+from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
+
+from enclave_launch.evaluation.rcl_parameters import resolve_parameters
+from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
+from enclave_launch.process import (
+    UNSPECIFIED_NODE_NAME,
+    UNSPECIFIED_NODE_NAMESPACE,
+    EnclaveRequest,
+    ProcessKind,
+    RemapRule,
+    ResolvedComponent,
+    ResolvedProcess,
+)
+from enclave_launch.ros2.attributes import enclave_attribute, scope_in_force
+from enclave_launch.source_location import SourceLocation
+
+
+def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, Any]) -> ResolvedProcess:
+    """``action``: a ``launch_ros.actions.Node`` whose substitutions have been performed."""
+    context.extend_locals({"ros_specific_arguments": ros_specific_arguments})
+    cmd = tuple(perform_substitutions(context, part) for part in action.cmd)
+    arguments = parse_ros_arguments(cmd)
+    fqn = str(action.node_name)
+    namespace, _, name = fqn.rpartition("/")
+    number, label = next_process_name(action, context, cmd)
+    return ResolvedProcess(
+        index=number,
+        kind=_kind(action),
+        package=_text(context, action.node_package),
+        executable=_text(context, action.node_executable) or "",
+        process_name=f"{label}-{number}",
+        name=name,
+        namespace=namespace or "/",
+        fqn=fqn,
+        cmd=cmd,
+        remaps=tuple(RemapRule(source, target) for source, target in action.expanded_remapping_rules or ()),
+        parameters=resolve_parameters(_fqn_tokens(fqn), arguments.parameters),
+        environment={},
+        enclave=EnclaveRequest(
+            enclave_attribute(action, context), scope_in_force(context), arguments.enclave
+        ),
+        location=location_in(context, type(action).__name__),
+    )
+
+
+def observe_components(action: Any, context: Any) -> tuple[ResolvedComponent, ...]:
+    """The composable nodes that a ``ComposableNodeContainer`` names itself and will load."""
+    descriptions = getattr(action, "_ComposableNodeContainer__composable_node_descriptions", None)
+    return tuple(_components(str(action.node_name), descriptions or (), context))
+
+
+def _components(container: str, descriptions: Iterable[Any], context: Any) -> Iterable[ResolvedComponent]:
+    from launch_ros.actions.load_composable_nodes import get_composable_node_load_request
+
+    for description in descriptions:
+        if description.condition() is not None and not description.condition().evaluate(context):
+            continue
+        request = get_composable_node_load_request(description, context)
+        yield ResolvedComponent(
+            container=container,
+            package=request.package_name,
+            plugin=request.plugin_name,
+            name=request.node_name,
+            namespace=request.node_namespace,
+            remaps=tuple(RemapRule(*rule.split(":=", 1)) for rule in request.remap_rules),
+            parameters={},
+            extra_arguments={},
+            location=location_in(context, "ComposableNode"),
+        )
+
+
+def next_process_name(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[int, str]:
+    """The number and label that launch is about to give: its counter advances when the process is
+    prepared.
+    """
+    name = action.process_description.name
+    label = cmd[0].rpartition("/")[2] if name is None else perform_substitutions(context, name)
+    return executable_description._executable_process_counter + 1, label
+
+
+def location_in(context: Any, element: str) -> SourceLocation:
+    """Real launch keeps the file, no lines."""
+    return SourceLocation(
+        context.get_locals_as_dict().get("current_launch_file_path", "<program>"), 0, element
+    )
+
+
+def _kind(action: Any) -> ProcessKind:
+    if isinstance(action, launch_ros.actions.ComposableNodeContainer):
+        return "container"
+    return "lifecycle_node" if isinstance(action, launch_ros.actions.LifecycleNode) else "node"
+
+
+def _text(context: Any, value: Any) -> str | None:
+    return (
+        None if value is None else perform_substitutions(context, normalize_to_list_of_substitutions(value))
+    )
+
+
+def _fqn_tokens(fqn: str) -> list[str | None]:
+    unknown = (UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE)
+    return [None if token in unknown else token for token in fqn.split("/") if token]

@@ -1,0 +1,166 @@
+"""The enclave vocabulary in real launch: XML, YAML and Python, with nobody else disturbed."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+
+from tests.ros2.conftest import Workspace
+
+pytestmark = pytest.mark.real_launch
+
+# Visits a launch file with upstream's engine up to the start of each process, and prints what our extension sees.
+VISIT = """
+import json, os, sys
+import stand_ins
+stand_ins.install()
+import launch, launch.actions
+from launch.launch_description_sources import AnyLaunchDescriptionSource
+import enclave_launch.ros2.attributes as attributes
+from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
+from enclave_launch.ros2.observation import observe_node
+
+seen = []
+def look(self, context, ros_specific_arguments, node_action):
+    process = observe_node(node_action, context, ros_specific_arguments)
+    seen.append({"fqn": process.fqn, "kind": process.kind, "attribute": process.enclave.attribute,
+                 "scope": process.enclave.scope, "argument": process.enclave.argument,
+                 "remaps": [[rule.source, rule.target] for rule in process.remaps],
+                 "cmd": process.cmd, "parameters": dict(process.parameters), "name": process.process_name})
+    return [], ros_specific_arguments
+EnclaveNodeActionExtension.prepare_for_execute = look
+
+service = launch.LaunchService(noninteractive=True)
+service.include_launch_description(launch.LaunchDescription([
+    launch.actions.IncludeLaunchDescription(AnyLaunchDescriptionSource(sys.argv[1]))]))
+status = service.run()
+print(json.dumps({"status": status, "seen": seen}))
+"""
+
+
+def visited(workspace: Workspace, name: str, text: str) -> list[dict[str, Any]]:
+    result = workspace.python(VISIT, str(workspace.add(name, text)))
+    told = json.loads(result.stdout.splitlines()[-1])
+    assert told["status"] == 0, result.stdout
+    seen: list[dict[str, Any]] = told["seen"]
+    return seen
+
+
+def enclaves(seen: list[dict[str, Any]]) -> list[tuple[str, str | None, str | None]]:
+    return [(item["fqn"], item["attribute"], item["scope"]) for item in seen]
+
+
+XML = """
+<launch>
+  <arg name="where" default="deep"/>
+  <node exec="/bin/true" name="a"/>
+  <node exec="/bin/true" name="b" enclave="$(var where)/b"/>
+  <group>
+    <push_ros_namespace namespace="robot"/>
+    <node exec="/bin/true" name="c"/>
+    <node_container exec="/bin/true" name="d" namespace="" enclave="/box"/>
+    <executable cmd="/bin/true" enclave="/tool"/>
+    <group>
+      <push_ros_enclave enclave="arm"/>
+      <node exec="/bin/true" name="e"/>
+    </group>
+    <group>
+      <push_ros_namespace namespace="left" enclave="sinister"/>
+      <node exec="/bin/true" name="f" ros_args="--enclave /mine"/>
+    </group>
+  </group>
+  <node exec="/bin/true" name="g"/>
+</launch>
+"""
+
+YAML = """
+launch:
+- arg: {name: where, default: deep}
+- node: {exec: /bin/true, name: a}
+- node: {exec: /bin/true, name: b, enclave: $(var where)/b}
+- group:
+  - push_ros_namespace: {namespace: robot}
+  - node: {exec: /bin/true, name: c}
+  - node_container: {exec: /bin/true, name: d, namespace: '', enclave: /box}
+  - executable: {cmd: /bin/true, enclave: /tool}
+  - group:
+    - push_ros_enclave: {enclave: arm}
+    - node: {exec: /bin/true, name: e}
+  - group:
+    - push_ros_namespace: {namespace: left, enclave: sinister}
+    - node: {exec: /bin/true, name: f, ros_args: --enclave /mine}
+- node: {exec: /bin/true, name: g}
+"""
+
+PYTHON = """
+from launch import LaunchDescription
+from launch.actions import DeclareLaunchArgument, ExecuteProcess, GroupAction
+from launch.substitutions import LaunchConfiguration
+from launch_ros.actions import ComposableNodeContainer, Node, PushRosEnclave, PushRosNamespace
+
+def node(name, **options):
+    return Node(executable="/bin/true", name=name, **options)
+
+def generate_launch_description():
+    return LaunchDescription([
+        DeclareLaunchArgument("where", default_value="deep"),
+        node("a"),
+        node("b", enclave=[LaunchConfiguration("where"), "/b"]),
+        GroupAction([
+            PushRosNamespace("robot"),
+            node("c"),
+            ComposableNodeContainer(executable="/bin/true", name="d", namespace="", enclave="/box"),
+            ExecuteProcess(cmd=["/bin/true"], enclave="/tool"),
+            GroupAction([PushRosEnclave("arm"), node("e")]),
+            GroupAction([PushRosNamespace("left", enclave="sinister"), node("f", ros_arguments=["--enclave", "/mine"])]),
+        ]),
+        node("g"),
+    ])
+"""
+
+EXPECTED = [
+    ("<node_namespace_unspecified>/a", None, None),
+    ("<node_namespace_unspecified>/b", "deep/b", None),
+    ("/robot/c", None, "/robot"),
+    ("/robot/d", "/box", "/robot"),
+    ("/robot/e", None, "/robot/arm"),
+    ("/robot/left/f", None, "/robot/sinister"),
+    ("<node_namespace_unspecified>/g", None, None),
+]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"), [("t.launch.xml", XML), ("t.launch.yaml", YAML), ("t.launch.py", PYTHON)], ids=["XML", "YAML", "Python"]
+)
+def test_attribute_and_scope(name: str, text: str, workspace: Workspace) -> None:
+    seen = visited(workspace, name, text)
+    assert enclaves(seen) == EXPECTED
+    assert [item["argument"] for item in seen] == [None] * 5 + ["/mine", None]
+    assert [item["kind"] for item in seen if item["kind"] != "node"] == ["container"]
+
+
+def test_what_is_observed_of_a_node(workspace: Workspace) -> None:
+    (seen,) = visited(
+        workspace,
+        "t.launch.xml",
+        """<launch>
+          <set_remap from="/global" to="/g"/>
+          <node exec="/bin/true" name="n" namespace="/ns" args="plain">
+            <remap from="chatter" to="news"/>
+            <param name="use_sim_time" value="true"/>
+          </node>
+        </launch>""",
+    )
+    assert seen["remaps"] == [["/global", "/g"], ["chatter", "news"]]
+    assert seen["parameters"] == {"use_sim_time": True}
+    assert seen["cmd"][:6] == ["/bin/true", "plain", "--ros-args", "-r", "__node:=n", "-r"]
+    assert seen["name"] == "true-1"
+
+
+def test_other_unknown_attributes_are_still_refused(workspace: Workspace) -> None:
+    file = workspace.add("t.launch.xml", '<launch><node exec="/bin/true" enklave="/x"/></launch>')
+    result = workspace.python(VISIT, str(file))
+    assert "Unexpected attribute(s) found in `node`: {'enklave'}" in result.stdout
+    assert json.loads(result.stdout.splitlines()[-1])["status"] == 1

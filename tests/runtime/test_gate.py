@@ -1,0 +1,135 @@
+"""The plan is fixed before the first process: what goes beyond it is refused, or let through and said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.process import EnclaveRequest, RemapRule, ResolvedComponent, ResolvedProcess
+from enclave_launch.runtime.gate import Grant, LateProcess, PlannedGate
+from enclave_launch.source_location import SourceLocation
+
+PLACE = SourceLocation("demo.launch.py", 12, "node")
+
+TALKER = ResolvedProcess(
+    index=1,
+    kind="node",
+    package="demo_nodes",
+    executable="talker",
+    process_name="talker-1",
+    name="talker",
+    namespace="/robot",
+    fqn="/robot/talker",
+    cmd=("talker", "--ros-args"),
+    remaps=(RemapRule("chatter", "news"),),
+    parameters={},
+    environment={},
+    enclave=EnclaveRequest(scope="/robot"),
+    location=PLACE,
+)
+
+CAMERA = ResolvedComponent(
+    container="/robot/box",
+    package="camera",
+    plugin="camera::Driver",
+    name="camera",
+    namespace="/robot",
+    remaps=(),
+    parameters={},
+    extra_arguments={},
+    location=PLACE,
+)
+
+
+class Keystore:
+    """Provisions in memory."""
+
+    def __init__(self) -> None:
+        self.done: list[str] = []
+
+    def ensure(self, process: ResolvedProcess) -> Grant:
+        self.done.append(f"planned {process.fqn}")
+        return Grant(("--enclave", "/robot"))
+
+    def ensure_late(self, process: ResolvedProcess) -> Grant:
+        self.done.append(f"late {process.fqn}")
+        return Grant(("--enclave", "/robot"))
+
+    def launcher(self) -> Grant | None:
+        return None
+
+
+def gate(*, allow_late: bool = False) -> tuple[PlannedGate, Keystore, list[str]]:
+    keystore, said = Keystore(), list[str]()
+    return PlannedGate([TALKER], [CAMERA], keystore, allow_late=allow_late, say_late=said.append), keystore, said
+
+
+@pytest.mark.parametrize(
+    "same",
+    [
+        TALKER,
+        replace(TALKER, index=7, process_name="talker-7"),
+        replace(TALKER, cmd=("talker", "--params-file", "/tmp/launch_params_x")),
+        replace(TALKER, on_event="OnProcessExit a-1"),
+        replace(TALKER, remaps=(RemapRule("chatter", "news", PLACE),)),
+    ],
+    ids=["itself", "another number", "another parameter file", "another event", "rule with its place"],
+)
+def test_what_the_plan_foresaw_is_provisioned(same: ResolvedProcess) -> None:
+    guard, keystore, _ = gate()
+    assert guard.ensure(same) == Grant(("--enclave", "/robot"))
+    assert keystore.done == ["planned /robot/talker"]
+
+
+BEYOND = {
+    "another name": replace(TALKER, fqn="/robot/talker2"),
+    "another program": replace(TALKER, executable="listener"),
+    "another package": replace(TALKER, package="evil"),
+    "another remap rule": replace(TALKER, remaps=(RemapRule("chatter", "secret"),)),
+    "another enclave": replace(TALKER, enclave=EnclaveRequest(attribute="/root")),
+    "its own enclave argument": replace(TALKER, enclave=EnclaveRequest(scope="/robot", argument="/root")),
+    "simulated time": replace(TALKER, parameters={"use_sim_time": True}),
+    "an executable with an enclave": replace(
+        TALKER, kind="executable", package=None, fqn=None, enclave=EnclaveRequest(attribute="/root")
+    ),
+}
+
+
+@pytest.mark.parametrize("late", BEYOND.values(), ids=BEYOND)
+def test_what_goes_beyond_the_plan_is_refused_with_its_place(late: ResolvedProcess) -> None:
+    guard, keystore, _ = gate()
+    with pytest.raises(LateProcess, match=r"refused: .* at demo\.launch\.py:12 .*--allow-late") as refusal:
+        guard.ensure(late)
+    assert keystore.done == []
+    assert refusal.value.exit_status == 1
+
+
+def test_allow_late_provisions_and_says_so_once() -> None:
+    guard, keystore, said = gate(allow_late=True)
+    late = BEYOND["another name"]
+    guard.ensure(late)
+    guard.ensure(late)
+    assert keystore.done == ["late /robot/talker2", "planned /robot/talker2"]
+    assert len(said) == 1
+    assert "demo_nodes/talker (/robot/talker2)" in said[0]
+
+
+def test_an_executable_without_enclave_has_nothing_to_sign() -> None:
+    guard, keystore, _ = gate()
+    guard.ensure(replace(TALKER, kind="executable", package=None, fqn=None, enclave=EnclaveRequest()))
+    assert keystore.done == ["late None"]
+
+
+def test_a_component_that_was_not_planned_cannot_be_granted_any_more() -> None:
+    guard, _, _ = gate(allow_late=True)
+    guard.ensure_components([CAMERA])
+    with pytest.raises(LateProcess, match=r"camera/camera::Spy for /robot/box"):
+        guard.ensure_components([replace(CAMERA, plugin="camera::Spy")])
+
+
+def test_the_place_is_told_as_written(tmp_path: Path) -> None:
+    guard, _, _ = gate()
+    with pytest.raises(LateProcess, match=str(tmp_path)):
+        guard.ensure(replace(TALKER, fqn="/x", location=SourceLocation(str(tmp_path / "a.launch.py"))))

@@ -1,0 +1,311 @@
+"""The live launch as a whole: launch files in, real children, what is on the screen, the exit status.
+
+Each case is a program of its own with a launch description, as users write them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import pytest
+
+from tests.runtime.conftest import alive, eventually, read_pid
+
+PROGRAM = """
+import sys
+from pathlib import Path
+from enclave_launch.runtime.service import RunOptions, run_launch
+from enclave_launch.runtime.description import launch_file
+sys.exit(run_launch(launch_file(sys.argv[1], []), options=RunOptions(noninteractive={noninteractive}, debug={debug})))
+"""
+
+PRELUDE = """
+import sys
+from launch import LaunchDescription, EventHandler
+from launch.actions import *
+from launch.event_handlers import *
+from launch.events import Shutdown as ShutdownEvent
+from launch.events.process import *
+
+def sh(script, **options):
+    return ExecuteProcess(cmd=[script], shell=True, **{"output": "screen", "name": "a", **options})
+
+def py(script, **options):
+    return ExecuteProcess(cmd=[sys.executable, "-c", script], **{"output": "screen", "name": "a", **options})
+"""
+
+
+class Launch:
+    """A launch in a process of its own, with everything it writes in ``screen``."""
+
+    def __init__(
+        self, directory: Path, actions: str, *, noninteractive: bool = False, debug: bool = False, prelude: str = ""
+    ) -> None:
+        file = directory / "test.launch.py"
+        file.write_text(
+            f"{PRELUDE}\n{textwrap.dedent(prelude)}\n"
+            f"def generate_launch_description():\n    return LaunchDescription([{actions}])\n"
+        )
+        self.logs = directory / "log"
+        self.screen_file = directory / "screen"
+        environment = {**os.environ, "ROS_LOG_DIR": str(self.logs), "PYTHONDONTWRITEBYTECODE": "1"}
+        with self.screen_file.open("wb") as screen:
+            self.process = subprocess.Popen(
+                [sys.executable, "-c", PROGRAM.format(noninteractive=noninteractive, debug=debug), str(file)],
+                stdout=screen,
+                stderr=subprocess.STDOUT,
+                env=environment,
+                start_new_session=True,
+            )
+
+    @property
+    def screen(self) -> str:
+        return self.screen_file.read_text(errors="replace")
+
+    def wait(self, timeout: float = 20.0) -> int:
+        try:
+            return self.process.wait(timeout)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise AssertionError(f"still running; on the screen:\n{self.screen}") from None
+
+    def until(self, text: str) -> None:
+        assert eventually(lambda: text in self.screen or self.process.poll() is not None), self.screen
+        assert text in self.screen, self.screen
+
+    def lines(self) -> list[str]:
+        """What is on the screen without the two lines about logging; pids as PID."""
+        shown = re.sub(r"pid \[?\d+", lambda found: found[0].rstrip("0123456789") + "PID", self.screen)
+        return shown.splitlines()[2:]
+
+
+def finished(directory: Path, actions: str, **options: object) -> tuple[int, list[str]]:
+    launch = Launch(directory, actions, **options)  # type: ignore[arg-type]
+    return launch.wait(), launch.lines()
+
+
+def test_one_process_from_start_to_end(tmp_path: Path) -> None:
+    assert finished(tmp_path, 'sh("echo hello")') == (
+        0,
+        [
+            "[INFO] [a-1]: process started with pid [PID]",
+            "[a-1] hello",
+            "[INFO] [a-1]: process has finished cleanly [pid PID]",
+        ],
+    )
+
+
+def test_launch_log_and_latest(tmp_path: Path) -> None:
+    launch = Launch(tmp_path, 'sh("echo hello; echo trouble >&2", output="log")')
+    assert launch.wait() == 0
+    assert "hello" not in launch.screen
+    assert "[a-1] trouble" in launch.screen
+    text = (launch.logs / "latest" / "launch.log").read_text()
+    assert re.search(r"(?m)^\d+\.\d{7} \[INFO\] \[launch\]: All log files can be found below ", text)
+    assert re.search(r"(?m)^\d+\.\d{7} \[a-1\] hello$", text)
+
+
+@pytest.mark.parametrize(
+    ("script", "status"), [("exit 0", 0), ("exit 1", 1), ("exit 77", 1), ("kill -SEGV $$", 1)]
+)
+def test_a_process_that_ends_badly_on_its_own_shows_in_the_exit_status(
+    script: str, status: int, tmp_path: Path
+) -> None:
+    assert finished(tmp_path, f'sh("{script}")')[0] == status
+
+
+def test_an_executable_that_is_missing_is_one_message_and_the_rest_runs(tmp_path: Path) -> None:
+    status, lines = finished(tmp_path, 'ExecuteProcess(cmd=["/no/such"]), sh("echo other", name="b")')
+    assert status == 1
+    assert "[ERROR] [such-1]: cannot start process: No such file or directory: '/no/such'" in lines
+    assert "[b-2] other" in lines
+    assert not any("Traceback" in line for line in lines)
+
+
+def test_on_exit_actions_and_events_run_in_launchs_order(tmp_path: Path) -> None:
+    actions = """
+        first := sh("echo one", on_exit=[LogInfo(msg="on_exit of first")]),
+        RegisterEventHandler(OnProcessExit(target_action=first, on_exit=[LogInfo(msg="newest"), sh("echo two", name="b")])),
+        RegisterEventHandler(OnProcessStart(target_action=first, on_start=[LogInfo(msg="started")])),
+        RegisterEventHandler(OnShutdown(on_shutdown=[LogInfo(msg="shutdown")])),
+    """
+    status, lines = finished(tmp_path, f"*({actions})")
+    told = [line for line in lines if "launch.user" in line or line.startswith(("[a-1]", "[b-2]"))]
+    assert (status, told) == (
+        0,
+        [
+            "[INFO] [launch.user]: started",
+            "[a-1] one",
+            "[INFO] [launch.user]: newest",
+            "[INFO] [launch.user]: on_exit of first",
+            "[b-2] two",
+            "[INFO] [launch.user]: shutdown",
+        ],
+    ) or told[:2] == ["[a-1] one", "[INFO] [launch.user]: started"]
+
+
+def test_output_reaches_handlers(tmp_path: Path) -> None:
+    actions = """
+        talker := sh("echo magic; sleep 30"),
+        RegisterEventHandler(OnProcessIO(target_action=talker, on_stdout=lambda event:
+            [EmitEvent(event=ShutdownEvent(reason="heard it"))] if b"magic" in event.text else None)),
+    """
+    status, lines = finished(tmp_path, f"*({actions})")
+    assert status == 0
+    assert "[INFO] [a-1]: sending signal 'SIGINT' to process[a-1]" in lines
+
+
+def test_a_timer_fires_after_its_period(tmp_path: Path) -> None:
+    status, lines = finished(
+        tmp_path, 'TimerAction(period=0.2, actions=[LogInfo(msg="late")]), LogInfo(msg="early")'
+    )
+    assert (status, lines) == (0, ["[INFO] [launch.user]: early", "[INFO] [launch.user]: late"])
+
+
+def test_shutdown_on_exit_ends_the_others(tmp_path: Path) -> None:
+    status, lines = finished(tmp_path, 'sh("sleep 0.2", on_exit=[Shutdown()]), sh("exec sleep 60", name="b")')
+    assert status == 0
+    assert "[INFO] [b-2]: sending signal 'SIGINT' to process[b-2]" in lines
+
+
+def test_respawn_under_kill_9(tmp_path: Path) -> None:
+    launch = Launch(
+        tmp_path, f"sh('echo $$ > {tmp_path}/pid.new; mv {tmp_path}/pid.new {tmp_path}/pid; exec sleep 60', respawn=True)"
+    )
+    seen: set[int] = set()
+    for _ in range(3):
+        assert eventually(lambda: (tmp_path / "pid").exists() and read_pid(tmp_path / "pid") not in seen)
+        pid = read_pid(tmp_path / "pid")
+        seen.add(pid)
+        os.kill(pid, signal.SIGKILL)
+    assert eventually(lambda: read_pid(tmp_path / "pid") not in seen)
+    launch.process.send_signal(signal.SIGINT)
+    assert launch.wait() == 0
+    assert launch.screen.count("exit code -9") == 3
+
+
+def test_respawn_gives_up_after_its_retries(tmp_path: Path) -> None:
+    status, lines = finished(tmp_path, 'sh("exit 3", respawn=True, respawn_max_retries=2)')
+    assert status == 1
+    assert sum("exit code 3" in line for line in lines) == 3
+
+
+def test_ctrl_c_ends_every_child_and_is_no_failure(tmp_path: Path) -> None:
+    launch = Launch(tmp_path, 'sh("echo up; exec sleep 60"), sh("echo up too; exec sleep 60", name="b")')
+    launch.until("up\n")
+    launch.until("up too\n")
+    launch.process.send_signal(signal.SIGINT)
+    assert launch.wait() == 0
+    assert "[WARNING] [launch]: user interrupted with ctrl-c (SIGINT)" in launch.lines()
+    assert launch.screen.count("exit code -2") == 2
+
+
+def test_ctrl_c_twice_reaches_the_children_twice(tmp_path: Path) -> None:
+    script = (
+        "import signal, time\\n"
+        "def first(*_):\\n"
+        "    signal.signal(signal.SIGINT, lambda *_: exit(0))\\n"
+        "    print('once', flush=True)\\n"
+        "signal.signal(signal.SIGINT, first)\\n"
+        "print('up', flush=True)\\n"
+        "while True: time.sleep(0.05)\\n"
+    )
+    launch = Launch(tmp_path, f'py("{script}")')
+    launch.until("[a-1] up")
+    launch.process.send_signal(signal.SIGINT)
+    launch.until("[a-1] once")
+    launch.process.send_signal(signal.SIGINT)
+    assert launch.wait(4) == 0  # before the five seconds to SIGTERM
+    assert "(SIGINT) again" in launch.screen
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
+def test_other_signals_shut_down_in_order_and_leave_nobody(number: signal.Signals, tmp_path: Path) -> None:
+    launch = Launch(
+        tmp_path, f"sh('trap \"echo bye; exit 0\" INT; echo $$ > {tmp_path}/pid; echo up; while true; do sleep 0.05; done')"
+    )
+    launch.until("[a-1] up")
+    launch.process.send_signal(number)
+    assert launch.wait() == 1
+    assert "[a-1] bye" in launch.screen
+    assert not alive(read_pid(tmp_path / "pid"))
+
+
+def test_a_child_that_ignores_sigint_is_escalated(tmp_path: Path) -> None:
+    launch = Launch(
+        tmp_path,
+        "sh('trap \"\" INT TERM; echo up; while true; do sleep 0.05; done', sigterm_timeout='0.2', sigkill_timeout='0.2')",
+    )
+    launch.until("[a-1] up")
+    launch.process.send_signal(signal.SIGINT)
+    assert launch.wait() == 0
+    assert "escalating to 'SIGTERM'" in launch.screen
+    assert "escalating to 'SIGKILL'" in launch.screen
+    assert "exit code -9" in launch.screen
+
+
+def test_killing_the_launcher_leaves_nobody(tmp_path: Path) -> None:
+    launch = Launch(
+        tmp_path, f"sh('sleep 60 & echo $! > {tmp_path}/inner; echo $$ > {tmp_path}/outer; wait')"
+    )
+    pids = [read_pid(tmp_path / name) for name in ("inner", "outer")]
+    launch.process.kill()
+    launch.process.wait()
+    assert eventually(lambda: not any(map(alive, pids)))
+
+
+def test_an_error_in_the_visit_ends_what_was_started_before_it(tmp_path: Path) -> None:
+    status, lines = finished(
+        tmp_path, 'sh("exec sleep 60"), SetLaunchConfiguration("x", LaunchConfiguration("absent"))',
+        prelude="from launch.substitutions import LaunchConfiguration",
+    )
+    assert status == 1
+    assert any("launch configuration 'absent' does not exist" in line for line in lines)
+    assert not any("Traceback" in line for line in lines)
+
+
+def test_debug_shows_the_traceback(tmp_path: Path) -> None:
+    status, lines = finished(tmp_path, 'OpaqueFunction(function=lambda context: 1 / 0)', debug=True)
+    assert status == 1
+    assert any("ZeroDivisionError" in line for line in lines)
+
+
+def test_processes_in_on_shutdown_start_after_an_explicit_shutdown_only(tmp_path: Path) -> None:
+    handler = 'RegisterEventHandler(OnShutdown(on_shutdown=[sh("echo farewell")]))'
+    (tmp_path / "explicit").mkdir()
+    (tmp_path / "idle").mkdir()
+    assert "[a-1] farewell" in finished(tmp_path / "explicit", f"{handler}, Shutdown()")[1]
+    assert "[a-1] farewell" not in finished(tmp_path / "idle", handler)[1]
+
+
+def test_emulate_tty_and_cwd_and_environment(tmp_path: Path) -> None:
+    _, lines = finished(
+        tmp_path,
+        f'sh("[ -t 1 ] && echo tty", emulate_tty=True), sh("pwd -P", name="b", cwd="{tmp_path}"), '
+        'sh("echo $EXTRA", name="c", additional_env={"EXTRA": "more"})',
+    )
+    assert "[a-1] tty" in lines
+    assert f"[b-2] {tmp_path.resolve()}" in lines
+    assert "[c-3] more" in lines
+
+
+def test_two_hundred_processes_in_one_launch(tmp_path: Path) -> None:
+    status, lines = finished(tmp_path, '*[sh(f"echo {n}") for n in range(200)]')
+    assert status == 0
+    assert sum("process has finished cleanly" in line for line in lines) == 200
+    assert sorted(int(line.split()[-1]) for line in lines if re.match(r"\[a-\d+\] \d+$", line)) == list(range(200))
+
+
+def test_fifty_megabytes_to_the_screen_and_the_log_without_loss(tmp_path: Path) -> None:
+    launch = Launch(tmp_path, "sh('seq 1 6500000', output='both')")
+    assert launch.wait(30) == 0
+    shown = sum(line.startswith("[a-1] ") for line in launch.screen.splitlines())
+    assert shown == 6_500_000
+    assert launch.screen.splitlines()[-2] == "[a-1] 6500000"
+    assert (launch.logs / "latest" / "launch.log").read_text().count("[a-1] ") == 6_500_000
