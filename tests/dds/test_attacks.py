@@ -8,13 +8,15 @@ Fast DDS 2.9.1: CVE-2023-24010).
 from __future__ import annotations
 
 import itertools
+import shutil
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import pytest
 
+from keystore.revocation import remove
 from tests.dds import attacks, our_keystore, sros2_style
-from tests.dds.attacks import ENCLAVES, GRANTS, HONEST, VICTIM, Attempt, Workshop, borrowed_label
+from tests.dds.attacks import ENCLAVES, GRANTS, HONEST, REVOKED, VICTIM, Attempt, Workshop, borrowed_label
 from tests.dds.probe import Probe
 
 pytestmark = pytest.mark.dds
@@ -127,3 +129,18 @@ def test_false_expired_and_tampered_credentials_are_refused(
     ]
     assert voices(dds, domain_id, ours, attempts, {"honest /a"}) == {"honest /a"}
     assert voices(dds, domain_id, ours, attempts, {"honest /a"}, patched_dds) == {"honest /a"}
+
+
+def test_a_revoked_identity_is_refused(
+    dds: Probe, sros2: Workshop, ours: Workshop, domain_id: int, patched_dds: Path
+) -> None:
+    """A copy made before its enclave was removed; SROS2, which writes no revocation list, cannot stop it."""
+    stolen = sros2.stolen_copy(REVOKED)
+    shutil.rmtree(sros2.enclave(REVOKED))
+    assert voices(dds, domain_id, sros2, [stolen], {stolen.label}) == {stolen.label}
+
+    stolen = ours.stolen_copy(REVOKED)
+    assert voices(dds, domain_id, ours, [stolen], {stolen.label}) == {stolen.label}
+    remove(ours.keystore, [REVOKED])
+    assert voices(dds, domain_id, ours, [stolen], set()) == set()
+    assert voices(dds, domain_id, ours, [stolen], set(), patched_dds) == set()

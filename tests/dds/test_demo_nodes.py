@@ -7,40 +7,16 @@ from pathlib import Path
 
 import pytest
 
-import keystore
-from keystore.domains import Domains
-from keystore.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore.policy import EnclavePolicy, Operation
 from tests.dds.demo import Node, environment
+from tests.dds.our_keystore import allow, node, provision
 from tests.dds.probe import Probe
 
 pytestmark = [pytest.mark.dds, pytest.mark.usefixtures("cyclone")]
 
-PARAMETER_SERVICES = (
-    "describe_parameters",
-    "get_parameter_types",
-    "get_parameters",
-    "list_parameters",
-    "set_parameters",
-    "set_parameters_atomically",
-)
-
-
-def allow(operation: Operation, *names: str) -> tuple[Rule, ...]:
-    return tuple(Rule(operation, Qualifier.ALLOW, name) for name in names)
-
-
-def profile(namespace: str, node: str, *rules: Rule) -> Profile:
-    """``rules`` and what every node needs."""
-    every_node = (
-        *allow(Operation.PUBLISH, "/rosout", "/parameter_events"),
-        *allow(Operation.REPLY, *(f"~/{service}" for service in PARAMETER_SERVICES)),
-    )
-    return Profile(namespace, node, (*every_node, *rules))
-
-
-TALKER = profile("/", "talker", *allow(Operation.PUBLISH, "chatter"))
-LISTENER = profile("/", "listener", *allow(Operation.SUBSCRIBE, "chatter"))
-INTRUDER = profile("/", "intruder", *allow(Operation.SUBSCRIBE, "chatter"))
+TALKER = node("/", "talker", *allow(Operation.PUBLISH, "chatter"))
+LISTENER = node("/", "listener", *allow(Operation.SUBSCRIBE, "chatter"))
+INTRUDER = node("/", "intruder", *allow(Operation.SUBSCRIBE, "chatter"))
 
 
 @pytest.fixture
@@ -52,11 +28,10 @@ def secured(tmp_path: Path, domain_id: int) -> Path:
         EnclavePolicy("/intruder", (INTRUDER,)),
         EnclavePolicy("/shared", (TALKER, LISTENER)),
         EnclavePolicy(
-            "/robot1", (profile("/robot1", "speaker", *allow(Operation.PUBLISH, "/conversation")),)
+            "/robot1", (node("/robot1", "speaker", *allow(Operation.PUBLISH, "/conversation")),)
         ),
     ]
-    options = keystore.ProvisionOptions(domains=Domains.single(domain_id), durable=False)
-    keystore.provision(tmp_path / "ks", policies, options=options)
+    provision(tmp_path / "ks", domain_id, policies)
     return tmp_path / "ks"
 
 
