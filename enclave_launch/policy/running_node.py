@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from enclave_launch.errors import LaunchFileError
-from enclave_launch.policy.ros_arguments import remap_rules
+from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import ParameterValue, RemapRule, ResolvedComponent, ResolvedProcess
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
@@ -46,7 +46,7 @@ class RunningNode:
 
 def node_of_process(process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role) -> RunningNode:
     """One node of ``process``. Raises ``LaunchFileError`` for a remap rule that would make rcl refuse to start."""
-    rules = RemapRules(process=_parse(remap_rules(process.cmd), process.remaps, process.location))
+    rules = RemapRules(process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location))
     return _named(interface, rules, process.parameters, enclave, process.location, role)
 
 
@@ -61,7 +61,7 @@ def node_of_component(
         texts.append(f"__ns:={component.namespace}")
     forwarded: tuple[ParsedRule, ...] = ()
     if container is not None and component.extra_arguments.get("forward_global_arguments") is True:
-        forwarded = _parse(remap_rules(container.cmd), container.remaps, container.location)
+        forwarded = _parse(parse_ros_arguments(container.cmd).remaps, container.remaps, container.location)
     rules = RemapRules(local=_parse(texts, component.remaps, component.location), process=forwarded)
     return _named(interface, rules, component.parameters, enclave, component.location, "component")
 

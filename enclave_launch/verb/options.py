@@ -70,6 +70,10 @@ def _add_security(group: argparse._ArgumentGroup) -> None:
                        help="warn when an enclave expires within this time (default: 30d)")
     group.add_argument("--compatible-subjects", action="store_true",
                        help="certificate subjects as SROS2 writes them; see secure-keystore verify for the exposure")
+    passphrase = group.add_mutually_exclusive_group()
+    passphrase.add_argument("--ca-passphrase-file", metavar="FILE", type=Path, help="passphrase of encrypted CA keys")
+    passphrase.add_argument("--ca-passphrase-env", metavar="NAME",
+                            help="the variable that holds it; no process of the launch sees it")
     group.add_argument("--allow-late", action="store_true",
                        help="provision actions that only exist at run time instead of refusing them")
 

@@ -1,0 +1,141 @@
+"""The flow as three calls, usable separately: a launch file → a plan → a keystore → processes.
+
+    plan = resolve("demo.launch.xml")                   decides everything, does nothing
+    launch = provision(plan, "keystore")                keys, certificates, signed permissions
+    status = run(launch)                                every process starts with its enclave
+
+``run`` also takes a bare plan and then starts it unsecured, as ``secure-launch`` without ``--secure`` does; inside a
+running event loop await ``run_async``. Errors are ``EnclaveLaunchError``; ``str(error)`` is for a person.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from enclave_launch.enclave import EnclaveScope
+from enclave_launch.errors import ManifestError
+from enclave_launch.plan import LaunchPlan, PlanOptions
+
+if TYPE_CHECKING:
+    from enclave_launch.runtime.service import RunOptions
+    from enclave_launch.secured import ProvisionedLaunch
+    from keystore.provisioning import ProvisionOptions
+
+
+@dataclass(frozen=True, slots=True)
+class ResolveOptions:
+    """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
+    else the newest; ``manifests`` win where NoDL definitions conflict."""
+
+    prefixes: tuple[Path, ...] = ()
+    manifests: tuple[Path, ...] = ()
+    policy: Path | None = None
+    distro: str | None = None
+    enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
+    infer: bool = True
+    accept_patterns: bool = False
+    allow_missing_packages: bool = False
+    no_python: bool = False
+    launch_configurations: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class SecurityOptions:
+    """How to provision: the keystore's own options, and the strategy that the processes are told."""
+
+    strategy: str = "Enforce"
+    keystore: ProvisionOptions | None = None
+
+
+def resolve(
+    launch_file: str | os.PathLike[str],
+    arguments: Sequence[tuple[str, str]] = (),
+    *,
+    options: ResolveOptions | None = None,
+) -> LaunchPlan:
+    """Evaluate ``launch_file`` as launch would and plan it. Starts nothing, writes nothing.
+
+    Raises ``LaunchFileError`` (file, line, element, include chain) and ``ManifestError``. What a secure start must
+    refuse is in ``plan.problems``.
+    """
+    from enclave_launch.evaluation.evaluate import evaluate
+    from enclave_launch.interfaces import InterfaceFinder
+    from enclave_launch.plan import Planner
+    from nodl.ament_index import search_prefixes
+
+    chosen = options or ResolveOptions()
+    with ament_prefixes(chosen.prefixes):
+        evaluation = evaluate(launch_file, arguments, host=_plan_host(chosen))
+        finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
+        planner = Planner(
+            os.fspath(launch_file), tuple(arguments), finder, evaluation.distro, _plan_options(chosen)
+        )
+        return planner.plan(evaluation)
+
+
+def provision(
+    plan: LaunchPlan, keystore: str | os.PathLike[str], *, options: SecurityOptions | None = None
+) -> ProvisionedLaunch:
+    """Bring every enclave of ``plan`` to exactly its planned permissions; idempotent.
+
+    Raises ``ManifestError`` for a plan with problems (nothing is written then) and ``ProvisionError``.
+    """
+    from enclave_launch.secured import ProvisionedLaunch, provision_policies
+    from enclave_launch.security_environment import SecuritySettings
+    from keystore.provisioning import ProvisionOptions
+
+    if plan.problems:
+        raise ManifestError("\n".join((*plan.problems, "nothing was started or written")))
+    chosen = options or SecurityOptions()
+    settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
+    wanted = chosen.keystore or ProvisionOptions()
+    report = provision_policies(settings, plan.derived.policy.enclaves, wanted)
+    return ProvisionedLaunch(plan, settings, report, wanted)
+
+
+@contextmanager
+def ament_prefixes(prefixes: Sequence[Path]) -> Iterator[None]:
+    """Within the block ``prefixes`` come before the rest of ``AMENT_PREFIX_PATH``, for us and for what we start."""
+    previous = os.environ.get("AMENT_PREFIX_PATH")
+    if prefixes:
+        listed = [os.path.abspath(prefix) for prefix in prefixes]
+        os.environ["AMENT_PREFIX_PATH"] = os.pathsep.join([*listed, *([previous] if previous else [])])
+    try:
+        yield
+    finally:
+        if previous is not None:
+            os.environ["AMENT_PREFIX_PATH"] = previous
+        elif prefixes:
+            del os.environ["AMENT_PREFIX_PATH"]
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How to run. ``secrets``: environment variables that no process of the launch sees."""
+
+    noninteractive: bool = False
+    debug: bool = False
+    allow_late: bool = False
+    secrets: frozenset[str] = frozenset()
+
+
+def run(launch: LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None) -> int:
+    """Start what was planned and stay until all has ended; handles SIGINT and SIGTERM. Gives the exit status.
+
+    Raises ``RuntimeFailure`` before anything is started when something it needs is not there.
+    """
+    from enclave_launch.running import run_plan
+
+    return run_plan(launch, options or RunSettings())
+
+
+async def run_async(launch: LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None) -> int:
+    """The same inside a running event loop; signals stay the caller's, cancelling ends every process first."""
+    from enclave_launch.running import run_plan_async
+
+    return await run_plan_async(launch, options or RunSettings())

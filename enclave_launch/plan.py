@@ -1,0 +1,262 @@
+"""The plan of a launch: everything decided, nothing done.
+
+Takes an ``Evaluation`` and a way to look up node interfaces; gives a ``LaunchPlan``, which the dry run prints,
+``provision`` turns into a keystore and ``run`` carries out. Pure: the look-up is handed in.
+
+What could not be found out is a value with a reason: a ``problem`` stops ``--secure`` and is a warning in a dry run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from enclave_launch.enclave import EnclaveAssignment, EnclaveScope, assign_enclave
+from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
+from enclave_launch.policy.launcher import launcher_node
+from enclave_launch.policy.running_node import Role, node_of_component, node_of_process
+from enclave_launch.process import (
+    UNSPECIFIED_NODE_NAME,
+    Evaluation,
+    ResolvedComponent,
+    ResolvedProcess,
+    Unforeseeable,
+)
+from enclave_launch.source_location import SourceLocation
+from nodl.node_interface import NodeInterface
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """The nodes of one executable or component. ``inferred``: from its source, for want of a manifest."""
+
+    interfaces: tuple[NodeInterface, ...]
+    inferred: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Missing:
+    """Nothing is known of an executable or component, and why: what was searched, what to do next."""
+
+    subject: str
+    why: str
+
+
+InterfaceLookup = Callable[["ResolvedProcess | ResolvedComponent"], "Found | Missing"]
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedProcess:
+    """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes."""
+
+    process: ResolvedProcess
+    enclave: EnclaveAssignment | None
+    nodes: tuple[RunningNode, ...]
+    missing: Missing | None = None
+
+    @property
+    def name(self) -> str | None:
+        """The node name: launch's, else the manifest's, else launch's placeholder."""
+        if self.process.name == UNSPECIFIED_NODE_NAME and self.nodes:
+            return self.nodes[0].original_name
+        return self.process.name
+
+    @property
+    def fqn(self) -> str | None:
+        """The fully qualified name as launch shows it, a placeholder for the name filled where known."""
+        if self.process.fqn is None or self.name is None:
+            return self.process.fqn
+        return self.process.fqn.replace(UNSPECIFIED_NODE_NAME, self.name)
+
+
+@dataclass(frozen=True, slots=True)
+class PlannedComponent:
+    """One composable node; ``enclave`` is its container's, ``None`` when that is not part of this launch."""
+
+    component: ResolvedComponent
+    container: PlannedProcess | None
+    nodes: tuple[RunningNode, ...]
+    missing: Missing | None = None
+
+    @property
+    def enclave(self) -> str | None:
+        return self.container.enclave.path if self.container and self.container.enclave else None
+
+    @property
+    def fqn(self) -> str:
+        if not self.component.name and self.nodes:
+            return self.component.fqn.replace(UNSPECIFIED_NODE_NAME, self.nodes[0].original_name)
+        return self.component.fqn
+
+
+@dataclass(frozen=True, slots=True)
+class LaunchPlan:
+    """What a launch file starts, in which enclaves, with which permissions.
+
+    ``problems`` are what ``--secure`` refuses to start with; ``warnings`` are for the reader.
+    """
+
+    evaluation: Evaluation
+    planner: Planner
+    processes: tuple[PlannedProcess, ...]
+    components: tuple[PlannedComponent, ...]
+    launcher: RunningNode | None
+    derived: DerivedPolicy
+    problems: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def launch_file(self) -> str:
+        return self.planner.launch_file
+
+    @property
+    def distro(self) -> str:
+        return self.planner.distro
+
+    @property
+    def nodes(self) -> tuple[RunningNode, ...]:
+        """Every node of the launch, the launcher's own last."""
+        return _nodes(self.processes, self.components, self.launcher)
+
+
+@dataclass(frozen=True, slots=True)
+class PlanOptions:
+    """``enclave_scope``: where processes without an ``enclave`` attribute go; ``policy``: how permissions derive."""
+
+    enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
+    policy: PolicyOptions = field(default_factory=PolicyOptions)
+
+
+@dataclass(frozen=True, slots=True)
+class Planner:
+    """Makes the plan of one launch: assign enclaves, join interfaces with final names, derive the policy."""
+
+    launch_file: str
+    arguments: tuple[tuple[str, str], ...]
+    lookup: InterfaceLookup
+    distro: str
+    options: PlanOptions
+
+    def plan(self, evaluation: Evaluation) -> LaunchPlan:
+        """Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse."""
+        scope = self.options.enclave_scope
+        processes = tuple(_plan_process(process, self.lookup, scope) for process in evaluation.processes)
+        containers = _containers(processes)
+        components = tuple(_plan_component(item, containers, self.lookup) for item in evaluation.components)
+        launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
+        derived = derive_policy(
+            _nodes(processes, components, launcher),
+            distro=self.distro,
+            options=self.options.policy,
+            also=_bare_enclaves(processes),
+        )
+        return LaunchPlan(
+            evaluation=evaluation,
+            planner=self,
+            processes=processes,
+            components=components,
+            launcher=launcher,
+            derived=derived,
+            problems=(*_problems(processes, components), *derived.problems),
+            warnings=(
+                *evaluation.warnings,
+                *_unforeseen(evaluation.unforeseeable),
+                *_notes(processes, components, launcher),
+                *derived.warnings,
+            ),
+        )
+
+
+def _nodes(
+    processes: Iterable[PlannedProcess], components: Iterable[PlannedComponent], launcher: RunningNode | None
+) -> tuple[RunningNode, ...]:
+    planned: Iterable[PlannedProcess | PlannedComponent] = (*processes, *components)
+    own = (launcher,) if launcher else ()
+    return (*(node for item in planned for node in item.nodes), *own)
+
+
+def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: EnclaveScope) -> PlannedProcess:
+    if process.kind == "executable":
+        return PlannedProcess(process, assign_enclave(process, scope), ())
+    found = lookup(process)
+    if isinstance(found, Missing):
+        unnamed = scope is EnclaveScope.NODE and process.name == UNSPECIFIED_NODE_NAME
+        enclave = None if unnamed else assign_enclave(process, scope)
+        return PlannedProcess(process, enclave, (), found)
+    enclave = assign_enclave(process, scope, found.interfaces[0].name if found.interfaces else None)
+    path = enclave.path if enclave else "/"
+    role = _role(process)
+    nodes = tuple(node_of_process(process, interface, path, role) for interface in found.interfaces)
+    return PlannedProcess(process, enclave, nodes)
+
+
+def _role(process: ResolvedProcess) -> Role:
+    if process.kind == "container" or process.package == "rclcpp_components":
+        return "container"
+    return "lifecycle_node" if process.kind == "lifecycle_node" else "node"
+
+
+def _plan_component(
+    component: ResolvedComponent, containers: Mapping[str, PlannedProcess], lookup: InterfaceLookup
+) -> PlannedComponent:
+    container = containers.get("/" + component.container.lstrip("/"))
+    found = lookup(component)
+    if isinstance(found, Missing):
+        return PlannedComponent(component, container, (), found)
+    if container is None or container.enclave is None:
+        return PlannedComponent(component, container, ())
+    nodes = tuple(
+        node_of_component(component, container.process, interface, container.enclave.path)
+        for interface in found.interfaces
+    )
+    return PlannedComponent(component, container, nodes)
+
+
+def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess]:
+    """Processes into which components may be loaded, by final name; of equal names the first one started."""
+    containers: dict[str, PlannedProcess] = {}
+    for planned in processes:
+        for node in planned.nodes:
+            containers.setdefault(node.fqn, planned)
+        if planned.fqn and not planned.nodes:
+            containers.setdefault("/" + planned.fqn.rpartition(">/")[2].lstrip("/"), planned)
+    return containers
+
+
+def _bare_enclaves(processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
+    """Enclaves that must exist although no node of them is known: executables to which the launch file gives one."""
+    return tuple(p.enclave.path for p in processes if p.enclave and not p.nodes and not p.missing)
+
+
+def _problems(processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]) -> list[str]:
+    problems = [_told(item.process.location, item.missing) for item in processes if item.missing]
+    problems += [_told(item.component.location, item.missing) for item in components if item.missing]
+    return problems
+
+
+def _told(location: SourceLocation, missing: Missing) -> str:
+    return f"{location}: no NoDL manifest for {missing.subject}: {missing.why}"
+
+
+def _unforeseen(actions: Iterable[Unforeseeable]) -> list[str]:
+    return [f"{action.location}: not foreseeable: {action.what}" for action in actions]
+
+
+def _notes(
+    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent], launcher: RunningNode | None
+) -> list[str]:
+    notes = [
+        f"{item.process.location}: {item.process.process_name} runs without an enclave: an executable gets one only "
+        "through its enclave attribute"
+        for item in processes
+        if item.enclave is None and item.process.kind == "executable"
+    ]
+    notes += [
+        f"{item.component.location}: container {item.component.container!r} of component {item.fqn} is not started by "
+        "this launch file; its permissions are not part of this plan"
+        for item in components
+        if item.container is None
+    ]
+    if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
+        notes.append(f"enclave {launcher.enclave} is shared with the launcher itself")
+    return notes

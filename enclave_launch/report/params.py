@@ -1,0 +1,32 @@
+"""Every node's resolved parameters as one parameter file (wished for in ros2/launch_ros issue 549)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.process import ParameterValue
+
+
+def params_yaml(plan: LaunchPlan) -> str:
+    """YAML that ``--params-file`` accepts: one section per node that has parameters, by final name where known."""
+    import yaml
+
+    sections: dict[str, dict[str, dict[str, object]]] = {}
+    for name, parameters in _named(plan):
+        if parameters:
+            section = sections.setdefault(name, {"ros__parameters": {}})
+            section["ros__parameters"].update({key: _plain(value) for key, value in parameters.items()})
+    return yaml.safe_dump(sections, sort_keys=True, allow_unicode=True) if sections else ""
+
+
+def _named(plan: LaunchPlan) -> Iterator[tuple[str, Mapping[str, ParameterValue]]]:
+    for process in plan.processes:
+        if process.process.kind != "executable":
+            yield (process.nodes[0].fqn if process.nodes else process.fqn or "/**"), process.process.parameters
+    for component in plan.components:
+        yield (component.nodes[0].fqn if component.nodes else component.fqn), component.component.parameters
+
+
+def _plain(value: ParameterValue) -> object:
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value

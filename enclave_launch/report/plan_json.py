@@ -1,0 +1,97 @@
+"""A ``LaunchPlan`` as the JSON document of ``report.contract`` (its pydantic models say what each field means)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+
+from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
+from enclave_launch.policy.derivation import LIST_NAMES
+from enclave_launch.process import ParameterValue, RemapRule
+from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
+from keystore.policy import EnclavePolicy, Qualifier
+
+VERSION = 1
+
+def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) -> dict[str, object]:
+    """The document as plain values. ``security``: as ``--secure`` would start the processes; ``None``: plainly."""
+    return {
+        "version": VERSION,
+        "processes": [_process(item, security) for item in plan.processes],
+        "components": [_component(item) for item in plan.components],
+        "enclaves": _enclaves(plan),
+        "warnings": [*plan.problems, *plan.warnings],
+    }
+
+
+def plan_json(plan: LaunchPlan, security: SecuritySettings | None = None) -> str:
+    return json.dumps(plan_document(plan, security), indent=2, ensure_ascii=False)
+
+
+def _process(item: PlannedProcess, security: SecuritySettings | None) -> dict[str, object]:
+    process = item.process
+    return {
+        "package": process.package,
+        "executable": process.executable,
+        "namespace": process.namespace,
+        "name": item.name,
+        "fqn": item.fqn,
+        "cmd": list(secured_command(item, security)),
+        "remaps": _remaps(process.remaps),
+        "parameters": _parameters(process.parameters),
+        "enclave": item.enclave.path if item.enclave else None,
+        "environment": {**process.environment, **secured_environment(item, security)},
+        "launch_file": process.location.file,
+        "line": process.location.line,
+        "on_event": process.on_event,
+    }
+
+
+def _component(item: PlannedComponent) -> dict[str, object]:
+    component = item.component
+    return {
+        "container": component.container,
+        "package": component.package,
+        "plugin": component.plugin,
+        "fqn": item.fqn,
+        "remaps": _remaps(component.remaps),
+        "parameters": _parameters(component.parameters),
+        "enclave": item.enclave,
+        "launch_file": component.location.file,
+        "line": component.location.line,
+        "on_event": component.on_event,
+    }
+
+
+def _enclaves(plan: LaunchPlan) -> dict[str, dict[str, list[str]]]:
+    nodes: dict[str, list[str]] = {}
+    for node in plan.nodes:
+        nodes.setdefault(node.enclave, []).append(node.fqn)
+    return {
+        enclave.path: {"nodes": sorted(nodes.get(enclave.path, [])), **allowed_names(enclave)}
+        for enclave in plan.derived.policy.enclaves
+    }
+
+
+def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:
+    """What an enclave may do, sorted, by the contract's list names."""
+    lists: dict[str, set[str]] = {name: set() for name in LIST_NAMES.values()}
+    for profile in enclave.profiles:
+        for rule in profile.rules:
+            if rule.qualifier is Qualifier.ALLOW:
+                lists[LIST_NAMES[rule.operation]].add(rule.expression)
+    return {name: sorted(names) for name, names in lists.items()}
+
+
+def _remaps(rules: Iterable[RemapRule]) -> list[list[str]]:
+    return [[rule.source, rule.target] for rule in rules]
+
+
+def _parameters(parameters: Mapping[str, ParameterValue]) -> dict[str, object]:
+    return {name: _plain(value) for name, value in parameters.items()}
+
+
+def _plain(value: ParameterValue) -> object:
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    return value.hex() if isinstance(value, bytes) else value

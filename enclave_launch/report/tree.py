@@ -1,0 +1,88 @@
+"""The plan as a tree for people: enclaves, the processes in each, and what each enclave may do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
+from enclave_launch.report.plan_json import allowed_names
+from keystore.policy import EnclavePolicy
+
+_LABELS = {
+    "publish": "publish",
+    "subscribe": "subscribe",
+    "call_services": "call",
+    "serve_services": "serve",
+    "call_actions": "call action",
+    "serve_actions": "serve action",
+}
+
+Branch = tuple[str, Sequence["Branch"]]
+
+
+def plan_tree(plan: LaunchPlan) -> str:
+    """Text that ends with a newline. Interfaces that every node has are counted, not listed."""
+    lines = [f"{plan.launch_file} (as {plan.distro})"]
+    lines += _draw([_enclave(plan, enclave) for enclave in plan.derived.policy.enclaves])
+    outside = _outside(plan)
+    if outside:
+        lines += ["without an enclave", *_draw(outside)]
+    for kind, texts in (("error under --secure", plan.problems), ("warning", plan.warnings)):
+        lines += [f"{kind}: {text}" for text in texts]
+    return "\n".join(lines) + "\n"
+
+
+def _enclave(plan: LaunchPlan, enclave: EnclavePolicy) -> Branch:
+    processes = [item for item in plan.processes if item.enclave and item.enclave.path == enclave.path]
+    branches: list[Branch] = [_process(item, plan.components) for item in processes]
+    if plan.launcher and plan.launcher.enclave == enclave.path:
+        branches.append((f"the launcher itself, node {plan.launcher.fqn}", ()))
+    branches.extend(_permissions(plan, enclave))
+    merged = f"  (shared by {len(processes)} processes)" if len(processes) > 1 else ""
+    return f"enclave {enclave.path}{merged}", branches
+
+
+def _process(item: PlannedProcess, components: Iterable[PlannedComponent]) -> Branch:
+    process = item.process
+    what = f"{process.package}/{process.executable}" if process.package else process.executable
+    names = " ".join(node.fqn for node in item.nodes) or item.fqn or ""
+    event = f", {process.on_event}" if process.on_event else ""
+    why = f", {item.enclave.reason.value}" if item.enclave else ""
+    head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({process.location}{why}{event})"
+    loaded: list[Branch] = [
+        (f"component {component.component.package} {component.component.plugin} as {component.fqn}", ())
+        for component in components
+        if component.container is item
+    ]
+    return head, loaded
+
+
+def _permissions(plan: LaunchPlan, enclave: EnclavePolicy) -> Iterator[Branch]:
+    built_in = plan.derived.built_in_names(enclave.path)
+    hidden = 0
+    for key, names in allowed_names(enclave).items():
+        shown = [name for name in names if (key, name) not in built_in]
+        hidden += len(names) - len(shown)
+        if shown:
+            yield f"{_LABELS[key]}: {' '.join(shown)}", ()
+    if hidden:
+        yield f"and {hidden} that every node has (see --format json or --explain {enclave.path})", ()
+
+
+def _outside(plan: LaunchPlan) -> list[Branch]:
+    without: list[Branch] = [_process(item, plan.components) for item in plan.processes if item.enclave is None]
+    without += [
+        (f"component {item.component.package} {item.component.plugin} as {item.fqn} in {item.component.container}", ())
+        for item in plan.components
+        if item.container is None
+    ]
+    return without
+
+
+def _draw(branches: Sequence[Branch], indent: str = "") -> list[str]:
+    lines: list[str] = []
+    for index, (text, below) in enumerate(branches):
+        last = index == len(branches) - 1
+        lines.append(f"{indent}{'└── ' if last else '├── '}{text}")
+        lines += _draw(below, indent + ("    " if last else "│   "))
+    return lines

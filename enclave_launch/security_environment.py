@@ -1,0 +1,59 @@
+"""What turns a planned process into a secured one: arguments and variables that rcl reads. Pure.
+
+Source: rcl/src/rcl/security.c and arguments.c. A node gets ``--enclave`` (the last one given wins, so ours is
+appended only where the user wrote none); an ``executable`` action, whose command line is not ours to extend, gets
+``ROS_SECURITY_ENCLAVE_OVERRIDE``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from enclave_launch.enclave import Reason
+from enclave_launch.plan import PlannedProcess
+
+ENABLE = "ROS_SECURITY_ENABLE"
+KEYSTORE = "ROS_SECURITY_KEYSTORE"
+STRATEGY = "ROS_SECURITY_STRATEGY"
+OVERRIDE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+
+
+@dataclass(frozen=True, slots=True)
+class SecuritySettings:
+    """``keystore``: absolute path of the keystore's root (rcl appends ``enclaves`` itself)."""
+
+    keystore: str
+    strategy: str = "Enforce"
+
+
+def enclave_arguments(planned: PlannedProcess) -> tuple[str, ...]:
+    """What to append to the command line of a node; empty for executables and where the user already chose."""
+    if planned.enclave is None or planned.process.kind == "executable":
+        return ()
+    if planned.enclave.reason is Reason.ARGUMENT:
+        return ()
+    return ("--enclave", planned.enclave.path)
+
+
+def secured_command(planned: PlannedProcess, settings: SecuritySettings | None) -> tuple[str, ...]:
+    """The command line; node commands end inside their ``--ros-args`` block, so the arguments simply follow."""
+    if settings is None:
+        return planned.process.cmd
+    return (*planned.process.cmd, *enclave_arguments(planned))
+
+
+def secured_environment(planned: PlannedProcess, settings: SecuritySettings | None) -> Mapping[str, str]:
+    """The security variables of one process. Every process gets them: an executable that turns out to be a ROS
+    process without an enclave of its own is then secured under rcl's default, never silently unsecured."""
+    if settings is None:
+        return {}
+    variables = dict(launcher_environment(settings))
+    if planned.enclave is not None and planned.process.kind == "executable":
+        variables[OVERRIDE] = planned.enclave.path
+    return variables
+
+
+def launcher_environment(settings: SecuritySettings) -> Mapping[str, str]:
+    """The security variables for the launcher's own node."""
+    return {ENABLE: "true", KEYSTORE: settings.keystore, STRATEGY: settings.strategy}

@@ -1,0 +1,167 @@
+"""``secure-launch``: arguments, the calls of ``flow``, an exit status."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from enclave_launch.errors import EnclaveLaunchError, UsageError
+from enclave_launch.verb.options import build_parser
+
+if TYPE_CHECKING:
+    from enclave_launch.flow import ResolveOptions, RunSettings
+    from enclave_launch.plan import LaunchPlan
+    from enclave_launch.verb.target import Target
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line ``argv`` (default: the program's own). Gives the exit status, never a traceback
+    for what a user can cause."""
+    options = build_parser().parse_intermixed_args(argv)
+    try:
+        return _main(options)
+    except EnclaveLaunchError as error:
+        print(f"secure-launch: error: {error}", file=sys.stderr)
+        return error.exit_status
+    except KeyboardInterrupt:
+        return 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _main(options: argparse.Namespace) -> int:
+    from enclave_launch.flow import ament_prefixes
+    from enclave_launch.verb.target import find_target
+    from nodl.ament_index import search_prefixes
+
+    with ament_prefixes(options.prefix):
+        target = find_target(options.words, search_prefixes())
+        if options.show_args or options.print_description:
+            return _show_file(target, options)
+        keystore = _keystore(options)
+        plan = _resolve(target, options)
+        if _only_looking(options):
+            return _show_plan(plan, options, keystore)
+        return _launch(plan, options, keystore)
+
+
+def _only_looking(options: argparse.Namespace) -> bool:
+    return bool(options.dry_run or options.explain or options.dump_params)
+
+
+def _keystore(options: argparse.Namespace) -> str | None:
+    """The keystore that ``--secure`` is to use. Raises ``UsageError`` when there is none."""
+    if not options.secure:
+        return None
+    if options.keystore is None:
+        raise UsageError("--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE")
+    return os.path.abspath(options.keystore)
+
+
+def _resolve(target: Target, options: argparse.Namespace) -> LaunchPlan:
+    from enclave_launch.flow import resolve
+
+    return resolve(target.launch_file, target.arguments, options=resolve_options(options))
+
+
+def resolve_options(options: argparse.Namespace) -> ResolveOptions:
+    from enclave_launch.enclave import EnclaveScope
+    from enclave_launch.flow import ResolveOptions
+
+    return ResolveOptions(
+        manifests=tuple(options.nodl),
+        policy=options.policy,
+        distro=options.distro,
+        enclave_scope=EnclaveScope(options.enclave_scope),
+        infer=options.missing_nodl == "infer",
+        accept_patterns=options.accept_patterns,
+        allow_missing_packages=options.allow_missing_packages,
+        no_python=options.no_python,
+        launch_configurations=_launch_prefix(options),
+    )
+
+
+def _launch_prefix(options: argparse.Namespace) -> Mapping[str, str]:
+    given = {"launch-prefix": options.launch_prefix, "launch-prefix-filter": options.launch_prefix_filter}
+    return {name: value for name, value in given.items() if value is not None}
+
+
+def _show_file(target: Target, options: argparse.Namespace) -> int:
+    from enclave_launch.report.launch_file import arguments_text, description_text
+
+    text = arguments_text if options.show_args else description_text
+    sys.stdout.write(text(target.launch_file, resolve_options(options)))
+    return 0
+
+
+def _show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
+    sys.stdout.write(_plan_text(plan, options, keystore))
+    return 0
+
+
+def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> str:
+    if options.explain:
+        return _explained(plan, options.explain)
+    if options.dump_params:
+        from enclave_launch.report.params import params_yaml
+
+        return params_yaml(plan)
+    if options.format == "json":
+        from enclave_launch.report.plan_json import plan_json
+        from enclave_launch.security_environment import SecuritySettings
+
+        security = SecuritySettings(keystore, options.strategy) if keystore else None
+        return plan_json(plan, security) + "\n"
+    if options.format == "policy":
+        from keystore.policy_xml import write_policy
+
+        return write_policy(plan.derived.policy).decode()
+    from enclave_launch.report.tree import plan_tree
+
+    return plan_tree(plan)
+
+
+def _explained(plan: LaunchPlan, subject: str) -> str:
+    from enclave_launch.policy.explanation import explain
+
+    lines = explain(plan.derived, subject)
+    if not lines:
+        known = " ".join(enclave.path for enclave in plan.derived.policy.enclaves)
+        raise UsageError(f"{subject!r} is no enclave, node, topic, service or action of this launch; enclaves: {known}")
+    return "\n".join(lines) + "\n"
+
+
+def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
+    from enclave_launch.flow import provision, run
+    from enclave_launch.verb.security import expiry_notices, security_options
+
+    _warn(plan.warnings)
+    settings = _run_settings(options)
+    if keystore is None:
+        return run(plan, options=settings)
+    launch = provision(plan, keystore, options=security_options(options))
+    _warn((*launch.report.warnings, *expiry_notices(keystore, plan, options.warn_expiry)))
+    return run(launch, options=settings)
+
+
+def _run_settings(options: argparse.Namespace) -> RunSettings:
+    from enclave_launch.flow import RunSettings
+
+    if options.show_all_subprocesses_output:
+        os.environ["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] = "both"
+    secrets = frozenset({options.ca_passphrase_env}) if options.ca_passphrase_env else frozenset()
+    return RunSettings(
+        noninteractive=options.noninteractive,
+        debug=options.debug,
+        allow_late=options.allow_late,
+        secrets=secrets,
+    )
+
+
+def _warn(texts: Iterable[str]) -> None:
+    for text in texts:
+        print(f"secure-launch: warning: {text}", file=sys.stderr)

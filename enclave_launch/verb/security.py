@@ -1,0 +1,65 @@
+"""The security options of ``secure-launch`` as values of the keystore's own types."""
+
+from __future__ import annotations
+
+import argparse
+import os
+from collections.abc import Iterator
+
+from enclave_launch.errors import ProvisionError, UsageError
+from enclave_launch.flow import SecurityOptions
+from enclave_launch.plan import LaunchPlan
+from keystore.creation import CreateOptions
+from keystore.domains import Domains
+from keystore.errors import InvalidInput, KeystoreError
+from keystore.provisioning import ProvisionOptions
+from keystore.signer import CaAccess, Secret
+from keystore.status import expires_soon
+from keystore.subject import SubjectScheme
+from keystore.validity import parse_duration, parse_end, utc_now
+
+
+def security_options(options: argparse.Namespace) -> SecurityOptions:
+    """Raises ``UsageError`` for a value that is not what its option takes."""
+    try:
+        return SecurityOptions(strategy=options.strategy, keystore=_provision_options(options))
+    except InvalidInput as error:
+        raise UsageError(str(error)) from error
+
+
+def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
+    subjects = SubjectScheme.COMPATIBLE if options.compatible_subjects else None
+    return ProvisionOptions(
+        domains=domains(options),
+        create=not options.no_create_keystore,
+        creation=CreateOptions(subjects=subjects or SubjectScheme.EXACT),
+        valid_until=parse_end(options.valid_for, utc_now()) if options.valid_for else None,
+        subjects=subjects,
+        access=CaAccess(passphrase=_passphrase(options)),
+    )
+
+
+def domains(options: argparse.Namespace) -> Domains:
+    """``--domain-id``, else the domain the processes will use. Raises ``InvalidInput``."""
+    return Domains.parse(options.domain_id or os.environ.get("ROS_DOMAIN_ID") or "0")
+
+
+def _passphrase(options: argparse.Namespace) -> Secret | None:
+    if options.ca_passphrase_file is not None:
+        return Secret(file=options.ca_passphrase_file)
+    if options.ca_passphrase_env is not None:
+        return Secret(variable=options.ca_passphrase_env)
+    return None
+
+
+def expiry_notices(keystore: str, plan: LaunchPlan, margin: str) -> Iterator[str]:
+    """What of this launch ends within ``margin`` (a duration such as ``30d``), one line each."""
+    enclaves = [enclave.path for enclave in plan.derived.policy.enclaves]
+    try:
+        due = expires_soon(keystore, parse_duration(margin), enclaves=enclaves)
+    except InvalidInput as error:
+        raise UsageError(str(error)) from error
+    except KeystoreError as error:
+        raise ProvisionError(str(error)) from error
+    for one in due:
+        yield f"{one.subject} ends {one.not_after:%Y-%m-%d %H:%M} UTC; renew with: secure-keystore renew {keystore}"

@@ -1,0 +1,58 @@
+"""What to launch: the positional words of ``secure-launch``, as ``ros2 launch`` understands them.
+
+Source: ros2launch/ros2launch/command/launch.py and api/api.py. One word is a file; two are a package and a file
+below its share directory, unless the first is a file that exists: then arguments follow.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from enclave_launch.errors import UsageError
+from nodl import ament_index
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """``arguments``: name and value of each ``name:=value``, the last of a repeated name."""
+
+    launch_file: str
+    arguments: tuple[tuple[str, str], ...]
+
+
+def find_target(words: Sequence[str], prefixes: Sequence[str]) -> Target:
+    """Raises ``UsageError``: nothing given, no such file or package, several files of that name, bad argument."""
+    if not words:
+        raise UsageError("give PACKAGE LAUNCH_FILE or the PATH of a launch file (see secure-launch --help)")
+    first, *rest = words
+    if os.path.isfile(first):
+        return Target(first, parse_arguments(rest))
+    if not rest or ":=" in rest[0]:
+        raise UsageError(f"launch file {first!r} does not exist (give PACKAGE LAUNCH_FILE or a PATH)")
+    return Target(_in_package(first, rest[0], prefixes), parse_arguments(rest[1:]))
+
+
+def _in_package(package: str, file_name: str, prefixes: Sequence[str]) -> str:
+    try:
+        return ament_index.launch_file_path(package, file_name, prefixes)
+    except ament_index.PackageNotFoundError as error:
+        searched = "".join(f"\n  {prefix}" for prefix in prefixes) or " no prefix at all"
+        raise UsageError(
+            f"package {error.package!r} not found, searched:{searched}\n"
+            "source the workspace (AMENT_PREFIX_PATH) or name its install prefix with --prefix"
+        ) from error
+    except (ament_index.MultipleLaunchFilesError, ament_index.LaunchFileNotFoundError, ValueError) as error:
+        raise UsageError(str(error)) from error
+
+
+def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:
+    """``name:=value`` words. Raises ``UsageError`` with upstream's message for anything else."""
+    arguments: dict[str, str] = {}
+    for word in words:
+        name, separator, value = word.partition(":=")
+        if not (name and separator and value):
+            raise UsageError(f"malformed launch argument {word!r}, expected format '<name>:=<value>'")
+        arguments[name] = value
+    return tuple(arguments.items())
