@@ -6,16 +6,53 @@ the name is then the parameter ``t``, to be filled in with what the launch file 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+Edit = tuple[str, tuple[str, ...]]
+"""A method of ``str`` with its arguments: ``("strip", ("/",))``."""
+
+EDITS = frozenset(
+    {"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"}
+)
 
 
 @dataclass(frozen=True, slots=True)
 class ParameterPart:
-    """The value of the node's parameter ``name``; ``default`` is what the code declares, if known."""
+    """The value of the node's parameter ``name``; ``default`` is what the code declares, if known.
+
+    ``item``: the parameter is a list and this is its element at an index, or ``"each"`` of them.
+    ``edits``: what the code does to the value before it uses it. Names that no ROS parameter can have stand
+    for other inputs of the program: ``--option`` and ``<argument>`` of its command line, ``$VARIABLE`` of
+    its environment.
+    """
 
     name: str
     default: str | None = None
+    item: int | str | None = None
+    edits: tuple[Edit, ...] = ()
+
+    def texts(self, parameters: Mapping[str, object]) -> tuple[str, ...]:
+        """What this part may stand for: normally one text; none when it has no value."""
+        values: Sequence[object] = () if self.default is None else (self.default,)
+        if self.name in parameters:
+            values = self._items(parameters[self.name])
+        return tuple(self._edited(str(value)) for value in values)
+
+    def _items(self, value: object) -> Sequence[object]:
+        if self.item is None:
+            return (value,)
+        if not isinstance(value, list | tuple):
+            return ()
+        if isinstance(self.item, int):
+            return tuple(value[self.item : self.item + 1]) if self.item >= 0 else tuple(value[self.item :][:1])
+        return tuple(value)
+
+    def _edited(self, text: str) -> str:
+        for method, arguments in self.edits:
+            if method in EDITS:
+                text = getattr(text, method)(*arguments)
+        return text
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,22 +80,26 @@ class NameTemplate:
         return all(isinstance(part, str) for part in self.parts)
 
     def fill(self, parameters: Mapping[str, object]) -> NameTemplate:
-        """Replace parameter parts by the given values (else by their defaults, else unknown)."""
-        filled: list[Part] = []
+        """Replace parameter parts by the given values (else by their defaults, else unknown).
+
+        A part that stands for each element of a list of several has no single value: see ``fill_each``.
+        """
+        filled = self.fill_each(parameters)
+        if len(filled) == 1:
+            return filled[0]
+        return NameTemplate((UnknownPart(f"{self} stands for {len(filled)} names, one per element"),))
+
+    def fill_each(self, parameters: Mapping[str, object]) -> tuple[NameTemplate, ...]:
+        """``fill`` for templates over the elements of a list parameter: one template for each."""
+        results: list[tuple[Part, ...]] = [()]
         for part in self.parts:
-            piece: Part = part
+            choices: tuple[Part, ...] = (part,)
             if isinstance(part, ParameterPart):
-                if part.name in parameters:
-                    piece = str(parameters[part.name])
-                elif part.default is not None:
-                    piece = part.default
-                else:
-                    piece = UnknownPart(f"parameter {part.name!r} has no value")
-            if isinstance(piece, str) and filled and isinstance(filled[-1], str):
-                filled[-1] += piece
-            else:
-                filled.append(piece)
-        return NameTemplate(tuple(filled))
+                choices = part.texts(parameters)
+                if not choices and not (part.item == "each" and part.name in parameters):
+                    choices = (UnknownPart(f"parameter {part.name!r} has no value"),)
+            results = [_appended(result, choice) for result in results for choice in choices]
+        return tuple(NameTemplate(result) for result in results)
 
     @property
     def text(self) -> str:
@@ -67,6 +108,13 @@ class NameTemplate:
 
     def __str__(self) -> str:
         return "".join(_shown(part) for part in self.parts)
+
+
+def _appended(parts: tuple[Part, ...], part: Part) -> tuple[Part, ...]:
+    """Neighbouring literals melt together."""
+    if isinstance(part, str) and parts and isinstance(parts[-1], str):
+        return (*parts[:-1], parts[-1] + part)
+    return (*parts, part)
 
 
 def _shown(part: Part) -> str:

@@ -1,0 +1,163 @@
+"""Drives runs: a module from its start, its entry functions, then every callback until nothing changes.
+
+What the world outside may call (subscriptions, timers, threads, hooks of foreign classes) is called in any
+order and any number of times: the state after each call is joined with the one before, to a fixpoint.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable
+
+from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.imports import execute_module
+from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Frame, Run
+from nodl.infer.interpreter.tables import new_run
+from nodl.infer.models.foreign import is_node_class
+from nodl.infer.program import Program, SourceModule
+from nodl.infer.values import ANY, ClassValue, External, FunctionValue, ModuleValue, unknown
+from nodl.source_ref import SourceRef
+
+MAX_ROUNDS = 12
+WIDEN_TEXTS_FROM = 4
+
+# A function or class whose text has none of these creates nothing by itself.
+_CREATING_WORDS = (
+    "create_", "ActionClient", "ActionServer", "Subscriber(", "Broadcaster(", "TransformListener(",
+    "Node(", "Node.__init__", "ParameterClient(", "wait_for_message", "Updater(",
+)  # fmt: skip
+
+
+def start(program: Program, main: SourceModule, functions: Iterable[str] = ()) -> Run:
+    """Run ``main`` as a script, then ``functions`` of it (``main`` if the script itself starts nothing)."""
+    run = new_run(program, main)
+    _guarded(run, lambda: _start(run, main, tuple(functions)))
+    return run
+
+
+def _start(run: Run, main: SourceModule, functions: tuple[str, ...]) -> None:
+    module = execute_module(run, main, "__main__")
+    for name in functions or ("main",):
+        for atom in module.cells.get(name, ()):
+            if isinstance(atom, FunctionValue) and (functions or atom.node not in run.called):
+                _call(run, module, atom, _defaults_only(atom))
+    settle(run)
+
+
+def start_function(program: Program, module: SourceModule, path: list[str]) -> Run:
+    """Import ``module`` and call ``path`` in it (``main``, ``Class.method``), as an entry point does."""
+    run = new_run(program, module)
+
+    def body() -> None:
+        imported = execute_module(run, module, module.name)
+        value = imported.cells.get(path[0], ())
+        frame = Frame(imported, {}, None, 0)
+        for step in path[1:]:
+            value = run.attribute(value, step, module.tree, frame)
+        if not value:
+            run.findings.gap(SourceRef(module.path), f"the entry point {'.'.join(path)} is not defined here")
+        for atom in value:
+            _call(run, imported, atom, Arguments())
+        settle(run)
+
+    _guarded(run, body)
+    return run
+
+
+def analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:
+    """What no analysed program uses: node classes and creating functions, with unknown arguments."""
+    _guarded(run, lambda: _analyse_rest(run, called, instantiated))
+
+
+def _analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:
+    main = run.modules.get("__main__")
+    if main is None:
+        return
+    missing = unknown("an argument that nothing analysed gives")
+    found = False
+    for cls in list(run.classes.values()):
+        if cls.module is main and cls.node not in instantiated and _creates(run, cls.node, cls):
+            found = True
+            instantiated.add(cls.node)
+            value = _call(run, main, cls, Arguments(more=missing))
+            if not _is_node(cls):
+                _expect_methods(run, value)
+    for value in list(main.cells.values()):
+        for atom in value:
+            if isinstance(atom, FunctionValue) and atom.module is main and atom.node not in called:
+                if not isinstance(atom.node, ast.Lambda) and _creates(run, atom.node, None):
+                    found = True
+                    called.add(atom.node)
+                    _call(run, main, atom, Arguments(more=missing))
+    if found:
+        settle(run)
+
+
+def _expect_methods(run: Run, value: Iterable[object]) -> None:
+    for instance in value:
+        cls = getattr(instance, "cls", None)
+        for base in linearized(cls) if isinstance(cls, ClassValue) else ():
+            for name in list(base.cells) if isinstance(base, ClassValue) else ():
+                if isinstance(name, str) and not name.startswith(("__", "[")):
+                    frame = Frame(cls.module, {}, None, 0)
+                    run.register_callback(run.attribute((instance,), name, base.node, frame), None)
+
+
+def _is_node(cls: ClassValue) -> bool:
+    return any(isinstance(base, External) and is_node_class(base.path) for base in linearized(cls))
+
+
+def _creates(run: Run, node: ast.AST, cls: ClassValue | None) -> bool:
+    if cls is not None and _is_node(cls):
+        return True
+    lines = run.main.text.splitlines()[node.lineno - 1 : node.end_lineno]  # type: ignore[attr-defined]
+    return any(word in line for line in lines for word in _CREATING_WORDS)
+
+
+def settle(run: Run) -> None:
+    """Call all callbacks until neither state nor findings change."""
+    run.repeated += 1
+    for turn in range(MAX_ROUNDS):
+        stamp, known = run.state.stamp, len(run.callbacks)
+        for callback, arity in list(run.callbacks.items()):
+            run.state.forget()
+            run.state.repeatedly(_called_back(run, callback, arity), turn >= WIDEN_TEXTS_FROM)
+        if run.state.stamp == stamp and len(run.callbacks) == known:
+            break
+    else:
+        run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
+    run.repeated -= 1
+
+
+def _called_back(run: Run, callback: object, arity: int | None) -> Callable[[], bool]:
+    made = unknown("an argument given by code that is not analysed")
+    args = Arguments(more=made) if arity is None else Arguments([made] * arity)
+    module = next(iter(run.modules.values()))
+
+    def call() -> bool:
+        _call(run, module, callback, args)
+        return True
+
+    return call
+
+
+def _defaults_only(function: FunctionValue) -> Arguments:
+    """An entry function gets no arguments; parameters without a default are unknown."""
+    count = len(function.node.args.args) - len(function.defaults)
+    return Arguments([ANY] * max(0, count))
+
+
+def _call(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple[object, ...]:
+    frame = Frame(module, {}, None, run.state.depth)
+    return run.call_atom(atom, Call(args, module.source.tree, frame))
+
+
+def _guarded(run: Run, body: Callable[[], None]) -> None:
+    try:
+        body()
+    except BudgetExceeded as error:
+        run.findings.gap(SourceRef(run.main.path), f"the analysis was given up: {error}")
+    except RecursionError:
+        run.findings.gap(SourceRef(run.main.path), "the analysis was given up: nested too deep")
+
+

@@ -1,0 +1,219 @@
+"""Attribute access: instances and their classes, modules, foreign names, methods of built-in values."""
+
+from __future__ import annotations
+
+import ast
+
+from nodl.infer.interpreter import imports
+from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.run import Arguments, AttributeReader, Frame, Run
+from nodl.infer.models import foreign
+from nodl.infer.text import Text
+from nodl.infer.values import (
+    ABSENT,
+    ANY,
+    BOTTOM,
+    Absent,
+    BoundMethod,
+    ClassMethod,
+    ClassValue,
+    Dictionary,
+    External,
+    ForeignMethod,
+    FunctionValue,
+    Instance,
+    ModuleValue,
+    NativeMethod,
+    PropertyValue,
+    Sequence,
+    SuperProxy,
+    Unknown,
+    Value,
+    external,
+    join,
+    unknown,
+)
+
+
+def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame) -> Value:
+    held = obj.cells.get(name)
+    if isinstance(obj.cls, External):
+        return held if held is not None else foreign.instance_attribute(run, obj, obj.cls.path, name)
+    if held is not None:
+        certain = not obj.summary and not any(type(atom) is Absent for atom in held)
+        if certain:
+            return held
+        held = tuple(atom for atom in held if atom is not ABSENT[0])
+        in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
+        return join(held, in_class or BOTTOM) or ANY
+    if name == "__class__":
+        return (obj.cls,)
+    if name == "__dict__":
+        return ANY
+    found = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
+    if found is not None:
+        return found
+    later = unknown(f"attribute {name}, which nothing analysed sets")
+    getter = _class_attribute(run, obj, linearized(obj.cls), "__getattr__", node, frame)
+    if getter is not None:
+        return run.call(getter, Arguments([(name,)]), node, frame)
+    return later
+
+
+def _class_attribute(
+    run: Run, obj: Instance, order: tuple[object, ...], name: str, node: ast.AST, frame: Frame
+) -> Value | None:
+    """What the classes in ``order`` hold under ``name``, bound to ``obj``; ``None``: nothing."""
+    for base in order:
+        if isinstance(base, ClassValue):
+            value = base.cells.get(name)
+            if value:
+                return _bound(run, obj, value, node, frame)
+        elif isinstance(base, External):
+            found = foreign.inherited(obj, base.path, name)
+            if found is not None:
+                return found
+        else:
+            return (ForeignMethod("", obj, name),)
+    return None
+
+
+def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame) -> Value:
+    if len(value) == 1 and type(value[0]) is FunctionValue:
+        return (BoundMethod(value[0], obj),)
+    result: Value = BOTTOM
+    for atom in value:
+        if isinstance(atom, FunctionValue):
+            result = join(result, (BoundMethod(atom, obj),))
+        elif isinstance(atom, PropertyValue):
+            result = join(result, run.call(atom.getter, Arguments([(obj,)]), node, frame))
+        elif isinstance(atom, ClassMethod):
+            result = join(result, _bound_class_method(atom, obj.cls))
+        else:
+            result = join(result, (atom,))
+    return result
+
+
+def _bound_class_method(method: ClassMethod, cls: object) -> Value:
+    if method.static:
+        return method.function
+    bound: Value = tuple(
+        BoundMethod(atom, cls) if isinstance(atom, FunctionValue) else atom for atom in method.function
+    )
+    return bound
+
+
+def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame) -> Value:
+    if name == "__name__":
+        return (cls.name,)
+    order = linearized(cls)
+    for base in order:
+        if isinstance(base, ClassValue):
+            value = base.cells.get(name)
+            if value is None:
+                continue
+            if any(isinstance(other, External) and other.path.startswith("enum.") for other in order):
+                return _enum_member(run, base, name, value, node)
+            result: Value = BOTTOM
+            for atom in value:
+                found = _bound_class_method(atom, cls) if isinstance(atom, ClassMethod) else (atom,)
+                result = join(result, found)
+            return result or ANY
+        if isinstance(base, External) and base.path not in ("builtins.object", "abc.ABC", "typing.Generic"):
+            if base.path.startswith("enum.") and name == "__members__":
+                return ANY
+            return external(f"{base.path}.{name}")
+    return unknown(f"attribute {name} of class {cls.name}")
+
+
+def _enum_member(run: Run, cls: ClassValue, name: str, value: Value, node: ast.AST) -> Value:
+    if isinstance(value[0], FunctionValue | ClassMethod | PropertyValue) or name.startswith("_"):
+        return value
+    key = ("enum", id(cls), name)
+    member = run.enum_members.get(key)
+    if member is None:
+        member = run.enum_members[key] = Instance(cls, (cls.module.source.path, cls.node.lineno))
+        member.cells.update({"value": value, "_value_": value, "name": (name,)})
+    return (member,)
+
+
+def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: Frame) -> Value:
+    return imports.member(run, (module,), module.source.name, name, frame)
+
+
+def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Frame) -> Value:
+    path = f"{atom.path}.{name}"
+    module = imports.import_submodule(run, path, frame)
+    if module is not None:
+        return (module,)
+    return foreign.constant(path) or external(path)
+
+
+def _of_super(run: Run, proxy: SuperProxy, name: str, node: ast.AST, frame: Frame) -> Value:
+    receiver = proxy.receiver
+    cls = receiver.cls if isinstance(receiver, Instance) else receiver
+    if not isinstance(cls, ClassValue):
+        return ANY
+    order = linearized(cls)
+    position = order.index(proxy.owner) + 1 if proxy.owner in order else 1
+    rest = order[position:]
+    if isinstance(receiver, Instance):
+        for base in rest:
+            if isinstance(base, External) and name == "__init__" and base.path != "builtins.object":
+                return (ForeignMethod(base.path, receiver, name),)
+            if isinstance(base, ClassValue) and base.fields is not None and name == "__init__":
+                break
+            found = _class_attribute(run, receiver, (base,), name, node, frame)
+            if found is not None:
+                return found
+        return (ForeignMethod("builtins.object", receiver, name),)
+    for base in rest:
+        if isinstance(base, ClassValue) and name in base.cells:
+            return _bound_in_class(base.cells[name], cls)
+    return ANY
+
+
+def _bound_in_class(value: Value, cls: ClassValue) -> Value:
+    result: Value = BOTTOM
+    for atom in value:
+        found = _bound_class_method(atom, cls) if isinstance(atom, ClassMethod) else (atom,)
+        result = join(result, found)
+    return result
+
+
+def _of_native(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -> Value:
+    return (NativeMethod(atom, name),)
+
+
+def _of_function(run: Run, atom: FunctionValue, name: str, node: ast.AST, frame: Frame) -> Value:
+    return (atom.name,) if name == "__name__" else ANY
+
+
+def _of_unknown(run: Run, atom: Unknown, name: str, node: ast.AST, frame: Frame) -> Value:
+    return (NativeMethod(atom, name),) if name in foreign.NODE_METHODS else (atom,)
+
+
+def _of_method(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -> Value:
+    if isinstance(atom, BoundMethod):
+        if name == "__self__":
+            return (atom.receiver,)
+        return (atom.function.name,) if name == "__name__" else ANY
+    return ANY
+
+
+ATTRIBUTES: dict[type, AttributeReader] = {
+    Instance: _of_instance,
+    ClassValue: _of_class,
+    ModuleValue: _of_module,
+    External: _of_external,
+    SuperProxy: _of_super,
+    FunctionValue: _of_function,
+    BoundMethod: _of_method,
+    ForeignMethod: _of_method,
+    Unknown: _of_unknown,
+    str: _of_native,
+    Text: _of_native,
+    bytes: _of_native,
+    Sequence: _of_native,
+    Dictionary: _of_native,
+}

@@ -1,0 +1,279 @@
+"""Calls of analysed functions and classes: binding arguments, running bodies, recursion, memory."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import dataclass, field
+
+from nodl.infer.interpreter.define import foreign_bases, linearized
+from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Caller, Frame, Run
+from nodl.infer.models import foreign
+from nodl.infer.values import (
+    ANY,
+    BOTTOM,
+    NONE,
+    OTHER,
+    BoundMethod,
+    ClassMethod,
+    ClassValue,
+    Dictionary,
+    External,
+    ForeignMethod,
+    FunctionValue,
+    Instance,
+    Items,
+    Key,
+    NativeMethod,
+    Partial,
+    Unknown,
+    Value,
+    join,
+    unknown,
+    widen,
+)
+
+MAX_RECURSION = 2
+_MISSING = unknown("an argument that the caller does not give")
+
+
+@dataclass
+class Summary:
+    """A function that calls itself too deep: its joined parameters and result, run to a fixpoint."""
+
+    parameters: dict[object, Value]
+    result: Value = BOTTOM
+    changed: bool = False
+    widened: int = field(default=0)
+
+
+def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
+    node = function.node
+    depth = run.stack.count(node)
+    if len(run.stack) >= MAX_DEPTH:
+        run.gap(call.node, call.frame, "calls are nested too deep to be followed")
+        return unknown("the result of a deeply nested call")
+    cells = bind(run, function, call)
+    run.called.setdefault(node)
+    if node in run.summaries:
+        return _recursive_result(run, run.summaries[node], cells)
+    if depth > MAX_RECURSION:
+        return _run_recursive(run, function, cells, call)
+    return _remembered(run, function, cells, call)
+
+
+def _remembered(run: Run, function: FunctionValue, cells: dict[object, Value], call: Call) -> Value:
+    """A call that leaves the state as it found it gives the same again while the state is the same."""
+    key = (function, tuple(cells.values()), id(call.node) if run.context else 0)
+    known = run.memo.get(key)
+    stamp = run.state.stamp
+    if known is not None and known[0] == stamp:
+        return known[1]
+    result = _run_body(run, function, cells, call)
+    if run.state.stamp == stamp:
+        run.memo[key] = (stamp, result)
+    return result
+
+
+def _run_body(run: Run, function: FunctionValue, cells: dict[object, Value], call: Call) -> Value:
+    closure = function.closure
+    assert closure is None or isinstance(closure, Frame)
+    frame = Frame(function.module, cells, closure, run.state.depth)
+    frame.function = function
+    previous = run.enter(id(call.node))
+    run.stack.append(function.node)
+    mark = run.state.mark()
+    node = function.node
+    if isinstance(node, ast.Lambda):
+        frame.returned = run.evaluate(node.body, frame)
+    else:
+        passes = run.execute(node.body, frame)
+        if frame.early:
+            run.state.join_seen(mark, None if frame.captured else cells)
+        if passes:
+            frame.returned = join(frame.returned, NONE)
+    run.stack.pop()
+    run.context = previous
+    if frame.yielded is not None:
+        return run.sequence(node, "generator", Items(None, frame.yielded or ANY))
+    return frame.returned or ANY
+
+
+def _run_recursive(run: Run, function: FunctionValue, cells: dict[object, Value], call: Call) -> Value:
+    summary = Summary(dict(cells))
+    run.summaries[function.node] = summary
+    run.repeated += 1
+    for _ in range(6):
+        summary.changed = False
+        result = _run_body(run, function, dict(summary.parameters), call)
+        merged = join(summary.result, result)
+        if merged is summary.result and not summary.changed:
+            break
+        summary.result = merged
+    else:
+        run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
+    run.repeated -= 1
+    del run.summaries[function.node]
+    return summary.result or ANY
+
+
+def _recursive_result(run: Run, summary: Summary, cells: dict[object, Value]) -> Value:
+    for key, value in cells.items():
+        old = summary.parameters.get(key, BOTTOM)
+        new = widen(old, value, summary.widened > 2)
+        if new is not old:
+            summary.parameters[key] = new
+            summary.changed = True
+            summary.widened += 1
+    return summary.result or unknown("the result of a recursion")
+
+
+# --- binding ----------------------------------------------------------------------------------------------
+
+
+def bind(run: Run, function: FunctionValue, call: Call) -> dict[object, Value]:
+    """The parameters' values; what the caller does not give takes its default."""
+    given, parameters = call.args, function.node.args
+    names = [parameter.arg for parameter in (*parameters.posonlyargs, *parameters.args)]
+    cells: dict[object, Value] = {}
+    first_default = len(names) - len(function.defaults)
+    used: set[str] = set()
+    for index, name in enumerate(names):
+        default = function.defaults[index - first_default] if index >= first_default else None
+        if index < len(given.positional):
+            cells[name] = given.positional[index]
+        else:
+            cells[name] = _named(name, given, default, join(given.more, given.more_keywords))
+            used.add(name)
+    for parameter, default in zip(parameters.kwonlyargs, function.kw_defaults, strict=True):
+        cells[parameter.arg] = _named(parameter.arg, given, default, given.more_keywords)
+        used.add(parameter.arg)
+    if parameters.vararg:
+        rest = tuple(given.positional[len(names) :])
+        items = Items(None, join(given.more, Items(rest).any_element())) if given.more else Items(rest)
+        cells[parameters.vararg.arg] = run.sequence(parameters.vararg, "tuple", items)
+    if parameters.kwarg:
+        cells[parameters.kwarg.arg] = _keywords(run, parameters.kwarg, given, used)
+    return cells
+
+
+def _named(name: str, given: Arguments, default: Value | None, more: Value) -> Value:
+    if name in given.keywords:
+        return given.keywords[name]
+    if default is not None:
+        return join(default, more)
+    return more or _MISSING
+
+
+def _keywords(run: Run, node: ast.AST, given: Arguments, used: set[str]) -> Value:
+    obj = run.allocate(node, "dict", Dictionary)
+    for name, value in given.keywords.items():
+        if name not in used:
+            run.state.store(obj, Key(name), value)
+    if given.more_keywords:
+        run.state.store(obj, OTHER, given.more_keywords)
+    return (obj,)
+
+
+# --- callables --------------------------------------------------------------------------------------------
+
+
+def _call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
+    shifted = Call(call.args.preceded((method.receiver,)), call.node, call.frame)
+    return call_function(run, method.function, shifted)
+
+
+def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
+    args = call.args.preceded(*partial.positional)
+    args = Arguments(args.positional, {**dict(partial.keywords), **args.keywords}, args.more, args.more_keywords)
+    return run.call(partial.function, args, call.node, call.frame)
+
+
+def _call_instance(run: Run, instance: Instance, call: Call) -> Value:
+    if isinstance(instance.cls, External):
+        run.escape(call.args)
+        return ANY
+    return run.call(
+        run.attribute((instance,), "__call__", call.node, call.frame), call.args, call.node, call.frame
+    )
+
+
+def _call_class_method(run: Run, method: ClassMethod, call: Call) -> Value:
+    return run.call(method.function, call.args, call.node, call.frame)
+
+
+def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
+    run.escape(call.args)
+    return (atom,)
+
+
+def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
+    """A new object: its constructor is the first one in the method resolution order."""
+    run.instantiated.setdefault(cls.node)
+    site = (call.frame.module.source.path, getattr(call.node, "lineno", 0))
+    instance = run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
+    value: Value = (instance,)
+    _expect_callbacks(run, cls, instance)
+    for base in linearized(cls):
+        if isinstance(base, ClassValue):
+            if base.fields is not None and "__init__" not in base.cells:
+                _fill_fields(run, base, instance, call)
+                break
+            constructor = base.cells.get("__init__")
+            if constructor:
+                for atom in constructor:
+                    if isinstance(atom, FunctionValue):
+                        _call_bound(run, BoundMethod(atom, instance), call)
+                break
+        else:
+            if isinstance(base, External) and base.path in ("builtins.object", "typing.Generic", "abc.ABC"):
+                continue
+            path = base.path if isinstance(base, External) else ""
+            run.call_atom(ForeignMethod(path, instance, "__init__"), call)
+            break
+    return value
+
+
+def _fill_fields(run: Run, cls: ClassValue, instance: object, call: Call) -> None:
+    assert isinstance(instance, Instance)
+    for index, (name, default) in enumerate(cls.fields or ()):
+        value = call.args.at(index, name)
+        run.state.store(instance, name, value if value is not None else default or _MISSING)
+    after = run.attribute((instance,), "__post_init__", call.node, call.frame)
+    if isinstance(after[0], BoundMethod):
+        run.call(after, Arguments(), call.node, call.frame)
+
+
+def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
+    """A foreign base class calls the methods that override its own; which ones, only its model knows."""
+    seen: set[object] = set()
+    bases = foreign_bases(cls)
+    hooks = [foreign.hooks_of(base) for base in bases]
+    if not hooks:
+        return
+    every = any(names is None for names in hooks)
+    wanted = frozenset().union(*(names for names in hooks if names is not None))
+    for base in linearized(cls):
+        if not isinstance(base, ClassValue):
+            continue
+        for name, value in list(base.cells.items()):
+            if name in seen or name == "__init__" or not isinstance(name, str):
+                continue
+            if every or name in wanted:
+                seen.add(name)
+                for atom in value:
+                    if isinstance(atom, FunctionValue):
+                        run.register_callback((BoundMethod(atom, instance),), None)
+
+
+CALLABLES: dict[type, Caller] = {
+    FunctionValue: call_function,
+    BoundMethod: _call_bound,
+    Partial: _call_partial,
+    Instance: _call_instance,
+    ClassMethod: _call_class_method,
+    ClassValue: instantiate,
+    Unknown: _call_unknown,
+    External: foreign.call_external,
+    ForeignMethod: foreign.call_foreign_method,
+    NativeMethod: foreign.call_native,
+}

@@ -1,0 +1,183 @@
+"""Conditions: is a value certainly true or false, and what does a test tell about the tested variable.
+
+Pruning a branch is only done on certainty; narrowing only removes alternatives that the branch excludes.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+
+from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.text import Text
+from nodl.infer.values import (
+    BOTTOM,
+    ITEMS,
+    ClassValue,
+    FunctionValue,
+    Instance,
+    ModuleValue,
+    Sequence,
+    Unknown,
+    Value,
+    contains,
+)
+
+_CONSTANTS = (str, int, float, bool, bytes, type(None))
+
+
+def truth_of(atom: object) -> bool | None:
+    """``bool(atom)`` of the concrete value, ``None`` if it may be either."""
+    if isinstance(atom, _CONSTANTS):
+        return bool(atom)
+    if isinstance(atom, Text):
+        return True if any(isinstance(piece, str) for piece in atom.pieces) else None
+    if isinstance(atom, Sequence):
+        items = atom.items
+        return bool(items.exact) if items.exact is not None and len(atom.cells[ITEMS]) == 1 else None
+    if isinstance(atom, FunctionValue | ModuleValue | ClassValue):
+        return True
+    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
+        return None if atom.cls.linear is None or _defines_truth(atom.cls) else True
+    return None
+
+
+def _defines_truth(cls: ClassValue) -> bool:
+    return any(
+        not isinstance(base, ClassValue) or "__bool__" in base.cells or "__len__" in base.cells
+        for base in cls.linear or ()
+    )
+
+
+def truth(value: Value) -> bool | None:
+    seen = {truth_of(atom) for atom in value}
+    return seen.pop() if len(seen) == 1 else None
+
+
+def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
+    """Evaluate ``test`` once, for its effects and its truth."""
+    return truth(run.evaluate(test, frame))
+
+
+def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
+    """Drop from a tested variable or field of ``self`` what the outcome of ``test`` excludes."""
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        narrowed(run, test.operand, not outcome, frame)
+    elif isinstance(test, ast.BoolOp):
+        if isinstance(test.op, ast.And) == outcome:
+            for part in test.values:
+                narrowed(run, part, outcome, frame)
+    elif isinstance(test, ast.Compare) and len(test.ops) == 1:
+        _narrow_comparison(run, test, outcome, frame)
+    elif isinstance(test, ast.Name | ast.Attribute):
+        _filter(run, test, frame, lambda atom: truth_of(atom) in (outcome, None))
+
+
+def _narrow_comparison(run: Run, test: ast.Compare, outcome: bool, frame: Frame) -> None:
+    operator = test.ops[0]
+    if isinstance(operator, ast.Is | ast.Eq):
+        wanted = outcome
+    elif isinstance(operator, ast.IsNot | ast.NotEq):
+        wanted = not outcome
+    else:
+        return
+    other = test.comparators[0]
+    if isinstance(other, ast.Constant) and isinstance(test.left, ast.Name | ast.Attribute):
+        constant = other.value
+        _filter(run, test.left, frame, lambda atom: _may_equal(atom, constant, wanted))
+
+
+def _may_equal(atom: object, constant: object, wanted: bool) -> bool:
+    if isinstance(atom, _CONSTANTS):
+        return (atom == constant) == wanted
+    if constant is None and isinstance(atom, Instance | FunctionValue | ClassValue | ModuleValue | Sequence):
+        return not wanted
+    return True
+
+
+def _filter(run: Run, target: ast.expr, frame: Frame, keep: Callable[[object], bool]) -> None:
+    if isinstance(target, ast.Name):
+        cells = frame.cells
+        key: object = target.id
+    elif isinstance(target, ast.Attribute) and isinstance(target.value, ast.Name):
+        owner = frame.cells.get(target.value.id, BOTTOM)
+        if len(owner) != 1 or not isinstance(owner[0], Instance) or owner[0].summary:
+            return
+        cells = owner[0].cells
+        key = target.attr
+    else:
+        return
+    value = cells.get(key)
+    if value is None or len(value) < 2:
+        return
+    kept = tuple(atom for atom in value if keep(atom))
+    if kept and len(kept) < len(value):
+        run.state.write(cells, key, kept)
+
+
+def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
+    """A comparison: certain for constants, else either."""
+    left = run.evaluate(node.left, frame)
+    results: set[bool | None] = set()
+    for operator, comparator in zip(node.ops, node.comparators, strict=True):
+        right = run.evaluate(comparator, frame)
+        results.add(_compare_values(operator, left, right))
+        left = right
+    if results == {True}:
+        return (True,)
+    return (False,) if False in results else (True, False)
+
+
+def _compare_values(operator: ast.cmpop, left: Value, right: Value) -> bool | None:
+    if len(left) * len(right) > 16 or not left or not right:
+        return None
+    outcomes = {_compare_atoms(operator, a, b) for a in left for b in right}
+    return outcomes.pop() if len(outcomes) == 1 else None
+
+
+def _compare_atoms(operator: ast.cmpop, left: object, right: object) -> bool | None:
+    if isinstance(operator, ast.In | ast.NotIn):
+        found = _membership(left, right)
+        return found if found is None or isinstance(operator, ast.In) else not found
+    if isinstance(left, _CONSTANTS) and isinstance(right, _CONSTANTS):
+        return _compare_constants(operator, left, right)
+    if isinstance(operator, ast.Is | ast.IsNot | ast.Eq | ast.NotEq) and (left is None or right is None):
+        other = right if left is None else left
+        if isinstance(other, Instance | FunctionValue | ClassValue | ModuleValue | Sequence):
+            return isinstance(operator, ast.IsNot | ast.NotEq)
+    return None
+
+
+def _membership(element: object, container: object) -> bool | None:
+    if isinstance(container, str) and isinstance(element, str):
+        return element in container
+    if isinstance(container, Sequence) and isinstance(element, _CONSTANTS):
+        exact = container.items.exact
+        if exact is None or container.escaped:
+            return None
+        if any(len(item) == 1 and contains(item, element) for item in exact):
+            return True
+        certain = all(isinstance(atom, _CONSTANTS) for item in exact for atom in item)
+        return False if certain and not any(contains(item, element) for item in exact) else None
+    return None
+
+
+def _compare_constants(operator: ast.cmpop, left: object, right: object) -> bool | None:
+    if isinstance(operator, ast.Eq | ast.Is):
+        return bool(left == right)
+    if isinstance(operator, ast.NotEq | ast.IsNot):
+        return bool(left != right)
+    try:
+        if isinstance(operator, ast.Lt):
+            return bool(left < right)  # type: ignore[operator]
+        if isinstance(operator, ast.Gt):
+            return bool(left > right)  # type: ignore[operator]
+        if isinstance(operator, ast.LtE):
+            return bool(left <= right)  # type: ignore[operator]
+        return bool(left >= right)  # type: ignore[operator]
+    except TypeError:
+        return None
+
+
+def is_unknown(value: Value) -> bool:
+    return any(type(atom) is Unknown for atom in value)

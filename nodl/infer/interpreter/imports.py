@@ -1,0 +1,129 @@
+"""Imports: analysed modules are executed once per run, everything else becomes ``External``."""
+
+from __future__ import annotations
+
+import ast
+import os
+
+from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.program import SourceModule
+from nodl.infer.values import ModuleValue, Value, external
+from nodl.source_ref import SourceRef
+
+
+def run_import(run: Run, node: ast.Import, frame: Frame) -> bool:
+    for alias in node.names:
+        whole = import_module(run, alias.name, frame)
+        if alias.asname:
+            run.assign_name(alias.asname, whole, frame)
+        else:
+            top = alias.name.partition(".")[0]
+            run.assign_name(top, import_module(run, top, frame), frame)
+    return True
+
+
+def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
+    base = _absolute(node, frame.module.source)
+    module = import_module(run, base, frame) if base else external("")
+    for alias in node.names:
+        if alias.name == "*":
+            _import_star(run, module, base, frame)
+            continue
+        value = member(run, module, base, alias.name, frame)
+        run.assign_name(alias.asname or alias.name, value, frame)
+    return True
+
+
+def _absolute(node: ast.ImportFrom, source: SourceModule) -> str:
+    """The absolute name of the module that ``from ... import`` names."""
+    if not node.level:
+        return node.module or ""
+    package = source.package()
+    for _ in range(node.level - 1):
+        package = package.rpartition(".")[0]
+    return ".".join(part for part in (package, node.module) if part)
+
+
+def member(run: Run, module: Value, base: str, name: str, frame: Frame) -> Value:
+    atom = module[0]
+    if not isinstance(atom, ModuleValue):
+        inner = f"{base}.{name}" if base else name
+        found = _load(run, inner, frame)
+        return (found,) if found else external(inner)
+    if name in atom.cells:
+        return atom.cells[name]
+    if name != "__path__":
+        found = _load(run, f"{atom.source.name}.{name}", frame)
+        if found is not None:
+            return (found,)
+    if len(atom.stars) == 1:
+        return external(f"{atom.stars[0]}.{name}")
+    return external(f"{atom.source.name}.{name}")
+
+
+def _import_star(run: Run, module: Value, base: str, frame: Frame) -> None:
+    atom = module[0]
+    if not isinstance(atom, ModuleValue):
+        if base not in frame.module.stars:
+            frame.module.stars.append(base)
+        return
+    for star in atom.stars:
+        if star not in frame.module.stars:
+            frame.module.stars.append(star)
+    for name, value in list(atom.cells.items()):
+        if isinstance(name, str) and not name.startswith(("_", "[")):
+            run.assign_name(name, value, frame)
+
+
+def import_module(run: Run, name: str, frame: Frame) -> Value:
+    """The module called ``name``, executed if it is new; submodules execute their packages first."""
+    found = _load(run, name, frame)
+    if found is None:
+        return external(name)
+    return (found,)
+
+
+def _load(run: Run, name: str, frame: Frame) -> ModuleValue | None:
+    known = run.modules.get(name)
+    if known is not None:
+        return known
+    package, _, last = name.rpartition(".")
+    path = run.program.find(name, run.beside)
+    if path is None:
+        folder = os.path.dirname(frame.module.source.path)
+        if package and frame.module.source.package() == package and not frame.module.source.is_package:
+            path = run.program.find(last, folder)  # a relative import in a folder without __init__.py
+    if path is None or path == run.main.path:
+        return run.modules.get("__main__") if path else None
+    parent = _load(run, package, frame) if package else None
+    source = run.program.load(path, name)
+    module = execute_module(run, source, name)
+    if parent is not None:
+        run.state.write(parent.cells, last, (module,))
+    return module
+
+
+def execute_module(run: Run, source: SourceModule, name: str) -> ModuleValue:
+    """Run the top level of a file as module ``name``."""
+    module = ModuleValue(source)
+    run.modules[name] = module
+    module.cells["__name__"] = (name,)
+    module.cells["__file__"] = (source.path,)
+    if source.error:
+        run.findings.gap(SourceRef(source.path, source.error_line), f"the file {source.error}")
+        return module
+    body = Frame(module, module.cells, None, run.state.depth)
+    previous = run.enter(("module", name))
+    run.execute(source.tree.body, body)
+    run.context = previous
+    if body.early or body.unsettled:
+        run.state.join_seen(0, None)
+    return module
+
+
+def import_submodule(run: Run, name: str, frame: Frame) -> ModuleValue | None:
+    """An analysed module below a folder without ``__init__.py`` (``import p.q`` where only q.py exists)."""
+    top = name.partition(".")[0]
+    if not run.program.has_namespace_package(top, run.beside):
+        return None
+    return _load(run, name, frame)

@@ -1,0 +1,223 @@
+"""Loops and comprehensions: unrolled over known elements, else run to a fixpoint with widening."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+
+from nodl.infer.interpreter.assign import assign
+from nodl.infer.interpreter.conditions import decide, narrowed, truth
+from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.values import (
+    BOTTOM,
+    OTHER,
+    OTHER_KEYS,
+    Dictionary,
+    Items,
+    Key,
+    Value,
+    join,
+)
+
+MAX_UNROLLED = 64
+MAX_ROUNDS = 8
+WIDEN_TEXTS_FROM = 3
+
+
+def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
+    items = elements(run, run.evaluate(node.iter, frame), node, frame)
+    before = frame.unsettled
+    frame.unsettled = False
+    if items.exact is not None and len(items.exact) <= MAX_UNROLLED:
+        passes = _unrolled(run, node, items.exact, frame)
+    else:
+        element = items.any_element()
+        passes = True
+        if element or items.exact is None:
+            _fixpoint(run, frame, lambda: _turn(run, node.target, element, node.body, frame))
+    frame.unsettled = before
+    if passes and node.orelse:
+        run.execute(node.orelse, frame)
+    return passes
+
+
+def _turn(run: Run, target: ast.expr, element: Value, body: list[ast.stmt], frame: Frame) -> bool:
+    assign(run, target, element, frame)
+    return run.execute(body, frame)
+
+
+def _unrolled(run: Run, node: ast.For | ast.AsyncFor, exact: tuple[Value, ...], frame: Frame) -> bool:
+    """One turn after the other. False: no turn lets control pass (a ``return`` in the first one)."""
+    start = run.state.mark()
+    broken = False
+    run.state.depth += 1
+    for index, element in enumerate(exact):
+        previous = run.enter((id(node), index))
+        mark = run.state.mark()
+        passes = _turn(run, node.target, element, node.body, frame)
+        run.context = previous
+        if frame.unsettled:
+            run.state.join_seen(mark)
+            frame.unsettled = False
+            broken = passes = True
+        if not passes:
+            run.state.depth -= 1
+            if broken:
+                run.state.join_seen(start)
+            return broken
+    run.state.depth -= 1
+    if broken:
+        run.state.join_seen(start)
+    return True
+
+
+def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
+    before = frame.unsettled
+    frame.unsettled = False
+    first = decide(run, node.test, frame)
+    if first is False:
+        frame.unsettled = before
+        return run.execute(node.orelse, frame) if node.orelse else True
+    endless = isinstance(node.test, ast.Constant)
+    broken = False
+
+    def turn() -> bool:
+        nonlocal broken
+        narrowed(run, node.test, True, frame)
+        passes = run.execute(node.body, frame)
+        broken = broken or frame.unsettled
+        if passes:
+            run.evaluate(node.test, frame)
+        return passes
+
+    _fixpoint(run, frame, turn)
+    frame.unsettled = before
+    if broken or not endless:
+        narrowed(run, node.test, False, frame)
+        if node.orelse:
+            run.execute(node.orelse, frame)
+        return True
+    return False  # ``while True`` without break: only return or an exception leaves it
+
+
+def _fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
+    run.repeated += 1
+    run.state.depth += 1
+    start = run.state.mark()
+    jumped = False
+    for count in range(MAX_ROUNDS):
+        mark = run.state.mark()
+        passes = turn()
+        if frame.unsettled or not passes:
+            jumped = True
+            frame.unsettled = False
+            run.state.join_seen(mark)
+        if run.state.join_head(mark, count >= WIDEN_TEXTS_FROM):
+            break
+    else:
+        frame_source = frame.function.node if frame.function else frame.module.source.tree
+        run.gap(frame_source, frame, "a loop whose values do not settle; names made in it may be missing")
+    run.state.depth -= 1
+    run.repeated -= 1
+    if jumped:
+        run.state.join_seen(start)
+
+
+# --- comprehensions -------------------------------------------------------------------------------------
+
+
+def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
+    inner = _inner_frame(frame)
+    collected: list[Value] = []
+    exact = _generate(run, node.generators, 0, inner, lambda: collected.append(run.evaluate(node.elt, inner)))
+    kind = "set" if isinstance(node, ast.SetComp) else "list"
+    if exact:
+        return run.sequence(node, kind, Items(tuple(collected)))
+    result = BOTTOM
+    for value in collected:
+        result = join(result, value)
+    return run.sequence(node, kind, Items(None, result))
+
+
+def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
+    inner = _inner_frame(frame)
+    result = run.allocate(node, "dict", Dictionary)
+
+    def add() -> None:
+        key = run.evaluate(node.key, inner)
+        value = run.evaluate(node.value, inner)
+        store_item(run, result, key, value)
+
+    _generate(run, node.generators, 0, inner, add)
+    return (result,)
+
+
+def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
+    """``obj[key] = value`` for a dictionary."""
+    assert isinstance(obj, Dictionary)
+    if len(key) == 1 and isinstance(key[0], str | int | float | bool | type(None)):
+        run.state.store(obj, Key(key[0]), value)
+        return
+    known = [atom for atom in key if isinstance(atom, str | int)]
+    for atom in known:
+        cell = Key(atom)
+        run.state.write(obj.cells, cell, join(obj.cells.get(cell, BOTTOM), value))
+    if len(known) < len(key):
+        run.state.write(obj.cells, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
+        run.state.write(obj.cells, OTHER_KEYS, join(obj.cells.get(OTHER_KEYS, BOTTOM), key))
+
+
+def _inner_frame(frame: Frame) -> Frame:
+    closure = frame.closure if frame.is_class else frame
+    inner = Frame(frame.module, dict(frame.cells) if frame.is_class else {}, closure, frame.depth)
+    inner.function = frame.function
+    inner.captured = True
+    if not frame.is_class:
+        frame.captured = True
+    return inner
+
+
+def _generate(
+    run: Run, generators: list[ast.comprehension], index: int, frame: Frame, emit: Callable[[], None]
+) -> bool:
+    """Bind the targets for every combination and ``emit``. True: exactly the emitted elements, in order."""
+    if index == len(generators):
+        emit()
+        return True
+    generator = generators[index]
+    items = elements(run, run.evaluate(generator.iter, frame), generator.iter, frame)
+    if items.exact is None or len(items.exact) > MAX_UNROLLED:
+        run.repeated += 1
+        element = items.any_element()
+        if element:
+            for _ in range(2):  # the second time with what the first one left behind
+                run.state.maybe(lambda: _one(run, generators, index, frame, element, emit) or True)
+        run.repeated -= 1
+        return False
+    exact = True
+    for turn, element in enumerate(items.exact):
+        previous = run.enter((id(generator), turn))
+        exact = _one(run, generators, index, frame, element, emit) and exact
+        run.context = previous
+    return exact
+
+
+def _one(
+    run: Run,
+    generators: list[ast.comprehension],
+    index: int,
+    frame: Frame,
+    element: Value,
+    emit: Callable[[], None],
+) -> bool:
+    generator = generators[index]
+    assign(run, generator.target, element, frame)
+    certain = True
+    for condition in generator.ifs:
+        outcome = truth(run.evaluate(condition, frame))
+        if outcome is False:
+            return True
+        narrowed(run, condition, True, frame)
+        certain = certain and outcome is True
+    return _generate(run, generators, index + 1, frame, emit) and certain

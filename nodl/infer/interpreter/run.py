@@ -1,0 +1,292 @@
+"""The interpreter's core: frames, dispatch, budgets. One ``Run`` analyses one program start.
+
+Expressions give values, statements tell whether control can pass them; who handles which kind of syntax
+or callable stands in the tables handed in (``Tables``), so that each concern has a module of its own.
+"""
+
+from __future__ import annotations
+
+import ast
+import itertools
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import Any
+
+from nodl.infer.findings import Findings, OptionDefaults
+from nodl.infer.program import Program, SourceModule
+from nodl.infer.state import State
+from nodl.infer.values import (
+    ANY,
+    BOTTOM,
+    BoundMethod,
+    ClassMethod,
+    ClassValue,
+    Dictionary,
+    FunctionValue,
+    HeapObject,
+    Instance,
+    Items,
+    ModuleValue,
+    Partial,
+    Sequence,
+    Value,
+    join,
+)
+from nodl.source_ref import SourceRef
+
+MAX_STEPS = 400_000  # statements analysed in one run
+MAX_DEPTH = 48  # analysed calls inside calls
+
+
+class BudgetExceeded(Exception):
+    """The run was given up; what it found so far is kept, with a gap that says so."""
+
+
+class Frame:
+    """The variables of a running function, class body or module."""
+
+    __slots__ = (
+        "captured", "cells", "closure", "depth", "early", "function", "globals", "is_class", "module",
+        "nonlocals", "returned", "unsettled", "yielded",
+    )  # fmt: skip
+
+    def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
+        self.module = module
+        self.cells = cells
+        self.closure = closure
+        self.depth = depth  # of branches when the frame was entered
+        self.function: FunctionValue | None = None
+        self.returned: Value = BOTTOM
+        self.yielded: Value | None = None
+        self.early = False  # some path left before the end
+        self.unsettled = False  # a break or continue since the loop asked last
+        self.captured = False  # inner functions can see the cells
+        self.is_class = False
+        self.globals: set[str] = set()
+        self.nonlocals: set[str] = set()
+
+
+@dataclass(slots=True)
+class Arguments:
+    """The arguments of a call. ``more``: further positional ones of unknown number."""
+
+    positional: list[Value] = field(default_factory=list)
+    keywords: dict[str, Value] = field(default_factory=dict)
+    more: Value = BOTTOM
+    more_keywords: Value = BOTTOM
+
+    def at(self, index: int, name: str | None = None) -> Value | None:
+        """The argument at ``index`` or called ``name``; ``None`` when it is not given."""
+        if 0 <= index < len(self.positional):
+            return self.positional[index]
+        if name is not None and name in self.keywords:
+            return self.keywords[name]
+        found = join(self.more if index >= 0 else BOTTOM, self.more_keywords)
+        return found or None
+
+    def shifted(self, count: int = 1) -> Arguments:
+        return Arguments(self.positional[count:], self.keywords, self.more, self.more_keywords)
+
+    def preceded(self, *first: Value) -> Arguments:
+        return Arguments([*first, *self.positional], self.keywords, self.more, self.more_keywords)
+
+    def all_values(self) -> Iterable[Value]:
+        return (*self.positional, *self.keywords.values(), self.more, self.more_keywords)
+
+
+@dataclass(slots=True)
+class Call:
+    """A call as the models of libraries see it."""
+
+    args: Arguments
+    node: ast.AST
+    frame: Frame
+
+    @property
+    def source(self) -> SourceRef:
+        return SourceRef(self.frame.module.source.path, getattr(self.node, "lineno", 0))
+
+
+Evaluator = Callable[["Run", Any, Frame], Value]
+Executor = Callable[["Run", Any, Frame], bool]
+Caller = Callable[["Run", Any, Call], Value]
+AttributeReader = Callable[["Run", Any, str, ast.AST, Frame], Value]
+
+
+@dataclass(frozen=True)
+class Tables:
+    expressions: dict[type, Evaluator]
+    statements: dict[type, Executor]
+    callables: dict[type, Caller]
+    attributes: dict[type, AttributeReader]
+
+
+class Run:
+    """One analysis from one entry point: state, findings and what is still to be called."""
+
+    def __init__(self, program: Program, tables: Tables, main: SourceModule):
+        self.program = program
+        self.main = main
+        self.beside = main.path.rpartition("/")[0]
+        self.tables = tables
+        self._expressions = tables.expressions
+        self._statements = tables.statements
+        self.state = State()
+        self.findings = Findings()
+        self.modules: dict[str, ModuleValue] = {}
+        self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
+        self.called: dict[ast.AST, None] = {}  # functions analysed so far
+        self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
+        self.stack: list[ast.AST] = []
+        self.classes: dict[ast.AST, ClassValue] = {}
+        self.enum_members: dict[tuple[str, int, str], Instance] = {}
+        self.functions: dict[tuple[object, ...], FunctionValue] = {}
+        self.summaries: dict[ast.AST, Any] = {}
+        self.options = OptionDefaults()
+        self.memo: dict[tuple[object, ...], tuple[int, Value]] = {}
+        self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
+        self.steps = 0
+        self.context = 0
+        self._contexts: dict[tuple[int, object], int] = {}
+        self._context_ids = itertools.count(1)
+        self._allocated: dict[tuple[object, ...], HeapObject] = {}
+
+    # --- syntax -----------------------------------------------------------------------------------------
+
+    def evaluate(self, node: ast.expr, frame: Frame) -> Value:
+        handler = self._expressions.get(type(node))
+        return handler(self, node, frame) if handler else ANY
+
+    def execute(self, body: list[ast.stmt], frame: Frame) -> bool:
+        """Run statements in order. False: control cannot reach the end of ``body``."""
+        self.steps += len(body)
+        if self.steps > MAX_STEPS:
+            raise BudgetExceeded(f"more than {MAX_STEPS} statements to analyse")
+        statements = self._statements
+        for statement in body:
+            handler = statements.get(type(statement))
+            if handler is not None and not handler(self, statement, frame):
+                return False
+        return True
+
+    # --- variables --------------------------------------------------------------------------------------
+
+    def assign_name(self, name: str, value: Value, frame: Frame) -> None:
+        if name in frame.globals:
+            self.state.write(frame.module.cells, name, value)
+        elif name in frame.nonlocals:
+            self._assign_nonlocal(name, value, frame)
+        else:
+            shared = frame.captured or frame.closure is None or frame.is_class
+            self.state.write(frame.cells, name, value, local=not shared)
+
+    def _assign_nonlocal(self, name: str, value: Value, frame: Frame) -> None:
+        outer = frame.closure
+        while outer is not None and name not in outer.cells:
+            outer = outer.closure
+        self.state.write((outer or frame).cells, name, value)
+
+    # --- calls and attributes ---------------------------------------------------------------------------
+
+    def call(self, callee: Value, args: Arguments, node: ast.AST, frame: Frame) -> Value:
+        """Call every callable that ``callee`` may be; the results are joined."""
+        call = Call(args, node, frame)
+        if len(callee) == 1:
+            return self.call_atom(callee[0], call)
+        results: list[Value] = []
+
+        def alternative(atom: object) -> Callable[[], bool]:
+            def run() -> bool:
+                results.append(self.call_atom(atom, call))
+                return True
+
+            return run
+
+        self.state.branches([alternative(atom) for atom in callee if atom is not None])
+        joined = BOTTOM
+        for result in results:
+            joined = join(joined, result)
+        return joined or ANY
+
+    def call_atom(self, atom: object, call: Call) -> Value:
+        handler = self.tables.callables.get(type(atom))
+        if handler is None:
+            return ANY
+        return handler(self, atom, call)
+
+    def attribute(self, owner: Value, name: str, node: ast.AST, frame: Frame) -> Value:
+        readers = self.tables.attributes
+        result: Value = BOTTOM
+        for atom in owner:
+            if atom is None and len(owner) > 1:
+                continue  # an attribute of None is an error, not a value
+            reader = readers.get(type(atom))
+            result = join(result, reader(self, atom, name, node, frame) if reader else ANY)
+        return result or ANY
+
+    # --- heap -------------------------------------------------------------------------------------------
+
+    def enter(self, key: object) -> int:
+        """Go into the calling context ``key``; returns the context to go back to."""
+        previous = self.context
+        place = (previous, key)
+        inner = self._contexts.get(place)
+        if inner is None:
+            inner = self._contexts[place] = next(self._context_ids)
+        self.context = inner
+        return previous
+
+    def allocate(self, node: ast.AST, kind: str, make: Callable[[], HeapObject]) -> HeapObject:
+        """The object made at ``node`` in this calling context; made twice it stands for all of them."""
+        key = (self.context, id(node), kind)
+        found = self._allocated.get(key)
+        if found is None:
+            found = self._allocated[key] = make()
+        else:
+            found.summary = True
+        return found
+
+    def sequence(self, node: ast.AST, kind: str, items: Items) -> Value:
+        obj = self.allocate(node, kind, lambda: Sequence(kind, items))
+        if obj.summary:
+            self.state.store(obj, "[items]", (items,))
+        return (obj,)
+
+    # --- the world outside ------------------------------------------------------------------------------
+
+    def register_callback(self, value: Value, arity: int | None) -> None:
+        """``value`` may be called by code that is not analysed, with ``arity`` arguments (``None``: any)."""
+        for atom in value:
+            if isinstance(atom, FunctionValue | BoundMethod | Partial | ClassMethod):
+                if atom not in self.callbacks:
+                    self.callbacks[atom] = arity
+                elif self.callbacks[atom] != arity:
+                    self.callbacks[atom] = None
+
+    def escape(self, args: Arguments, opened: bool = True) -> None:
+        """All of ``args`` go to code that is not analysed: it may call callables and fill containers.
+
+        ``opened`` is false for libraries that are known to leave containers alone.
+        """
+        for value in args.all_values():
+            self.escape_value(value, opened)
+
+    def escape_value(self, value: Value, opened: bool = True, depth: int = 0) -> None:
+        for atom in value:
+            if isinstance(atom, Sequence | Dictionary):
+                self._escape_container(atom, opened, depth)
+            elif isinstance(atom, FunctionValue | BoundMethod | Partial):
+                self.register_callback((atom,), None)
+
+    def _escape_container(self, obj: Sequence | Dictionary, opened: bool, depth: int) -> None:
+        obj.escaped = obj.escaped or opened
+        if depth < 3 and len(obj.cells) < 64:
+            for value in list(obj.cells.values()):
+                for atom in value:
+                    inner = atom.any_element() if isinstance(atom, Items) else (atom,)
+                    self.escape_value(inner, opened, depth + 1)
+
+    def gap(self, node: ast.AST, frame: Frame, why: str) -> None:
+        self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)
+
+

@@ -1,0 +1,239 @@
+"""Statements: sequencing, branches, exceptions, definitions. Each handler: can control pass it?"""
+
+from __future__ import annotations
+
+import ast
+from typing import Any
+
+from nodl.infer.interpreter import imports, loops
+from nodl.infer.interpreter.assign import assign, assign_unknown, delete
+from nodl.infer.interpreter.conditions import decide, narrowed
+from nodl.infer.interpreter.define import define_class, define_function
+from nodl.infer.interpreter.operators import binary_operation
+from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
+from nodl.infer.values import ANY, NONE, Instance, Sequence, Value, join
+
+
+def _expression(run: Run, node: ast.Expr, frame: Frame) -> bool:
+    if type(node.value) is not ast.Constant:
+        run.evaluate(node.value, frame)
+        if type(node.value) is ast.Call and _never_returns(node.value.func):
+            _leave(run, frame)
+            return False
+    return True
+
+
+def _never_returns(function: ast.expr) -> bool:
+    if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
+        return (function.value.id, function.attr) in (("sys", "exit"), ("os", "_exit"))
+    return isinstance(function, ast.Name) and function.id in ("exit", "quit")
+
+
+def _assignment(run: Run, node: ast.Assign, frame: Frame) -> bool:
+    value = run.evaluate(node.value, frame)
+    for target in node.targets:
+        assign(run, target, value, frame)
+    return True
+
+
+def _annotated(run: Run, node: ast.AnnAssign, frame: Frame) -> bool:
+    if node.value is not None:
+        assign(run, node.target, run.evaluate(node.value, frame), frame)
+    return True
+
+
+def _augmented(run: Run, node: ast.AugAssign, frame: Frame) -> bool:
+    old = run.evaluate(_as_load(node.target), frame)
+    added = run.evaluate(node.value, frame)
+    if isinstance(node.op, ast.Add | ast.BitOr):
+        mutated = [atom for atom in old if isinstance(atom, Sequence) and atom.kind in ("list", "set")]
+        for atom in mutated:
+            run.call(
+                run.attribute((atom,), "extend" if atom.kind == "list" else "update", node, frame),
+                Arguments([added]),
+                node,
+                frame,
+            )
+        if mutated and len(mutated) == len(old):
+            return True
+    assign(run, node.target, binary_operation(run, node, old, node.op, added), frame)
+    return True
+
+
+def _as_load(target: ast.expr) -> ast.expr:
+    if isinstance(target, ast.Name):
+        return ast.copy_location(ast.Name(target.id, ast.Load()), target)
+    return target  # attributes and subscripts are read by the same handlers whatever their context
+
+
+def _if(run: Run, node: ast.If, frame: Frame) -> bool:
+    outcome = decide(run, node.test, frame)
+    if outcome is not None:
+        return run.execute(node.body if outcome else node.orelse, frame)
+
+    def taken() -> bool:
+        narrowed(run, node.test, True, frame)
+        return run.execute(node.body, frame)
+
+    def other() -> bool:
+        narrowed(run, node.test, False, frame)
+        return run.execute(node.orelse, frame)
+
+    return run.state.branches((taken, other))
+
+
+def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
+    value = NONE if node.value is None else run.evaluate(node.value, frame)
+    frame.returned = join(frame.returned, value)
+    _leave(run, frame)
+    return False
+
+
+def _leave(run: Run, frame: Frame) -> None:
+    if run.state.depth > frame.depth:
+        frame.early = True
+
+
+def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
+    if node.exc is not None:
+        run.evaluate(node.exc, frame)
+    _leave(run, frame)
+    return False
+
+
+def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
+    frame.unsettled = True
+    return False
+
+
+def _try(run: Run, node: Any, frame: Frame) -> bool:
+    """A handler may run after any prefix of the body: it sees every value written on the way."""
+    mark = run.state.mark()
+    run.state.depth += 1
+    passes = run.execute(node.body, frame)
+    if passes and node.orelse:
+        passes = run.execute(node.orelse, frame)
+    run.state.depth -= 1
+
+    def no_exception() -> bool:
+        return passes
+
+    def handler_of(handler: ast.ExceptHandler) -> Any:
+        def handle() -> bool:
+            run.state.join_seen(mark)
+            if handler.name:
+                run.assign_name(handler.name, ANY, frame)
+            return run.execute(handler.body, frame)
+
+        return handle
+
+    alternatives = [no_exception, *(handler_of(handler) for handler in node.handlers)]
+    if node.handlers:
+        passes = run.state.branches(alternatives)
+    if node.finalbody:
+        if not passes:
+            run.state.join_seen(mark)
+        passes = run.execute(node.finalbody, frame) and passes
+    return passes
+
+
+def _with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
+    for item in node.items:
+        manager = run.evaluate(item.context_expr, frame)
+        entered = _entered(run, manager, node, frame)
+        if item.optional_vars is not None:
+            assign(run, item.optional_vars, entered, frame)
+    mark = run.state.mark()
+    passes = run.execute(node.body, frame)
+    if not passes:  # the manager may swallow an exception
+        run.state.join_seen(mark)
+    return True
+
+
+def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
+    result: Value = ()
+    for atom in manager:
+        if isinstance(atom, Instance):
+            enter = run.attribute((atom,), "__enter__", node, frame)
+            entered = run.call(enter, Arguments(), node, frame)
+            leave = run.attribute((atom,), "__exit__", node, frame)
+            run.register_callback(leave, 3)
+            result = join(result, entered)
+        elif isinstance(atom, Sequence) and atom.kind == "generator":
+            result = join(result, atom.items.any_element())
+        else:
+            result = join(result, ANY)
+    return result or ANY
+
+
+def _match(run: Run, node: Any, frame: Frame) -> bool:
+    subject = run.evaluate(node.subject, frame)
+
+    def case_of(case: Any) -> Any:
+        def run_case() -> bool:
+            for pattern in ast.walk(case.pattern):
+                name = getattr(pattern, "name", None) or getattr(pattern, "rest", None)
+                if isinstance(name, str):
+                    whole = pattern is case.pattern
+                    run.assign_name(name, subject if whole else ANY, frame)
+            if case.guard is not None:
+                run.evaluate(case.guard, frame)
+            return run.execute(case.body, frame)
+
+        return run_case
+
+    return run.state.branches([*(case_of(case) for case in node.cases), lambda: True])
+
+
+def _global(run: Run, node: ast.Global, frame: Frame) -> bool:
+    frame.globals.update(node.names)
+    return True
+
+
+def _nonlocal(run: Run, node: ast.Nonlocal, frame: Frame) -> bool:
+    frame.nonlocals.update(node.names)
+    return True
+
+
+def _assert(run: Run, node: ast.Assert, frame: Frame) -> bool:
+    run.evaluate(node.test, frame)
+    return True
+
+
+def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
+    for target in node.targets:
+        delete(run, target, frame)
+    return True
+
+
+STATEMENTS: dict[type, Executor] = {
+    ast.Expr: _expression,
+    ast.Assign: _assignment,
+    ast.AnnAssign: _annotated,
+    ast.AugAssign: _augmented,
+    ast.If: _if,
+    ast.For: loops.run_for,
+    ast.AsyncFor: loops.run_for,
+    ast.While: loops.run_while,
+    ast.Return: _return,
+    ast.Raise: _raise,
+    ast.Break: _jump,
+    ast.Continue: _jump,
+    ast.Try: _try,
+    ast.With: _with,
+    ast.AsyncWith: _with,
+    ast.Match: _match,
+    ast.Global: _global,
+    ast.Nonlocal: _nonlocal,
+    ast.Assert: _assert,
+    ast.Delete: _delete,
+    ast.FunctionDef: define_function,
+    ast.AsyncFunctionDef: define_function,
+    ast.ClassDef: define_class,
+    ast.Import: imports.run_import,
+    ast.ImportFrom: imports.run_import_from,
+}
+if hasattr(ast, "TryStar"):  # Python 3.11
+    STATEMENTS[ast.TryStar] = _try
+
+__all__ = ["STATEMENTS", "assign_unknown"]

@@ -1,0 +1,16 @@
+"""Puts the handlers of all concerns together and makes runs of them."""
+
+from __future__ import annotations
+
+from nodl.infer.interpreter.attributes import ATTRIBUTES
+from nodl.infer.interpreter.calls import CALLABLES
+from nodl.infer.interpreter.expressions import EXPRESSIONS
+from nodl.infer.interpreter.run import Run, Tables
+from nodl.infer.interpreter.statements import STATEMENTS
+from nodl.infer.program import Program, SourceModule
+
+TABLES = Tables(EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES)
+
+
+def new_run(program: Program, main: SourceModule) -> Run:
+    return Run(program, TABLES, main)

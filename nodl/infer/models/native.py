@@ -1,0 +1,245 @@
+"""Methods of strings, lists, sets, dictionaries."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nodl.infer.interpreter.iterate import elements, keys_of, values_of
+from nodl.infer.interpreter.loops import store_item
+from nodl.infer.interpreter.operators import joined, str_format, text_value
+from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.text import Hole, Text, TextAtom, edited
+from nodl.infer.values import (
+    ANY,
+    BOOLEAN,
+    BOTTOM,
+    ITEMS,
+    NONE,
+    OTHER,
+    Dictionary,
+    Items,
+    Key,
+    Sequence,
+    Value,
+    join,
+    sole,
+    unknown,
+)
+
+# Methods of str whose result is computed outright when everything is constant.
+_PURE = frozenset(
+    {
+        "strip", "lstrip", "rstrip", "lower", "upper", "title", "capitalize", "replace", "removeprefix",
+        "removesuffix", "zfill", "ljust", "rjust", "center", "casefold", "swapcase", "startswith", "endswith",
+        "isdigit", "isalpha", "find", "rfind", "index", "count", "isidentifier", "islower", "isupper",
+    }
+)  # fmt: skip
+_SPLITS = frozenset({"split", "rsplit", "splitlines", "partition", "rpartition"})
+
+
+def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
+    if isinstance(receiver, str | Text):
+        return _text_method(run, receiver, name, call)
+    if isinstance(receiver, Dictionary):
+        model = _DICTIONARY.get(name)
+        return model(run, receiver, call) if model else ANY
+    if isinstance(receiver, Sequence):
+        method = _SEQUENCE.get(name)
+        return method(run, receiver, call) if method else ANY
+    return unknown(f"the result of {name}()")
+
+
+# --- text ---------------------------------------------------------------------------------------------------
+
+
+def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
+    if name == "format":
+        return text_value(str_format(text, call.args))
+    if name == "join":
+        return text_value(joined((text,), elements(run, call.args.at(0) or ANY, call.node, call.frame)))
+    arguments = tuple(sole(value) for value in call.args.positional)
+    constant = all(isinstance(argument, str | int | type(None)) for argument in arguments)
+    if not constant or call.args.keywords or call.args.more:
+        return unknown(f"the result of str.{name}()")
+    if isinstance(text, str):
+        return _constant_method(run, text, name, arguments, call)
+    if name in ("startswith", "endswith", "isdigit", "isalpha"):
+        return BOOLEAN
+    symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
+    if symbolic is not None:
+        return (symbolic,)
+    hole = Text((Hole(f"the result of str.{name}()"),))
+    return text_value([hole])
+
+
+def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ...], call: Call) -> Value:
+    if name not in _PURE and name not in _SPLITS:
+        return unknown(f"the result of str.{name}()")
+    try:
+        result = getattr(text, name)(*arguments)
+    except (TypeError, ValueError, OverflowError):
+        return ANY
+    if name in _SPLITS:
+        return run.sequence(call.node, "list", Items(tuple((part,) for part in result)))
+    return (result,) if not isinstance(result, str) or len(result) < 4096 else ANY
+
+
+# --- sequences ----------------------------------------------------------------------------------------------
+
+
+def _append(run: Run, owner: Sequence, call: Call) -> Value:
+    value = call.args.at(0) or ANY
+    items = owner.items
+    if items.exact is not None and not owner.summary and len(items.exact) < 256:
+        run.state.store(owner, ITEMS, (Items((*items.exact, value)),))
+    else:
+        run.state.store(owner, ITEMS, (Items(None, join(items.any_element(), value)),))
+    return NONE
+
+
+def _extend(run: Run, owner: Sequence, call: Call) -> Value:
+    added = elements(run, call.args.at(0) or ANY, call.node, call.frame)
+    items = owner.items
+    if items.exact is not None and added.exact is not None and len(items.exact + added.exact) < 256:
+        run.state.store(owner, ITEMS, (Items(items.exact + added.exact),))
+    else:
+        everything = join(items.any_element(), added.any_element())
+        run.state.store(owner, ITEMS, (Items(None, everything),))
+    return NONE
+
+
+def _insert(run: Run, owner: Sequence, call: Call) -> Value:
+    value = call.args.at(1) or ANY
+    run.state.store(owner, ITEMS, (Items(None, join(owner.items.any_element(), value)),))
+    return NONE
+
+
+def _pop(run: Run, owner: Sequence, call: Call) -> Value:
+    element = owner.items.any_element()
+    exact = owner.items.exact
+    if exact and not call.args.positional and not owner.summary and not owner.escaped:
+        run.state.store(owner, ITEMS, (Items(exact[:-1]),))
+        return exact[-1]
+    run.state.store(owner, ITEMS, (Items(None, element),))
+    return element or ANY
+
+
+def _forget_length(run: Run, owner: Sequence, call: Call) -> Value:
+    run.state.store(owner, ITEMS, (Items(None, owner.items.any_element()),))
+    return NONE
+
+
+def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
+    return run.sequence(call.node, owner.kind, owner.items)
+
+
+def _united(run: Run, owner: Sequence, call: Call) -> Value:
+    everything = owner.items.any_element()
+    for value in call.args.positional:
+        everything = join(everything, elements(run, value, call.node, call.frame).any_element())
+    return run.sequence(call.node, owner.kind, Items(None, everything))
+
+
+SequenceMethod = Callable[[Run, Sequence, Call], Value]
+_SEQUENCE: dict[str, SequenceMethod] = {
+    "append": _append,
+    "add": _append,
+    "appendleft": _append,
+    "extend": _extend,
+    "update": _extend,
+    "insert": _insert,
+    "pop": _pop,
+    "popleft": _pop,
+    "remove": _forget_length,
+    "discard": _forget_length,
+    "clear": _forget_length,
+    "sort": _forget_length,
+    "reverse": _forget_length,
+    "copy": _copy_sequence,
+    "union": _united,
+    "intersection": _united,
+    "difference": _copy_sequence,
+}
+
+
+# --- dictionaries -------------------------------------------------------------------------------------------
+
+
+def _get(run: Run, owner: Dictionary, call: Call) -> Value:
+    key = call.args.at(0) or ANY
+    found = owner.cells.get(OTHER, BOTTOM)
+    missing = False
+    for atom in key:
+        if isinstance(atom, str | int | float | bool | type(None)):
+            held = owner.cells.get(Key(atom))
+            missing = missing or held is None
+            found = join(found, held or BOTTOM)
+        else:
+            missing = True
+            found = join(found, values_of(owner).any_element())
+    if missing or owner.summary or owner.escaped or OTHER in owner.cells:
+        found = join(found, call.args.at(1, "default") or NONE)
+    return join(found, ANY) if owner.escaped else found
+
+
+def _setdefault(run: Run, owner: Dictionary, call: Call) -> Value:
+    value = join(_get(run, owner, call), call.args.at(1) or NONE)
+    store_item(run, owner, call.args.at(0) or ANY, value)
+    return value
+
+
+def _keys(run: Run, owner: Dictionary, call: Call) -> Value:
+    return run.sequence(call.node, "list", keys_of(owner))
+
+
+def _values(run: Run, owner: Dictionary, call: Call) -> Value:
+    return run.sequence(call.node, "list", values_of(owner))
+
+
+def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
+    keys, values = keys_of(owner), values_of(owner)
+    if keys.exact is not None and values.exact is not None:
+        pairs = tuple(
+            (Sequence("tuple", Items((key, value))),)
+            for key, value in zip(keys.exact, values.exact, strict=True)
+        )
+        return run.sequence(call.node, "list", Items(pairs))
+    pair = Sequence("tuple", Items((keys.any_element() or ANY, values.any_element() or ANY)))
+    return run.sequence(call.node, "list", Items(None, (pair,)))
+
+
+def _update(run: Run, owner: Dictionary, call: Call) -> Value:
+    for atom in call.args.at(0) or BOTTOM:
+        if isinstance(atom, Dictionary):
+            for cell, value in list(atom.cells.items()):
+                run.state.store(owner, cell, value)
+        else:
+            run.state.store(owner, OTHER, join(owner.cells.get(OTHER, BOTTOM), ANY))
+    for name, value in call.args.keywords.items():
+        run.state.store(owner, Key(name), value)
+    return NONE
+
+
+def _pop_item(run: Run, owner: Dictionary, call: Call) -> Value:
+    return _get(run, owner, call)
+
+
+def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
+    copied = run.allocate(call.node, "dict", Dictionary)
+    for cell, value in list(owner.cells.items()):
+        run.state.store(copied, cell, value)
+    copied.escaped = copied.escaped or owner.escaped
+    return (copied,)
+
+
+DictionaryMethod = Callable[[Run, Dictionary, Call], Value]
+_DICTIONARY: dict[str, DictionaryMethod] = {
+    "get": _get,
+    "setdefault": _setdefault,
+    "keys": _keys,
+    "values": _values,
+    "items": _pairs,
+    "update": _update,
+    "pop": _pop_item,
+    "copy": _copy_dictionary,
+}

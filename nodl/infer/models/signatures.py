@@ -1,0 +1,155 @@
+"""The ROS 2 Python API as tables: which call makes which endpoint, and which argument holds what.
+
+Sources: rclpy ``node.py``, ``lifecycle``, ``action``, ``parameter_client.py``; tf2_ros_py; message_filters;
+diagnostic_updater; image_transport_py (branches humble to rolling). Positions count without ``self``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nodl.node_interface import EndpointKind
+
+PUBLISHER = EndpointKind.PUBLISHER
+SUBSCRIPTION = EndpointKind.SUBSCRIPTION
+SERVER = EndpointKind.SERVICE_SERVER
+CLIENT = EndpointKind.SERVICE_CLIENT
+ACTION_SERVER = EndpointKind.ACTION_SERVER
+ACTION_CLIENT = EndpointKind.ACTION_CLIENT
+
+
+@dataclass(frozen=True, slots=True)
+class Argument:
+    """Where an argument stands: position (-1: keyword only) and keyword."""
+
+    position: int
+    keyword: str
+
+
+@dataclass(frozen=True, slots=True)
+class Callback:
+    """An argument that is called later, with ``arity`` arguments (``None``: any number)."""
+
+    argument: Argument
+    arity: int | None
+
+
+@dataclass(frozen=True, slots=True)
+class EndpointCall:
+    """A call that makes one endpoint; ``node`` is ``None`` for methods of the node itself."""
+
+    kind: EndpointKind
+    type: Argument
+    name: Argument
+    node: Argument | None = None
+    callbacks: tuple[Callback, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FixedEndpoint:
+    kind: EndpointKind
+    name: str
+    type: str
+    unless: Argument | None = None  # not made when this argument is certainly true
+
+
+@dataclass(frozen=True, slots=True)
+class Helper:
+    """A class or function of a library that makes endpoints with fixed names on the node it is given."""
+
+    node: Argument
+    endpoints: tuple[FixedEndpoint, ...]
+    callbacks: tuple[Callback, ...] = ()
+
+
+_CALLBACK = Argument(2, "callback")
+
+NODE_ENDPOINTS: dict[str, EndpointCall] = {
+    "create_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic")),
+    "create_lifecycle_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic")),
+    "create_subscription": EndpointCall(
+        SUBSCRIPTION, Argument(0, "msg_type"), Argument(1, "topic"), callbacks=(Callback(_CALLBACK, 1),)
+    ),
+    "create_service": EndpointCall(
+        SERVER, Argument(0, "srv_type"), Argument(1, "srv_name"), callbacks=(Callback(_CALLBACK, 2),)
+    ),
+    "create_client": EndpointCall(CLIENT, Argument(0, "srv_type"), Argument(1, "srv_name")),
+}
+
+_NODE = Argument(0, "node")
+_ACTION = {"type": Argument(1, "action_type"), "name": Argument(2, "action_name"), "node": _NODE}
+
+# Keyed by (top package, last name): ``rclpy.action.ActionClient`` and ``rclpy.action.client.ActionClient``.
+ENDPOINT_CALLS: dict[tuple[str, str], EndpointCall] = {
+    ("rclpy", "ActionClient"): EndpointCall(ACTION_CLIENT, **_ACTION),
+    ("rclpy", "ActionServer"): EndpointCall(
+        ACTION_SERVER,
+        **_ACTION,
+        callbacks=(
+            Callback(Argument(3, "execute_callback"), 1),
+            Callback(Argument(-1, "goal_callback"), 1),
+            Callback(Argument(-1, "handle_accepted_callback"), 1),
+            Callback(Argument(-1, "cancel_callback"), 1),
+        ),
+    ),
+    ("message_filters", "Subscriber"): EndpointCall(
+        SUBSCRIPTION, Argument(1, "msg_type"), Argument(2, "topic"), node=_NODE
+    ),
+    ("rclpy", "wait_for_message"): EndpointCall(
+        SUBSCRIPTION, Argument(0, "msg_type"), Argument(2, "topic"), node=Argument(1, "node")
+    ),
+}
+
+_TF = FixedEndpoint(SUBSCRIPTION, "/tf", "tf2_msgs/msg/TFMessage", unless=Argument(-1, "static_only"))
+_TF_STATIC = FixedEndpoint(SUBSCRIPTION, "/tf_static", "tf2_msgs/msg/TFMessage")
+
+HELPERS: dict[tuple[str, str], Helper] = {
+    ("tf2_ros", "TransformListener"): Helper(Argument(1, "node"), (_TF, _TF_STATIC)),
+    ("tf2_ros", "TransformBroadcaster"): Helper(
+        _NODE, (FixedEndpoint(PUBLISHER, "/tf", "tf2_msgs/msg/TFMessage"),)
+    ),
+    ("tf2_ros", "StaticTransformBroadcaster"): Helper(
+        _NODE, (FixedEndpoint(PUBLISHER, "/tf_static", "tf2_msgs/msg/TFMessage"),)
+    ),
+    ("tf2_ros", "Buffer"): Helper(
+        Argument(1, "node"), (FixedEndpoint(SERVER, "tf2_frames", "tf2_msgs/srv/FrameGraph"),)
+    ),
+    ("diagnostic_updater", "Updater"): Helper(
+        _NODE, (FixedEndpoint(PUBLISHER, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"),)
+    ),
+    ("rclpy", "ParameterEventHandler"): Helper(
+        _NODE, (FixedEndpoint(SUBSCRIPTION, "/parameter_events", "rcl_interfaces/msg/ParameterEvent"),)
+    ),
+}
+
+# The services that a client of another node's parameters calls, below that node's name.
+PARAMETER_SERVICES: dict[str, str] = {
+    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
+    "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
+    "get_parameters": "rcl_interfaces/srv/GetParameters",
+    "list_parameters": "rcl_interfaces/srv/ListParameters",
+    "set_parameters": "rcl_interfaces/srv/SetParameters",
+    "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
+}
+
+# Node methods that only take callbacks.
+NODE_CALLBACKS: dict[str, Callback] = {
+    "create_timer": Callback(Argument(1, "callback"), 0),
+    "create_guard_condition": Callback(Argument(0, "callback"), 0),
+    "add_on_set_parameters_callback": Callback(Argument(0, "callback"), 1),
+    "add_pre_set_parameters_callback": Callback(Argument(0, "callback"), 1),
+    "add_post_set_parameters_callback": Callback(Argument(0, "callback"), 1),
+    "set_parameters_callback": Callback(Argument(0, "callback"), 1),
+    "add_waitable": Callback(Argument(0, "waitable"), None),
+}
+
+# Methods of objects whose class is not known that take a callback.
+COMMON_CALLBACKS: dict[str, Callback] = {
+    "add_done_callback": Callback(Argument(0, "callback"), 1),
+    "send_goal_async": Callback(Argument(1, "feedback_callback"), 1),
+}
+
+# Transitions that a lifecycle node's class overrides (rclpy/lifecycle/node.py).
+LIFECYCLE_HOOKS = frozenset(
+    {"on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown", "on_error"}
+)

@@ -1,0 +1,320 @@
+"""Python's standard library where it makes names, keeps callables or changes control flow."""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Callable
+
+from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.operators import as_texts, text_value
+from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.models import builtin
+from nodl.infer.text import Input, Text, concatenations
+from nodl.infer.values import (
+    ANY,
+    BOTTOM,
+    NONE,
+    Dictionary,
+    External,
+    Instance,
+    Items,
+    Key,
+    Partial,
+    Sequence,
+    Value,
+    constant_strings,
+    join,
+    sole,
+    unknown,
+)
+
+Model = Callable[[Run, Call], Value]
+Method = Callable[[Run, Instance, Call], Value]
+
+PARSER = "argparse.ArgumentParser"
+NAMESPACE = "argparse.Namespace"
+
+
+# --- argparse -----------------------------------------------------------------------------------------------
+
+
+def _parser(run: Run, call: Call) -> Value:
+    return (_library_instance(run, call, PARSER),)
+
+
+def _library_instance(run: Run, call: Call, path: str) -> Instance:
+    site = (call.source.file, call.source.line)
+    instance = run.allocate(call.node, path, lambda: Instance(External(path), site))
+    assert isinstance(instance, Instance)
+    return instance
+
+
+def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
+    flags = [flag for value in call.args.positional for flag in constant_strings(value)]
+    if not flags:
+        return ANY
+    long = next((flag for flag in flags if flag.startswith("--")), flags[0])
+    dest = sole(call.args.keywords.get("dest", (long.lstrip("-").replace("-", "_"),)))
+    default = call.args.keywords.get("default", BOTTOM)
+    name = long if long.startswith("-") else f"<{long}>"
+    run.options.declare(name, tuple(atom for atom in default if atom is not None))
+    if isinstance(dest, str):
+        owner = parser.cells.get("parser", (parser,))[0]
+        assert isinstance(owner, Instance)
+        run.state.store(owner, "dest " + dest, (Text((Input(name, run.options),)),))
+    return ANY
+
+
+def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
+    for dest, value in call.args.keywords.items():
+        cell = "dest " + dest
+        run.state.store(parser, cell, join(parser.cells.get(cell, BOTTOM), value))
+    return NONE
+
+
+def _argument_group(run: Run, parser: Instance, call: Call) -> Value:
+    return (parser,)
+
+
+def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
+    namespace = _library_instance(run, call, NAMESPACE)
+    run.state.store(namespace, "parser", (parser,))
+    return (namespace,)
+
+
+def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
+    namespace = _parse_args(run, parser, call)
+    rest = run.sequence(call.node, "list", Items(None, unknown("command line arguments")))
+    return (Sequence("tuple", Items((namespace, rest))),)
+
+
+def _namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
+    found: Value = BOTTOM
+    for parser in namespace.cells.get("parser", BOTTOM):
+        if isinstance(parser, Instance):
+            found = join(found, parser.cells.get("dest " + name, BOTTOM))
+    return found or unknown(f"the command line option {name}")
+
+
+# --- environment, paths ---------------------------------------------------------------------------------------
+
+
+def _environment(run: Run, call: Call) -> Value:
+    default = call.args.at(1, "default") or BOTTOM
+    result: Value = BOTTOM
+    for name in constant_strings(call.args.at(0) or ANY):
+        run.options.declare("$" + name, tuple(atom for atom in default if atom is not None))
+        result = join(result, (Text((Input("$" + name, run.options),)),))
+    return result or unknown("an environment variable")
+
+
+def _path_join(run: Run, call: Call) -> Value:
+    parts = [sole(value) for value in call.args.positional]
+    if parts and not call.args.more and all(isinstance(part, str) for part in parts):
+        return (os.path.join(*(str(part) for part in parts)),)
+    operands = [as_texts(value) for value in call.args.positional]
+    separated = [texts for operand in operands for texts in (operand, ["/"])][:-1]
+    return text_value(concatenations(separated)) if separated else ANY
+
+
+def _base_name(run: Run, call: Call) -> Value:
+    atom = sole(call.args.at(0))
+    return (os.path.basename(atom),) if isinstance(atom, str) else unknown("the name of a file")
+
+
+# --- callables ----------------------------------------------------------------------------------------------
+
+
+def _partial(run: Run, call: Call) -> Value:
+    function = call.args.at(0) or ANY
+    keywords = tuple(call.args.keywords.items())
+    return (Partial(function, tuple(call.args.positional[1:]), keywords),)
+
+
+def _thread(run: Run, call: Call) -> Value:
+    """``Thread(target=f, args=(...))``: calls ``f`` with these arguments, some time later."""
+    target = call.args.at(1, "target") or NONE
+    _register_with(run, target, call.args.keywords.get("args"), call.args.keywords.get("kwargs"), call)
+    return (_library_instance(run, call, "threading.Thread"),)
+
+
+def _register_with(run: Run, target: Value, args: Value | None, kwargs: Value | None, call: Call) -> None:
+    keywords: list[tuple[str, Value]] = []
+    for atom in kwargs or BOTTOM:
+        if isinstance(atom, Dictionary):
+            for cell, value in atom.cells.items():
+                if isinstance(cell, Key) and isinstance(cell.constant, str):
+                    keywords.append((cell.constant, value))
+    items = Items(()) if args is None else elements(run, args, call.node, call.frame)
+    if items.exact is None:
+        run.register_callback(target, None)
+    elif target != NONE:
+        run.register_callback((Partial(target, items.exact, tuple(keywords)),), 0)
+
+
+def _timer(run: Run, call: Call) -> Value:
+    _register_with(run, call.args.at(1, "function") or NONE, call.args.at(2, "args"), None, call)
+    return ANY
+
+
+def _submit(run: Run, pool: Instance, call: Call) -> Value:
+    rest = Items(tuple(call.args.positional[1:]))
+    run.register_callback(
+        (Partial(call.args.at(0) or ANY, rest.exact or (), tuple(call.args.keywords.items())),), 0
+    )
+    return ANY
+
+
+def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
+    _thread(run, call)
+    return NONE
+
+
+def _reduce(run: Run, call: Call) -> Value:
+    run.escape(call.args, opened=False)
+    return ANY
+
+
+# --- containers ---------------------------------------------------------------------------------------------
+
+
+def _default_dict(run: Run, call: Call) -> Value:
+    obj = run.allocate(call.node, "dict", Dictionary)
+    assert isinstance(obj, Dictionary)
+    obj.default = join(obj.default, tuple(atom for atom in call.args.at(0) or BOTTOM if atom is not None))
+    return (obj,)
+
+
+def _named_tuple(run: Run, call: Call) -> Value:
+    return unknown("the class made by namedtuple()")
+
+
+def _simple_namespace(run: Run, call: Call) -> Value:
+    instance = _library_instance(run, call, "types.SimpleNamespace")
+    for name, value in call.args.keywords.items():
+        run.state.store(instance, name, value)
+    return (instance,)
+
+
+def _copy(run: Run, call: Call) -> Value:
+    return call.args.at(0) or ANY
+
+
+def _chain(run: Run, call: Call) -> Value:
+    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
+    if all(column.exact is not None for column in columns):
+        return run.sequence(
+            call.node, "list", Items(tuple(item for column in columns for item in column.exact or ()))
+        )
+    result: Value = BOTTOM
+    for column in columns:
+        result = join(result, column.any_element())
+    return run.sequence(call.node, "list", Items(None, result))
+
+
+def _product(run: Run, call: Call) -> Value:
+    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
+    rows: list[tuple[Value, ...]] = [()]
+    for column in columns:
+        if column.exact is None or len(rows) * len(column.exact) > builtin.MAX_RANGE:
+            row = tuple(each.any_element() or ANY for each in columns)
+            return run.sequence(call.node, "list", Items(None, (Sequence("tuple", Items(row)),)))
+        rows = [(*row, item) for row in rows for item in column.exact]
+    pairs = tuple((Sequence("tuple", Items(row)),) for row in rows)
+    return run.sequence(call.node, "list", Items(pairs))
+
+
+def _register(run: Run, call: Call) -> Value:
+    run.escape(call.args, opened=False)
+    return ANY
+
+
+def _file_contents(run: Run, call: Call) -> Value:
+    return unknown("the contents of a file, read when the program runs")
+
+
+FUNCTIONS: dict[str, Model] = {
+    "argparse.ArgumentParser": _parser,
+    "os.getenv": _environment,
+    "os.environ.get": _environment,
+    "os.path.join": _path_join,
+    "os.path.basename": _base_name,
+    "functools.partial": _partial,
+    "functools.reduce": _reduce,
+    "threading.Thread": _thread,
+    "threading.Timer": _timer,
+    "multiprocessing.Process": _thread,
+    "collections.defaultdict": _default_dict,
+    "collections.OrderedDict": builtin.FUNCTIONS["builtins.dict"],
+    "collections.deque": builtin.FUNCTIONS["builtins.list"],
+    "collections.namedtuple": _named_tuple,
+    "types.SimpleNamespace": _simple_namespace,
+    "copy.copy": _copy,
+    "copy.deepcopy": _copy,
+    "itertools.chain": _chain,
+    "itertools.product": _product,
+    "random.choice": builtin.FUNCTIONS["builtins.next"],
+    "importlib.import_module": builtin.import_dynamic,
+    "atexit.register": _register,
+    "yaml.safe_load": _file_contents,
+    "yaml.load": _file_contents,
+    "json.load": _file_contents,
+    "builtins.open": _file_contents,
+}
+
+METHODS: dict[tuple[str, str], Method] = {
+    (PARSER, "add_argument"): _add_argument,
+    (PARSER, "set_defaults"): _set_defaults,
+    (PARSER, "add_argument_group"): _argument_group,
+    (PARSER, "add_mutually_exclusive_group"): _argument_group,
+    (PARSER, "parse_args"): _parse_args,
+    (PARSER, "parse_known_args"): _parse_known_args,
+    (PARSER, "parse_intermixed_args"): _parse_args,
+    ("threading.Thread", "__init__"): _thread_init,
+    ("multiprocessing.Process", "__init__"): _thread_init,
+}
+
+
+def _field(run: Run, obj: Instance, name: str) -> Value:
+    return unknown(f"the attribute {name}, which nothing analysed sets")
+
+
+OPEN_ATTRIBUTES: dict[str, Callable[[Run, Instance, str], Value]] = {
+    NAMESPACE: _namespace_attribute,
+    "types.SimpleNamespace": _field,
+}
+
+# Methods of a subclass that the base class calls.
+HOOKS: dict[str, frozenset[str]] = {
+    "builtins.object": frozenset(),
+    "builtins.dict": frozenset(),
+    "builtins.list": frozenset(),
+    "builtins.str": frozenset(),
+    "builtins.int": frozenset(),
+    "builtins.Exception": frozenset(),
+    "enum.Enum": frozenset(),
+    "enum.IntEnum": frozenset(),
+    "enum.StrEnum": frozenset(),
+    "enum.Flag": frozenset(),
+    "abc.ABC": frozenset(),
+    "typing.NamedTuple": frozenset(),
+    "typing.Generic": frozenset(),
+    "typing.Protocol": frozenset(),
+    "threading.Thread": frozenset({"run"}),
+    "multiprocessing.Process": frozenset({"run"}),
+}
+
+CONSTANTS: dict[str, Value] = {
+    "sys.argv": unknown("command line arguments"),
+    "sys.platform": ("linux",),
+    "os.sep": ("/",),
+    "os.name": ("posix",),
+    "typing.TYPE_CHECKING": (False,),
+    "rclpy.action.client.ActionClient": (External("rclpy.action.ActionClient"),),
+}
+
+
+def arguments_of_callback(arity: int | None) -> Arguments:
+    """What foreign code hands to a callback: ``arity`` values it makes, or any number of them."""
+    made = unknown("an argument given by code that is not analysed")
+    return Arguments(more=made) if arity is None else Arguments([made] * arity)

@@ -1,0 +1,143 @@
+"""The analysed program as text: which module is which file, parsed once. Reads files, runs nothing.
+
+An import finds a module as Python would: relative to the package, beside the started script, or below one
+of the roots (folders that hold top-level packages). What is not found there is a foreign library.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import warnings
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+MAX_SOURCE_BYTES = 4_000_000
+
+
+@dataclass(eq=False)
+class SourceModule:
+    """One parsed file. ``error`` says why it could not be parsed (``tree`` is then empty)."""
+
+    name: str
+    path: str
+    tree: ast.Module
+    text: str = ""
+    is_package: bool = False
+    error: str | None = None
+    error_line: int = 0
+    entry_functions: list[str] = field(default_factory=list)
+
+    def package(self) -> str:
+        return self.name if self.is_package else self.name.rpartition(".")[0]
+
+
+class Program:
+    """Finds and parses modules below ``roots``; one object serves many runs."""
+
+    def __init__(self, roots: Iterable[str] = ()):
+        self.roots = list(dict.fromkeys(os.path.abspath(root) for root in roots))
+        self._by_path: dict[str, SourceModule] = {}
+        self._found: dict[tuple[str, str], str | None] = {}
+        self._listings: dict[str, frozenset[str]] = {}
+
+    def add_root(self, folder: str) -> None:
+        folder = os.path.abspath(folder)
+        if folder not in self.roots:
+            self.roots.append(folder)
+            self._found.clear()
+
+    def load(self, path: str, name: str | None = None) -> SourceModule:
+        """The module in file ``path``; its name is derived from the ``__init__.py`` files above it."""
+        path = os.path.abspath(path)
+        module = self._by_path.get(path)
+        if module is None:
+            module = self._by_path[path] = _parse(path, name or self.module_name(path))
+        return module
+
+    def module_name(self, path: str) -> str:
+        """``/ws/src/p/p/sub/node.py`` -> ``p.sub.node`` if ``p`` and ``sub`` are Python packages."""
+        folder, base = os.path.split(path)
+        names = [] if base == "__init__.py" else [base.removesuffix(".py")]
+        while "__init__.py" in self._listing(folder):
+            folder, package = os.path.split(folder)
+            names.insert(0, package)
+        return ".".join(names) or base.removesuffix(".py")
+
+    def top_folder(self, path: str) -> str:
+        """The folder that would have to be on ``sys.path`` for the module in ``path``."""
+        folder = os.path.dirname(os.path.abspath(path))
+        while "__init__.py" in self._listing(folder):
+            folder = os.path.dirname(folder)
+        return folder
+
+    def find(self, name: str, beside: str) -> str | None:
+        """The file of module ``name`` for a program started in folder ``beside``; ``None``: foreign."""
+        key = (name, beside)
+        if key not in self._found:
+            self._found[key] = self._search(name, beside)
+        return self._found[key]
+
+    def _search(self, name: str, beside: str) -> str | None:
+        steps = name.split(".")
+        for root in (beside, *self.roots):
+            found = self._below(root, steps)
+            if found:
+                return found
+        return None
+
+    def _below(self, root: str, steps: list[str]) -> str | None:
+        folder = root
+        for step in steps[:-1]:
+            if step not in self._listing(folder):
+                return None
+            folder = os.path.join(folder, step)
+        last = steps[-1]
+        listing = self._listing(folder)
+        if last in listing:
+            inside = os.path.join(folder, last)
+            if "__init__.py" in self._listing(inside):
+                return os.path.join(inside, "__init__.py")
+        if last + ".py" in listing:
+            return os.path.join(folder, last + ".py")
+        return None
+
+    def has_namespace_package(self, name: str, beside: str) -> bool:
+        """A folder without ``__init__.py`` but with Python files, as implicit packages are."""
+        for root in (beside, *self.roots):
+            folder = os.path.join(root, *name.split("."))
+            if any(entry.endswith(".py") for entry in self._listing(folder)):
+                return True
+        return False
+
+    def _listing(self, folder: str) -> frozenset[str]:
+        listing = self._listings.get(folder)
+        if listing is None:
+            try:
+                listing = frozenset(os.listdir(folder))
+            except OSError:
+                listing = frozenset()
+            self._listings[folder] = listing
+        return listing
+
+
+def _parse(path: str, name: str) -> SourceModule:
+    is_package = os.path.basename(path) == "__init__.py"
+    empty = ast.Module(body=[], type_ignores=[])
+    try:
+        data = Path(path).read_bytes()
+    except OSError as error:
+        return SourceModule(name, path, empty, "", is_package, f"cannot be read: {error.strerror}")
+    if len(data) > MAX_SOURCE_BYTES:
+        return SourceModule(name, path, empty, "", is_package, "is too large to be a program")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # invalid escapes in foreign sources
+            tree = ast.parse(data, path)
+    except SyntaxError as error:
+        why = f"is not valid Python 3: {error.msg}"
+        return SourceModule(name, path, empty, "", is_package, why, error.lineno or 0)
+    except (ValueError, RecursionError, MemoryError) as error:
+        return SourceModule(name, path, empty, "", is_package, f"cannot be parsed: {error}")
+    return SourceModule(name, path, tree, data.decode("utf-8", "replace"), is_package)

@@ -1,0 +1,244 @@
+"""Findings become ``NodeInterface`` values: names as templates, with certainty and file:line.
+
+Parameters stay symbolic, with what the code declares as their default; launch fills them in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
+from nodl.infer.text import Hole, Input, NodePart, Piece, Text
+from nodl.infer.values import Sequence, Unknown, Value
+from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
+from nodl.names import InvalidNameError, expand_name
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
+from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapKind, RemapRules, parse_rule
+
+MAX_ALTERNATIVES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Under which key launch starts the nodes of a run."""
+
+    package: str | None = None
+    executable: str | None = None
+    plugin: str | None = None
+
+
+def interfaces_of(findings: Findings, origin: Origin) -> list[NodeInterface]:
+    """One interface for each node (and each name it may have), in the order they were found."""
+    interfaces: list[NodeInterface] = []
+    for record in findings.nodes:
+        if record.created or record.endpoints:
+            interfaces.extend(_interfaces_of_node(record, findings, origin))
+    return interfaces
+
+
+def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) -> list[NodeInterface]:
+    rules, gaps = _rules(record, findings)
+    endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found, record)))
+    gaps.extend(Gap(source, why) for source, why in record.gaps)
+    names = _plain_texts(record.names) or [None]
+    if not record.created:
+        gaps.append(Gap(record.source, "the node that these interfaces belong to is not known"))
+    elif names == [None]:
+        gaps.append(Gap(record.source, "the name of this node is made at run time"))
+    interfaces = []
+    for name in names:
+        for namespace in _namespaces(record):
+            interface = NodeInterface(
+                package=origin.package,
+                executable=origin.executable,
+                plugin=origin.plugin,
+                name=name,
+                namespace=namespace,
+                endpoints=endpoints,
+                source=record.source,
+                library=ClientLibrary.RCLPY,
+                lifecycle=record.lifecycle and record.communication_interface,
+                parameters=tuple(sorted({*record.parameters, *record.assigned})),
+                gaps=tuple(dict.fromkeys(gaps)),
+            )
+            interfaces.append(remapped(interface, rules) if rules.ordered else interface)
+    return interfaces
+
+
+def _namespaces(record: NodeRecord) -> list[str | None]:
+    texts: list[str | None] = []
+    for atom in record.namespaces or (None,):
+        if atom is None or atom == "":
+            texts.append("/")
+        elif isinstance(atom, str):
+            texts.append(atom if atom.startswith("/") else "/" + atom)
+        else:
+            texts.extend("/" + text.lstrip("/") for text in _plain_texts((atom,)))
+    return list(dict.fromkeys(texts)) or [None]
+
+
+def _plain_texts(value: Value) -> list[str | None]:
+    """The texts of ``value`` with defaults filled in; what stays unknown is left out."""
+    texts: list[str | None] = []
+    for atom in value:
+        for template in templates(atom):
+            filled = template.fill({})
+            if filled.is_literal and isinstance(atom, str | Text):
+                texts.append(filled.text)
+    return list(dict.fromkeys(texts))
+
+
+# --- endpoints ----------------------------------------------------------------------------------------------
+
+
+def _endpoints(found: FoundEndpoint, record: NodeRecord) -> list[Endpoint]:
+    return [
+        Endpoint(found.kind, template, found.type, found.source, certainty_of(template))
+        for template in templates(found.name)
+    ]
+
+
+def certainty_of(template: NameTemplate) -> Certainty:
+    if template.is_literal:
+        return Certainty.EXACT
+    known = [part for part in template.parts if isinstance(part, str) and part.strip("/~")]
+    open_parts = [
+        part
+        for part in template.parts
+        if isinstance(part, UnknownPart) or (isinstance(part, ParameterPart) and part.default is None)
+    ]
+    if not open_parts:
+        return Certainty.FROM_DEFAULT
+    has_default = any(isinstance(part, ParameterPart) and part.default for part in template.parts)
+    return Certainty.PATTERN if known or has_default else Certainty.UNKNOWN
+
+
+def templates(name: object) -> list[NameTemplate]:
+    """The templates of one possible name: several when a parameter has several defaults."""
+    if isinstance(name, str):
+        return [NameTemplate.literal(name)]
+    if isinstance(name, Text):
+        results: list[tuple[Part, ...]] = [()]
+        for index, piece in enumerate(name.pieces):
+            choices = _parts(piece, first=index == 0)
+            results = [(*result, choice) for result in results for choice in choices]
+            if len(results) > MAX_ALTERNATIVES:
+                return [NameTemplate((UnknownPart("too many possible defaults"),))]
+        return [NameTemplate(_melted(result)) for result in results]
+    why = name.why if isinstance(name, Unknown) else "not a text"
+    return [NameTemplate((UnknownPart(why),))]
+
+
+def _melted(parts: Iterable[Part]) -> tuple[Part, ...]:
+    melted: list[Part] = []
+    for part in parts:
+        if isinstance(part, str) and melted and isinstance(melted[-1], str):
+            melted[-1] += part
+        else:
+            melted.append(part)
+    return tuple(melted)
+
+
+def _parts(piece: Piece, first: bool) -> list[Part]:
+    if isinstance(piece, str):
+        return [piece]
+    if isinstance(piece, Hole):
+        return [UnknownPart(piece.why)]
+    if isinstance(piece, NodePart):
+        if piece.what == "fqn":
+            return ["~" if first else "{ns}/{node}"]
+        return ["{node}" if piece.what == "name" else "{ns}"]
+    return _input_parts(piece)
+
+
+def _input_parts(piece: Input) -> list[Part]:
+    """The symbolic part once per default, and what the program itself sets the parameter to."""
+    assert isinstance(piece.owner, NodeRecord | OptionDefaults)
+    defaults = _default_texts(piece.owner.default(piece.name), piece.item)
+    parts: list[Part] = [
+        ParameterPart(piece.name, default, piece.item, piece.edits) for default in defaults or [None]
+    ]
+    if isinstance(piece.owner, NodeRecord) and piece.name in piece.owner.assigned:
+        for text in _default_texts(piece.owner.assigned[piece.name], piece.item):
+            only = ParameterPart(piece.name, text, None, piece.edits).texts({}) if text is not None else ()
+            parts.extend(only or [UnknownPart(f"the program sets parameter {piece.name} itself")])
+    return parts
+
+
+def _default_texts(value: Value, item: int | str | None) -> list[str | None]:
+    texts: list[str | None] = []
+    for atom in value:
+        if item is not None:
+            texts.extend(_default_items(atom, item))
+        elif isinstance(atom, str | int | float):
+            texts.append(str(atom))
+        elif isinstance(atom, Text):
+            texts.extend(_plain_texts((atom,)) or [None])
+        else:
+            texts.append(None)
+    return list(dict.fromkeys(texts))[:MAX_ALTERNATIVES]
+
+
+def _default_items(atom: object, item: int | str) -> list[str | None]:
+    exact = atom.items.exact if isinstance(atom, Sequence) else None
+    if exact is None:
+        return [None]
+    chosen = exact if item == "each" else exact[item : item + 1] if isinstance(item, int) and item >= 0 else ()
+    return [text for element in chosen for text in _default_texts(element, None)]
+
+
+# --- remapping in code --------------------------------------------------------------------------------------
+
+
+def _rules(record: NodeRecord, findings: Findings) -> tuple[RemapRules, list[Gap]]:
+    """Remap rules that the program itself gives to the node, or to all nodes with ``rclpy.init(args=...)``."""
+    gaps: list[Gap] = []
+    local = _parse_arguments(record.arguments, record, gaps)
+    everywhere: list[ParsedRule] = []
+    if record.use_global_arguments != (False,):
+        everywhere = _parse_arguments(findings.global_arguments, record, gaps)
+    return RemapRules(tuple(local), tuple(everywhere)), gaps
+
+
+def _parse_arguments(value: Value, record: NodeRecord, gaps: list[Gap]) -> list[ParsedRule]:
+    rules: list[ParsedRule] = []
+    for atom in value:
+        if not isinstance(atom, tuple):
+            gaps.append(Gap(record.source, "remap rules given in code are not known"))
+            continue
+        for index, word in enumerate(atom[:-1]):
+            if word in ("-r", "--remap"):
+                try:
+                    rules.append(parse_rule(str(atom[index + 1])))
+                except InvalidRemapRuleError as error:
+                    gaps.append(Gap(record.source, str(error)))
+    return rules
+
+
+def remapped(interface: NodeInterface, rules: RemapRules) -> NodeInterface:
+    """The interface under the rules that the program gives itself. Launch may still remap the result."""
+    name, namespace = interface.name, interface.namespace
+    if name is not None:
+        name = rules.node_name(name).name
+        if namespace is not None:
+            namespace = rules.namespace(namespace, name).name
+    endpoints = tuple(_remapped_endpoint(e, rules, name, namespace) for e in interface.endpoints)
+    return replace(interface, name=name, namespace=namespace, endpoints=endpoints)
+
+
+def _remapped_endpoint(
+    endpoint: Endpoint, rules: RemapRules, name: str | None, namespace: str | None
+) -> Endpoint:
+    if not endpoint.name.is_literal or name is None or namespace is None:
+        return endpoint
+    try:
+        full = expand_name(endpoint.name.text, namespace=namespace, node=name)
+        for rule in rules.names:
+            if rule.kind in (RemapKind.NODE_NAME, RemapKind.NAMESPACE) or rule.node not in (None, name):
+                continue
+            if expand_name(rule.match, namespace=namespace, node=name) == full:
+                return replace(endpoint, name=NameTemplate.literal(rule.replacement))
+    except InvalidNameError:
+        return endpoint
+    return endpoint

@@ -1,0 +1,163 @@
+"""The abstract store: every variable, field and element is a cell; writes leave a trail.
+
+The trail makes branches cheap: both sides run on the same cells, what each wrote is undone and then
+joined. Undone entries stay in the trail on purpose, so that ``join_seen`` can tell every value that a cell
+held since a mark; that is the state an exception handler, or the end of a function with early returns,
+may meet. ``stamp`` names the state: equal stamps, equal contents.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Sequence
+
+from nodl.infer.values import ABSENT, BOTTOM, Cells, FieldCells, HeapObject, Value, contains, join, widen
+
+Alternative = Callable[[], bool]  # runs one branch; tells whether its end can be reached
+Written = dict[tuple[int, object], tuple[Cells, object, Value]]  # by cell: its value at the end of a branch
+
+
+class State:
+    def __init__(self) -> None:
+        self._trail: list[tuple[Cells, object, Value | None]] = []
+        self._stamps = itertools.count(1)
+        self.stamp = 0
+        self.depth = 0  # how many branches or loops surround the current point
+
+    def write(self, cells: Cells, key: object, value: Value, *, local: bool = False) -> None:
+        """Strong update. ``local``: only the running function can see the cell (no new stamp)."""
+        old = cells.get(key)
+        if old is value or (old is not None and _same(old, value)):
+            return
+        self._trail.append((cells, key, old))
+        cells[key] = value
+        if not local:
+            self.stamp = next(self._stamps)
+
+    def store(self, obj: HeapObject, key: object, value: Value) -> None:
+        """Write to an object: strong if it is one concrete object, else weak."""
+        if obj.summary:
+            value = join(obj.cells.get(key, BOTTOM), value)
+        self.write(obj.cells, key, value)
+
+    def forget(self) -> None:
+        """Drop the trail; only between top-level steps, when nobody holds a mark."""
+        self._trail.clear()
+
+    def mark(self) -> int:
+        return len(self._trail)
+
+    def unchanged_since(self, mark: int) -> bool:
+        return len(self._trail) == mark
+
+    def branches(self, alternatives: Sequence[Alternative]) -> bool:
+        """Run each alternative from the present state and join what they leave. False: none falls through."""
+        outcomes = self._run_each(alternatives)
+        if outcomes:
+            self._merge(outcomes)
+        return bool(outcomes)
+
+    def maybe(self, action: Alternative) -> None:
+        """Run ``action`` as something that may happen or not."""
+        self.branches((action, lambda: True))
+
+    def repeatedly(self, action: Alternative, widen_texts: bool) -> None:
+        """``maybe`` as one step towards a fixpoint: what keeps growing is widened."""
+        for outcome in self._run_each((action,)):
+            for cells, key, value in outcome.values():
+                before = cells.get(key)
+                if before is None:
+                    self.write(cells, key, join(_absent(cells), value))
+                else:
+                    self.write(cells, key, widen(before, value, widen_texts))
+
+    def _run_each(self, alternatives: Sequence[Alternative]) -> list[Written]:
+        stamp = self.stamp
+        outcomes: list[Written] = []
+        self.depth += 1
+        for alternative in alternatives:
+            mark = len(self._trail)
+            if alternative():
+                outcomes.append(self._written(mark))
+            self._undo(mark)
+            self.stamp = stamp
+        self.depth -= 1
+        return outcomes
+
+    def join_seen(self, mark: int, own: Cells | None = None) -> None:
+        """Give each cell written since ``mark`` (except in ``own``) every value it held since then."""
+        seen: Written = {}
+        for cells, key, old in self._trail[mark:]:
+            if cells is own:
+                continue
+            place = (id(cells), key)
+            entry = seen.get(place)
+            if entry is None:
+                entry = (cells, key, cells.get(key, BOTTOM))
+            entry = (cells, key, join(entry[2], _absent(cells) if old is None else old))
+            seen[place] = entry
+        for cells, key, value in seen.values():
+            if value:
+                self.write(cells, key, value)
+
+    def join_head(self, mark: int, widen_texts: bool) -> bool:
+        """End of one turn of a loop: join with the state at ``mark``. True: nothing new, a fixpoint."""
+        stable = True
+        first: dict[tuple[int, object], tuple[Cells, object, Value | None]] = {}
+        for cells, key, old in self._trail[mark:]:
+            first.setdefault((id(cells), key), (cells, key, old))
+        for cells, key, old in first.values():
+            current = cells.get(key)
+            if current is None:
+                current = BOTTOM
+            if old is None:
+                stable = stable and not current
+                if type(cells) is FieldCells:
+                    self.write(cells, key, join(current, ABSENT))
+                continue
+            joined = widen(old, current, widen_texts)
+            if joined is not old and joined != old:
+                stable = False
+            self.write(cells, key, joined)
+        return stable
+
+    def _written(self, mark: int) -> Written:
+        return {
+            (id(cells), key): (cells, key, cells[key])
+            for cells, key, _ in self._trail[mark:]
+            if key in cells
+        }
+
+    def _undo(self, mark: int) -> None:
+        for cells, key, old in reversed(self._trail[mark:]):
+            if old is None:
+                cells.pop(key, None)
+            else:
+                cells[key] = old
+
+    def _merge(self, outcomes: list[Written]) -> None:
+        places = outcomes[0] if len(outcomes) == 1 else {k: v for found in outcomes for k, v in found.items()}
+        for place, (cells, key, _) in places.items():
+            before = cells.get(key)
+            if before is None:
+                before = _absent(cells)
+            partial = any(place not in outcome for outcome in outcomes)
+            value: Value = before if partial else BOTTOM
+            for outcome in outcomes:
+                if place in outcome:
+                    value = join(value, outcome[place][2])
+            self.write(cells, key, value)
+
+
+def _same(old: Value, new: Value) -> bool:
+    """Equal as sets of atoms."""
+    if len(old) != len(new):
+        return False
+    if len(new) == 1:
+        return type(old[0]) is type(new[0]) and old[0] == new[0]
+    return all(contains(old, atom) for atom in new)
+
+
+def _absent(cells: Cells) -> Value:
+    """What a cell that was never written holds: a field may then be found in the class."""
+    return ABSENT if type(cells) is FieldCells else BOTTOM

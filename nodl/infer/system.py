@@ -1,0 +1,98 @@
+"""Files and folders in, all their nodes out: what every Python program among them would create."""
+
+from __future__ import annotations
+
+import gc
+import os
+import re
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+from nodl.infer.analysis import analyse_rest, start
+from nodl.infer.interpreter.run import Run
+from nodl.infer.packages import EntryPoint, Package, find_package
+from nodl.infer.program import Program
+from nodl.infer.results import Origin, interfaces_of
+from nodl.node_interface import Gap, NodeInterface
+
+_SKIPPED_FOLDERS = frozenset({"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"})
+_NOT_PROGRAMS = re.compile(r"(?:setup|conf|conftest)\.py\Z|.*launch\.py\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class InferredSystem:
+    """``gaps`` belong to no single node; each node carries its own."""
+
+    nodes: tuple[NodeInterface, ...]
+    gaps: tuple[Gap, ...]
+    files: tuple[str, ...]
+
+
+def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
+    """All nodes that the Python files in ``paths`` (files, or folders with everything below) may create.
+
+    Raises ``FileNotFoundError`` for a path that does not exist. A file that cannot be parsed is a gap.
+    """
+    files = list(dict.fromkeys(file for path in paths for file in _python_files(Path(path))))
+    program = Program()
+    for file in files:
+        program.add_root(program.top_folder(file))
+    with _without_collector():
+        runs = [(run, origin) for file in files for run, origin in _runs(program, file)]
+        called = {node for run, _ in runs for node in run.called}
+        instantiated = {node for run, _ in runs for node in run.instantiated}
+        for run, _ in runs:
+            analyse_rest(run, called, instantiated)
+        nodes = [node for run, origin in runs for node in interfaces_of(run.findings, origin)]
+    gaps = dict.fromkeys(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)
+    return InferredSystem(_distinct(nodes), tuple(gaps), tuple(files))
+
+
+def _distinct(nodes: list[NodeInterface]) -> tuple[NodeInterface, ...]:
+    """A node found twice through different files of one program counts once."""
+    return tuple(dict.fromkeys(nodes))
+
+
+def _runs(program: Program, file: str) -> Iterator[tuple[Run, Origin]]:
+    module = program.load(file)
+    package = find_package(file)
+    entries = package.entry_points_of(module.name) if package else []
+    functions = [entry.function for entry in entries]
+    origin = Origin(package.name if package else None, _executable(entries, file, package))
+    yield start(program, module, functions), origin
+
+
+def _executable(entries: list[EntryPoint], file: str, package: Package | None) -> str | None:
+    if entries:
+        return entries[0].executable
+    name = os.path.basename(file)
+    return name if package is not None and name in package.installed_programs else None
+
+
+def _python_files(path: Path) -> Iterator[str]:
+    if path.is_file():
+        yield os.path.abspath(path)
+        return
+    if not path.is_dir():
+        raise FileNotFoundError(f"no such file or folder: {path}")
+    for folder, folders, names in os.walk(path):
+        folders[:] = sorted(f for f in folders if f not in _SKIPPED_FOLDERS and not f.startswith("."))
+        for name in sorted(names):
+            if name.endswith(".py") and not _NOT_PROGRAMS.match(name):
+                yield os.path.abspath(os.path.join(folder, name))
+
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """Analysis makes many small objects that stay alive to its end; looking for garbage finds none."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+

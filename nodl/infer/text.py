@@ -1,0 +1,160 @@
+"""The string domain: text known in part.
+
+A ``Text`` is a sequence of literal pieces, inputs (a ROS parameter, a command line option, an environment
+variable), the node's own name, and holes. Fully known text is a plain ``str``; many texts widen to their
+common prefix and suffix around a hole; a text that is only a hole says no more than unknown.
+"""
+
+from __future__ import annotations
+
+import os.path
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+MAX_PARTS = 24
+MAX_PRODUCT = 64
+
+# str methods that are applied later, when an input's value is known.
+DEFERRED_METHODS = frozenset(
+    {"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"}
+)
+
+Edit = tuple[str, tuple[str, ...]]
+
+
+class InputOwner(Protocol):
+    """Who knows the defaults of an input: a node for its parameters, a parser for its options."""
+
+
+@dataclass(frozen=True, slots=True)
+class Input:
+    """The value of a named input of the program. ``item``: an index, or ``"each"`` element of a list."""
+
+    name: str
+    owner: object
+    item: int | str | None = None
+    edits: tuple[Edit, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class NodePart:
+    """The node's ``name``, ``namespace`` or ``fqn`` (fully qualified name), whatever launch makes of it."""
+
+    what: str
+
+
+@dataclass(frozen=True, slots=True)
+class Hole:
+    why: str
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Hole)
+
+    def __hash__(self) -> int:
+        return 7
+
+
+Piece = str | Input | NodePart | Hole
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    pieces: tuple[Piece, ...]
+
+    @property
+    def is_hole(self) -> bool:
+        return len(self.pieces) == 1 and isinstance(self.pieces[0], Hole)
+
+
+TextAtom = str | Text
+
+
+def text_of(pieces: Iterable[Piece]) -> TextAtom:
+    """The text made of ``pieces``; neighbouring literals and holes melt together."""
+    merged: list[Piece] = []
+    for piece in pieces:
+        if piece == "":
+            continue
+        last = merged[-1] if merged else None
+        if isinstance(piece, str) and isinstance(last, str):
+            merged[-1] = last + piece
+        elif not (isinstance(piece, Hole) and isinstance(last, Hole)):
+            merged.append(piece)
+    if not merged:
+        return ""
+    if len(merged) == 1 and isinstance(merged[0], str):
+        return merged[0]
+    if len(merged) > MAX_PARTS:
+        merged = [merged[0], Hole("a very long text"), merged[-1]]
+    return Text(tuple(merged))
+
+
+def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
+    return (text,) if isinstance(text, str) else text.pieces
+
+
+def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
+    if isinstance(left, str) and isinstance(right, str):
+        return left + right
+    return text_of((*pieces_of(left), *pieces_of(right)))
+
+
+def concatenations(operands: Sequence[Sequence[TextAtom]]) -> list[TextAtom]:
+    """All texts made of one alternative of each operand; a pattern when there are too many."""
+    results: list[TextAtom] = [""]
+    for alternatives in operands:
+        if len(results) * len(alternatives) > MAX_PRODUCT:
+            alternatives = [common_text(alternatives, "too many possible texts")]
+        if len(results) * len(alternatives) > MAX_PRODUCT:
+            results = [common_text(results, "too many possible texts")]
+        results = list(dict.fromkeys(concatenate(head, tail) for head in results for tail in alternatives))
+    return results
+
+
+def common_text(texts: Sequence[TextAtom], why: str) -> Text:
+    """The common literal prefix and suffix of ``texts`` around a hole."""
+    heads = [_literal_end(text, 0) for text in texts]
+    tails = [_literal_end(text, -1)[::-1] for text in texts]
+    prefix = os.path.commonprefix(heads)
+    shortest = min((len(text) for text in texts if isinstance(text, str)), default=len(prefix) + 1_000)
+    suffix = os.path.commonprefix(tails)[: max(0, shortest - len(prefix))][::-1]
+    text = text_of((prefix, Hole(why), suffix))
+    assert isinstance(text, Text)
+    return text
+
+
+def _literal_end(text: TextAtom, index: int) -> str:
+    piece = pieces_of(text)[index] if text else ""
+    return piece if isinstance(piece, str) else ""
+
+
+def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
+    """``text.method(*arguments)`` where it can be said symbolically, else ``None``."""
+    if method not in DEFERRED_METHODS:
+        return None
+    pieces = text.pieces
+    if len(pieces) == 1:
+        return _edited_input(pieces[0], method, arguments)
+    first, last = pieces[0], pieces[-1]
+    if method in ("lstrip", "strip") and isinstance(first, str):
+        first = first.lstrip(*arguments)
+        if not first:
+            return None
+    elif method in ("lstrip", "strip"):
+        return None
+    if method in ("rstrip", "strip") and isinstance(last, str):
+        last = last.rstrip(*arguments)
+        if not last:
+            return None
+    elif method in ("rstrip", "strip"):
+        return None
+    if method in ("lstrip", "rstrip", "strip"):
+        return text_of((first, *pieces[1:-1], last))
+    return None
+
+
+def _edited_input(piece: Piece, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
+    if isinstance(piece, Input) and len(piece.edits) < 6:
+        return Text((Input(piece.name, piece.owner, piece.item, (*piece.edits, (method, arguments))),))
+    return None

@@ -1,0 +1,369 @@
+"""The abstract values of the analysis: what an expression of the analysed program may denote.
+
+A ``Value`` is a tuple of atoms, read as "one of these". Python constants (``str``, ``int``, ``None`` ...)
+stand for themselves, ``Text`` is a string known in part, ``Unknown`` is anything, the rest are the
+things a program handles: modules, functions, classes, instances, containers, names of foreign libraries.
+Heap objects keep their contents in ``cells``; only ``state.State`` writes there.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from nodl.infer.text import Text, common_text
+
+if TYPE_CHECKING:
+    from nodl.infer.findings import NodeRecord
+    from nodl.infer.program import SourceModule
+
+Value: TypeAlias = tuple[object, ...]
+Cells: TypeAlias = dict[object, Value]
+
+# More different strings than this in one value become a pattern; more objects become unknown.
+MAX_STRINGS = 48
+MAX_ATOMS = 96
+
+NONE: Value = (None,)
+BOTTOM: Value = ()
+
+
+class Unknown:
+    """Anything; ``why`` tells the reader what the analysis would have had to know."""
+
+    __slots__ = ("why",)
+
+    def __init__(self, why: str):
+        self.why = why
+
+    def __repr__(self) -> str:
+        return f"Unknown({self.why!r})"
+
+
+_unknowns: dict[str, Value] = {}
+
+
+def unknown(why: str) -> Value:
+    """The value "anything", one shared object per reason."""
+    value = _unknowns.get(why)
+    if value is None:
+        value = _unknowns[why] = (Unknown(why),)
+    return value
+
+
+ANY: Value = unknown("a value that the program computes")
+BOOLEAN: Value = (True, False)
+
+
+class Absent:
+    """In a field: it may not have been set, so that the class is asked."""
+
+
+ABSENT: Value = (Absent(),)
+
+
+class FieldCells(dict[object, Value]):
+    """The cells of an instance; the state notes when one may be absent."""
+
+
+class External:
+    """Something of a library that is not analysed, by its dotted path: ``rclpy.node.Node``."""
+
+    __slots__ = ("path",)
+
+    def __init__(self, path: str):
+        self.path = path
+
+    def __repr__(self) -> str:
+        return f"External({self.path})"
+
+
+_externals: dict[str, Value] = {}
+
+
+def external(path: str) -> Value:
+    value = _externals.get(path)
+    if value is None:
+        value = _externals[path] = (External(path),)
+    return value
+
+
+class HeapObject:
+    """An object with mutable contents. A ``summary`` stands for several concrete ones (weak updates)."""
+
+    __slots__ = ("cells", "escaped", "summary")
+
+    def __init__(self) -> None:
+        self.cells: Cells = {}
+        self.summary = False
+        self.escaped = False
+
+
+class Items:
+    """The contents of a sequence: each element if the length is known, else what any element may be."""
+
+    __slots__ = ("exact", "rest")
+
+    def __init__(self, exact: tuple[Value, ...] | None, rest: Value = BOTTOM):
+        self.exact = exact
+        self.rest = rest
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Items) and self.exact == other.exact and self.rest == other.rest
+
+    def __hash__(self) -> int:
+        return hash((self.exact, self.rest))
+
+    def any_element(self) -> Value:
+        return self.rest if self.exact is None else join_all(self.exact)
+
+
+ITEMS = "[items]"  # the cell of a sequence that holds its Items
+OTHER = "[other]"  # the cell of a dictionary for keys that are not constants
+OTHER_KEYS = "[keys]"
+
+
+class Sequence(HeapObject):
+    """A list, tuple or set."""
+
+    __slots__ = ("kind",)
+
+    def __init__(self, kind: str, items: Items):
+        super().__init__()
+        self.kind = kind
+        self.cells[ITEMS] = (items,)
+
+    @property
+    def items(self) -> Items:
+        items = self.cells[ITEMS][0]
+        assert isinstance(items, Items)
+        return items
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """The cell of a dictionary under a constant key."""
+
+    constant: object
+
+
+class Dictionary(HeapObject):
+    __slots__ = ("default",)
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.default: Value = BOTTOM  # defaultdict's factory
+
+
+class ModuleValue(HeapObject):
+    __slots__ = ("source", "stars")
+
+    def __init__(self, source: SourceModule):
+        super().__init__()
+        self.source = source
+        self.stars: list[str] = []  # foreign modules whose names were imported with *
+
+
+class FunctionValue:
+    """A function with what it closes over. ``owner`` is the class whose body defines it."""
+
+    __slots__ = ("closure", "context_manager", "defaults", "kw_defaults", "module", "name", "node", "owner")
+
+    def __init__(
+        self,
+        node: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda,
+        name: str,
+        module: ModuleValue,
+        closure: object,
+        owner: ClassValue | None,
+    ):
+        self.node = node
+        self.name = name
+        self.module = module
+        self.closure = closure
+        self.owner = owner
+        self.defaults: tuple[Value, ...] = ()
+        self.kw_defaults: tuple[Value | None, ...] = ()
+        self.context_manager = False
+
+
+class ClassValue(HeapObject):
+    __slots__ = ("bases", "fields", "linear", "module", "name", "node")
+
+    def __init__(self, node: ast.ClassDef, name: str, module: ModuleValue, bases: Value):
+        super().__init__()
+        self.node = node
+        self.name = name
+        self.module = module
+        self.bases = bases
+        self.linear: tuple[object, ...] | None = None  # method resolution order, made on first use
+        self.fields: list[tuple[str, Value | None]] | None = None  # of a dataclass
+
+
+class Instance(HeapObject):
+    """An object of an analysed class, or of a modelled foreign class (``cls`` is then its ``External``)."""
+
+    __slots__ = ("cls", "node", "site")
+
+    def __init__(self, cls: ClassValue | External, site: tuple[str, int]):
+        super().__init__()
+        self.cells = FieldCells()
+        self.cls = cls
+        self.node: NodeRecord | None = None
+        self.site = site
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BoundMethod:
+    function: FunctionValue
+    receiver: object
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, BoundMethod)
+            and other.function is self.function
+            and other.receiver is self.receiver
+        )
+
+    def __hash__(self) -> int:
+        return hash((id(self.function), id(self.receiver)))
+
+
+@dataclass(frozen=True, slots=True)
+class NativeMethod:
+    """Attribute ``name`` of a string, container or modelled object."""
+
+    receiver: object
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignMethod:
+    """Method ``name`` that ``receiver`` inherits from the foreign class ``path``."""
+
+    path: str
+    receiver: object
+    name: str
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    function: Value
+    positional: tuple[Value, ...]
+    keywords: tuple[tuple[str, Value], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SuperProxy:
+    """``super()`` inside a method of ``owner`` for object ``receiver``."""
+
+    owner: ClassValue
+    receiver: object
+
+
+@dataclass(frozen=True, slots=True)
+class PropertyValue:
+    getter: Value
+
+
+@dataclass(frozen=True, slots=True)
+class ClassMethod:
+    function: Value
+    static: bool
+
+
+def join(left: Value, right: Value) -> Value:
+    """What may be ``left`` or ``right``. Returns ``left`` itself when ``right`` adds nothing."""
+    if left is right or not right:
+        return left
+    if not left:
+        return right
+    added = [atom for atom in right if not contains(left, atom)]
+    if not added:
+        return left
+    return _limited((*left, *added))
+
+
+def join_all(values: Iterable[Value]) -> Value:
+    result: Value = BOTTOM
+    for value in values:
+        result = join(result, value)
+    return result
+
+
+def contains(value: Value, atom: object) -> bool:
+    kind = type(atom)
+    if kind is str:
+        return atom in value
+    if kind is Unknown:
+        return any(type(other) is Unknown for other in value)
+    if kind is Items:
+        return any(other == atom for other in value)
+    return any(other is atom or (type(other) is kind and other == atom) for other in value)
+
+
+def _limited(value: Value) -> Value:
+    items = [atom for atom in value if type(atom) is Items]
+    if items:
+        return (_join_items(items),)
+    if len(value) <= MAX_STRINGS:
+        return value
+    texts = [atom for atom in value if isinstance(atom, str | Text)]
+    others = tuple(atom for atom in value if not isinstance(atom, str | Text))
+    if len(texts) > MAX_STRINGS:
+        return (*others, widened_texts(texts))
+    if len(value) > MAX_ATOMS:
+        return unknown("too many possible values")
+    return value
+
+
+def widened_texts(texts: list[str | Text]) -> object:
+    text = common_text(texts, "too many possible names")
+    return text if not text.is_hole else unknown("too many possible names")[0]
+
+
+def _join_items(items: list[Items]) -> Items:
+    joined = items[0]
+    for other in items[1:]:
+        exact = joined.exact
+        if exact is not None and other.exact is not None and len(exact) == len(other.exact):
+            joined = Items(tuple(join(a, b) for a, b in zip(exact, other.exact, strict=True)))
+        else:
+            joined = Items(None, join(joined.any_element(), other.any_element()))
+    return joined
+
+
+def widen(old: Value, new: Value, texts_too: bool) -> Value:
+    """``join`` for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
+    joined = join(old, new)
+    if joined is old:
+        return old
+    kept: list[object] = []
+    texts: list[str | Text] = []
+    for atom in joined:
+        if type(atom) in (int, float) and not contains(old, atom):
+            return (*kept, *(a for a in joined if not isinstance(a, int | float)), *ANY) if old else joined
+        if isinstance(atom, str | Text):
+            texts.append(atom)
+        else:
+            kept.append(atom)
+    if texts_too and len(texts) > 1 and any(not contains(old, text) for text in texts):
+        return (*kept, widened_texts(texts))
+    if texts_too and len(kept) == 1 and isinstance(kept[0], Items) and kept[0].exact is not None:
+        return (Items(None, kept[0].any_element()),)
+    return joined
+
+
+def without_unknown(value: Value) -> Value:
+    return tuple(atom for atom in value if type(atom) is not Unknown)
+
+
+def constant_strings(value: Value) -> list[str]:
+    return [atom for atom in value if isinstance(atom, str)]
+
+
+def sole(value: Value | None) -> object:
+    """The single atom of ``value``, or ``Unknown`` when there is not exactly one."""
+    return value[0] if value is not None and len(value) == 1 else ANY[0]
