@@ -122,7 +122,7 @@ def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) ->
     from cryptography import x509
 
     if not name or len(name) > 64 or any(char in name for char in ',+"\\=/|<>;#\0'):
-        raise InvalidInput("a CA name has 1 to 64 characters and none of , + \" \\ = / | < > ; #")
+        raise InvalidInput('a CA name has 1 to 64 characters and none of , + " \\ = / | < > ; #')
     subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
     builder = (
         _builder(subject, subject, validity, signer.public_key())

@@ -37,7 +37,7 @@ class ImportedCa:
 
 @dataclass(frozen=True, slots=True)
 class CreateOptions:
-    """``ca_lifetime`` and ``lifetime`` (of enclaves) start at ``now``; ``names`` are the CAs' common names."""
+    """``ca_lifetime``, ``lifetime`` (of enclaves) start at ``now``; ``names`` are the CAs' common names."""
 
     domains: Domains = field(default_factory=lambda: Domains.single(0))
     governance: Governance | None = None
@@ -86,7 +86,7 @@ def _refuse_foreign(root: Path) -> None:
     view = KeystoreView(root)
     if not view.is_complete and not view.can_be_completed:
         raise NotAKeystore(
-            f"{printable(root)} exists and is no keystore (it has other files); choose an empty or new directory"
+            f"{printable(root)} exists and is no keystore; choose an empty or new directory"
         )
 
 
@@ -170,7 +170,11 @@ def _make_ca(
         return authority.self_signed_ca(role, name, signer, validity), present.rpartition("/")[2], reference
     fresh = authority.new_key(options.curve)
     made = authority.self_signed_ca(role, name, fresh, validity)
-    return made, layout.KEY, authority.key_pem(fresh, passphrase_for_new_keys(options.encrypt_ca_keys, options.access))
+    return (
+        made,
+        layout.KEY,
+        authority.key_pem(fresh, passphrase_for_new_keys(options.encrypt_ca_keys, options.access)),
+    )
 
 
 def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
@@ -179,9 +183,7 @@ def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
     return access.passphrase if encrypt else None
 
 
-def _import_ca(
-    role: Role, options: CreateOptions, warnings: list[str]
-) -> tuple[Authority, str, bytes]:
+def _import_ca(role: Role, options: CreateOptions, warnings: list[str]) -> tuple[Authority, str, bytes]:
     source = options.imported[role]
     reference = _read_given(source.key)
     signer = open_signer(reference, printable(source.key), options.access)
@@ -246,7 +248,11 @@ def install_incoming(opened: Store) -> None:
         cert = safe_files.read_if_there(opened.root, f"{waiting}/{layout.CERT}")
         if cert is not None:
             _install(opened, role, waiting, cert)
-        for name in (layout.CERT, layout.KEY, "key.p11"):  # the certificate first: without it nothing is installed
+        for name in (
+            layout.CERT,
+            layout.KEY,
+            "key.p11",
+        ):  # the certificate first: without it nothing is installed
             opened.remove(f"{waiting}/{name}")
         opened.remove_empty_directory(waiting)
     opened.remove_empty_directory(layout.INCOMING)
@@ -256,7 +262,9 @@ def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
     pem = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY}")
     uri = safe_files.read_if_there(opened.root, f"{waiting}/key.p11")
     if pem is None and uri is None:
-        raise DamagedKeystore(f"{printable(opened.root / waiting)} holds a certificate without key; remove it")
+        raise DamagedKeystore(
+            f"{printable(opened.root / waiting)} holds a certificate without key; remove it"
+        )
     name, stale = layout.ca_key(role), layout.ca_key_uri(role)
     if pem is None:
         name, stale = stale, name

@@ -1,8 +1,8 @@
 """One enclave on disk against what it should be: what is missing, stale or wrong, by cheap means. Reads only.
 
-This is the warm path of every launch: no ``cryptography``, no XML parser, about ten system calls an enclave. It
-compares bytes, dates, modes and links; it does not check signatures, which DDS does at start and
-``keystore.verify`` on request.
+This is the warm path of every launch: no ``cryptography``, no XML parser, about ten system calls an
+enclave. It compares bytes, dates, modes and links; it does not check signatures, which DDS does at start
+and ``keystore.verify`` on request.
 """
 
 from __future__ import annotations
@@ -25,7 +25,10 @@ from keystore.validity import Validity
 from keystore.view import KeystoreView
 
 PermissionsSource = Callable[[str, Validity], "bytes | None"]
-"""(subject name, validity of the certificate) -> the document the enclave should have; None: keep what it has."""
+"""(subject name, validity of the certificate) -> the document it should have; None: keep what it has."""
+
+
+NEW = "new enclave"
 
 
 class Identity(Enum):
@@ -71,9 +74,13 @@ def inspect(
     identity, facts = _identity(view, enclave, directory, now, due, reasons)
     if lax:
         reasons.append("the private key was readable by others")
-    permissions = identity is not Identity.GOOD or not _permissions_stand(view, directory, facts, wanted, reasons)
-    links = tuple(name for name in _wanted_links(view, enclave) if not _link_stands(view, enclave, directory, name))
-    if links:
+    permissions = identity is not Identity.GOOD or not _permissions_stand(
+        view, directory, facts, wanted, reasons
+    )
+    links = tuple(
+        name for name in _wanted_links(view, enclave) if not _link_stands(view, enclave, directory, name)
+    )
+    if links and reasons != [NEW]:
         reasons.append(f"{', '.join(links)} missing or out of step")
     return EnclaveState(enclave, identity, facts, permissions, links, lax is True, tuple(reasons))
 
@@ -84,7 +91,9 @@ def _refuse_link(view: KeystoreView, directory: str) -> None:
         path = f"{path}/{part}"
         try:
             if stat.S_ISLNK(os.lstat(path).st_mode):
-                raise UnsafeKeystore(f"{path!r} is a link; an enclave must be a real directory. Remove it: rm {path}")
+                raise UnsafeKeystore(
+                    f"{path!r} is a link; an enclave must be a real directory. Remove it: rm {path}"
+                )
         except FileNotFoundError:
             return
 
@@ -110,9 +119,11 @@ def _identity(
     cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
     facts = _facts(cert)
     if key is None:
-        reasons.append("no private key" if cert is not None else "new enclave")
+        reasons.append("no private key" if cert is not None else NEW)
         return Identity.PAIR, facts
-    problem = _certificate_problem(view, enclave, key, facts, now, due) if cert is not None else "no certificate"
+    problem = (
+        _certificate_problem(view, enclave, key, facts, now, due) if cert is not None else "no certificate"
+    )
     if problem is None:
         return Identity.GOOD, facts
     reasons.append(problem)

@@ -12,6 +12,7 @@ from keystore.certificate import CertificateFacts
 from keystore.creation import sign_document
 from keystore.enclave_state import EnclaveState, Identity, PermissionsSource
 from keystore.errors import DamagedKeystore, InvalidInput, KeystoreError, printable
+from keystore.governance_file import governance_domains
 from keystore.identity import certify, new_identity, public_half
 from keystore.permissions import permissions_document
 from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
@@ -56,7 +57,9 @@ class EnclaveWriter:
         asked = Validity.starting(self._now, lifetime, until=options.valid_until, backdate=options.backdate)
         validity = asked.within(self._identity_ca.validity).within(self._view.ca(Role.PERMISSIONS).validity)
         if not validity.covers(self._now):
-            raise DamagedKeystore("a CA of this keystore is expired: secure-keystore renew KEYSTORE --ca start")
+            raise DamagedKeystore(
+                "a CA of this keystore is expired: secure-keystore renew KEYSTORE --ca start"
+            )
         return validity
 
     @property
@@ -73,8 +76,8 @@ class EnclaveWriter:
         pairs = [pair for pair in borrowable(names) if fresh & set(pair)]
         if pairs:
             raise InvalidInput(
-                f"with compatible subjects, on Cyclone DDS {cannot_be_told_apart(pairs)}; use exact subjects, "
-                "rename the enclaves, or accept it with --allow-subject-overlap"
+                f"with compatible subjects, on Cyclone DDS {cannot_be_told_apart(pairs)}; use exact "
+                "subjects, rename the enclaves, or accept it with --allow-subject-overlap"
             )
 
     def _present_name(self, enclave: str) -> str:
@@ -86,8 +89,8 @@ class EnclaveWriter:
         return (facts.common_name if facts else None) or common_name(enclave, self._scheme)
 
     def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> tuple[str, ...]:
-        """Add the enclave's missing files; returns what was done. Order: key, certificate, links, permissions,
-        so that a process never finds permissions without an identity."""
+        """Add the enclave's missing files; returns what was done. Order: key, certificate, links,
+        permissions, so that a process never finds permissions without an identity."""
         entries: dict[str, Content | Link] = {}
         actions: list[str] = []
         facts = self._identity(state, entries, actions)
@@ -98,7 +101,9 @@ class EnclaveWriter:
             self._permissions(state, facts, permissions, entries)
         self._name_actions(state, actions)
         if state.lax_key and layout.KEY not in entries:
-            self._opened.set_mode(f"{layout.enclave_directory(state.enclave)}/{layout.KEY}", store.PRIVATE_MODE)
+            self._opened.set_mode(
+                f"{layout.enclave_directory(state.enclave)}/{layout.KEY}", store.PRIVATE_MODE
+            )
         if entries:
             batch.directory(layout.enclave_directory(state.enclave), entries)
         return tuple(actions)
@@ -145,8 +150,8 @@ class EnclaveWriter:
         signed = sign_document(document, self._permissions_ca, self._now)
         if len(signed) >= WARN_BYTES:
             self.warnings.append(
-                f"the permissions of enclave {state.enclave} take {len(signed)} bytes; Fast DDS carries at most "
-                f"{FAST_DDS_LIMIT_BYTES}, beyond that its peers never match: split the enclave"
+                f"the permissions of enclave {state.enclave} take {len(signed)} bytes; Fast DDS carries "
+                f"at most {FAST_DDS_LIMIT_BYTES}, beyond that its peers never match: split the enclave"
             )
         entries[layout.PERMISSIONS_XML] = Content(document)
         entries[layout.PERMISSIONS] = Content(signed)
@@ -159,12 +164,18 @@ class EnclaveWriter:
         if safe_files.read_if_there(self._view.root, relative) is None:
             nothing = EnclavePolicy(state.enclave, ())
             return permissions_document(
-                subject, nothing, validity=validity, domains=self._options.domains, rmw=self._options.rmw
+                subject,
+                nothing,
+                validity=validity,
+                domains=governance_domains(self._view),
+                rmw=self._options.rmw,
             )
         old = state.facts.common_name if state.facts else None
         try:
             document = trusted_document(self._view, relative)
-            return redated(document, subject_name(old or state.enclave), subject, validity, printable(relative))
+            return redated(
+                document, subject_name(old or state.enclave), subject, validity, printable(relative)
+            )
         except KeystoreError as error:
             raise DamagedKeystore(
                 f"{error}. What it may do is not known then: give it with secure-keystore apply-policy"

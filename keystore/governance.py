@@ -2,8 +2,8 @@
 
     Governance (plain values) <-> governance.xml        YAML is ``keystore.governance_yaml``
 
-It must be identical everywhere in a domain: participants whose protection kinds differ do not talk, without an
-error. Defaults are SROS2's. Element order is the schema's, which Fast DDS insists on.
+It must be identical everywhere in a domain: participants whose protection kinds differ do not talk,
+without an error. Defaults are SROS2's. Element order is the schema's, which Fast DDS insists on.
 """
 
 from __future__ import annotations
@@ -89,11 +89,8 @@ class Governance:
         """SROS2's default for these domains."""
         return cls((DomainRule(domains=domains),))
 
-    def covers(self, domains: Domains) -> bool:
-        """Whether every one of ``domains`` has a rule; without one Cyclone DDS refuses the participant."""
-        return _covered(self.domains(), domains)
-
     def domains(self) -> Domains:
+        """All domains with a rule; in any other Cyclone DDS refuses the participant."""
         return Domains(tuple(part for rule in self.domain_rules for part in rule.domains.ranges))
 
     def extended_to(self, domains: Domains) -> Governance:
@@ -108,7 +105,8 @@ class Governance:
         return Governance((replace(rule, domains=both),))
 
 
-def _covered(outer: Domains, inner: Domains) -> bool:
+def covers(outer: Domains, inner: Domains) -> bool:
+    """Whether ``outer`` has every domain of ``inner``."""
     return all(any(a <= first and last <= b for a, b in outer.ranges) for first, last in inner.ranges)
 
 
@@ -128,7 +126,9 @@ def governance_document(governance: Governance) -> bytes:
 def _domain_rule(rule: DomainRule) -> str:
     settings = "".join(_leaf(name, getattr(rule, name)) for name in _DOMAIN_LEAVES)
     topics = "".join(
-        "<topic_rule>\n" + "".join(_leaf(name, getattr(topic, name)) for name in _TOPIC_LEAVES) + "</topic_rule>\n"
+        "<topic_rule>\n"
+        + "".join(_leaf(name, getattr(topic, name)) for name in _TOPIC_LEAVES)
+        + "</topic_rule>\n"
         for topic in rule.topic_rules
     )
     return (

@@ -55,7 +55,9 @@ def _wait(descriptor: int, root: Path, timeout: float) -> None:
             if time.monotonic() >= deadline:
                 raise _busy(descriptor, root, timeout) from None
         except OSError as error:
-            raise StorageError.of(error, "locking the keystore (does its file system support flock?)") from None
+            raise StorageError.of(
+                error, "locking the keystore (does its file system support flock?)"
+            ) from None
         time.sleep(_POLL)
 
 

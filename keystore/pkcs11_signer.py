@@ -1,8 +1,8 @@
 """A CA key in a PKCS#11 token (HSM, smart card, SoftHSM2), by the ``pkcs11:`` URI of RFC 7512.
 
-Optional: needs ``python-pkcs11`` (``pip install enclave-launch[pkcs11]``). The URI names token and object; the
-module comes from ``module-path`` or ``PKCS11_MODULE_PATH``, the PIN from a ``Secret`` or ``pin-source``. A
-``pin-value`` in a URI is refused: such a file would carry the secret in clear.
+Optional: needs ``python-pkcs11`` (``pip install enclave-launch[pkcs11]``). The URI names token and
+object; the module comes from ``module-path`` or ``PKCS11_MODULE_PATH``, the PIN from a ``Secret`` or
+``pin-source``. A ``pin-value`` in a URI is refused: such a file would carry the secret in clear.
 """
 
 from __future__ import annotations
@@ -83,7 +83,7 @@ class Pkcs11Signer:
 
 
 def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
-    """Tokens return r and s side by side; X.509 and CMS want a DER sequence. Hashing here suits every token."""
+    """Tokens return r and s side by side; X.509 and CMS want DER. Hashing here suits every token."""
     import hashlib
 
     from cryptography.hazmat.primitives.asymmetric.utils import encode_dss_signature
@@ -108,7 +108,9 @@ def _pin(attributes: Mapping[str, str], pin: Secret | None) -> str | None:
 
 
 def _find(pkcs11: Any, attributes: Mapping[str, str], module: str, pin: str | None) -> tuple[Any, PublicKey]:
-    token = pkcs11.lib(module).get_token(token_label=attributes.get("token"), token_serial=_serial(attributes))
+    token = pkcs11.lib(module).get_token(
+        token_label=attributes.get("token"), token_serial=_serial(attributes)
+    )
     session = token.open(user_pin=pin)
     wanted: dict[Any, Any] = {}
     if "object" in attributes:
@@ -129,7 +131,7 @@ def _single(session: Any, kind: Any, wanted: Mapping[Any, Any], pkcs11: Any) -> 
     found = list(session.get_objects({pkcs11.Attribute.CLASS: kind, **wanted}))
     if len(found) != 1:
         raise SigningUnavailable(
-            f"the token holds {len(found)} objects of kind {kind.name} with that object/id, exactly one is needed"
+            f"the token holds {len(found)} objects of kind {kind.name} with that object/id, one is needed"
         )
     return found[0]
 

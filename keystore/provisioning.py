@@ -1,4 +1,4 @@
-"""Enclaves brought to exactly the wanted state: the engine behind provision, create-enclave, apply-policy, renew.
+"""Enclaves brought to exactly the wanted state: the engine behind provision, create-enclave and renew.
 
     inspect (cheap, no lock) -> nothing to do -> done
                              -> lock, inspect again, issue and sign what is missing, publish in batches
@@ -10,7 +10,6 @@ by the next one, because ``enclave_state`` finds every missing step again.
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -18,14 +17,13 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from keystore import layout, lock, safe_files, smime, store
-from keystore.authority import Role
+from keystore import layout, lock, store
 from keystore.creation import CreateOptions, complete
 from keystore.domains import Domains
 from keystore.enclave_name import check_distinct, validate_enclave_name
 from keystore.enclave_state import EnclaveState, Identity, PermissionsSource, inspect
-from keystore.errors import InvalidInput, NotAKeystore, StorageError, printable
-from keystore.governance import governance_document, parse_governance
+from keystore.errors import InvalidInput, NotAKeystore, printable
+from keystore.governance_file import governance_domains, governance_stands, renew_governance
 from keystore.permissions import permissions_document
 from keystore.policy import EnclavePolicy
 from keystore.signer import CaAccess
@@ -45,11 +43,12 @@ _BATCH = 250
 
 @dataclass(frozen=True, slots=True)
 class ProvisionOptions:
-    """``lifetime``, ``subjects`` None: what the keystore was created with. ``renew_within``: certificates that
-    end sooner are re-issued, by default only those that are expired. ``creation``: for a new keystore; its
-    domains, access, clock and durability are taken from here."""
+    """``domains`` None: those of the keystore's governance, 0 for a new one. ``lifetime``, ``subjects`` None:
+    what the keystore was created with. ``renew_within``: certificates that end sooner are re-issued, by
+    default only the expired. ``creation``: for a new keystore; its domains, access, clock and durability are
+    taken from here."""
 
-    domains: Domains = field(default_factory=lambda: Domains.single(0))
+    domains: Domains | None = None
     create: bool = True
     creation: CreateOptions = field(default_factory=CreateOptions)
     lifetime: timedelta | None = None
@@ -76,7 +75,7 @@ class Wish:
 
 @dataclass(frozen=True, slots=True)
 class EnclaveReport:
-    """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; empty: left untouched."""
+    """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; or none."""
 
     enclave: str
     actions: tuple[str, ...]
@@ -104,9 +103,18 @@ def provision(
     Creates the keystore if ``options.create``. Other enclaves of the keystore are left alone. Raises a
     KeystoreError and leaves only complete, valid enclaves visible.
     """
-    chosen = options or ProvisionOptions()
-    wanted = {policy.path: Wish(policy_source(policy, chosen)) for policy in _distinct(enclaves)}
-    return bring_about(resolve_root(keystore), wanted, chosen)
+    root = resolve_root(keystore)
+    chosen = with_domains(root, options or ProvisionOptions())
+    wishes = {policy.path: Wish(policy_source(policy, chosen)) for policy in _distinct(enclaves)}
+    return bring_about(root, wishes, chosen)
+
+
+def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
+    """The same options with the domains decided."""
+    if options.domains is not None:
+        return options
+    view = KeystoreView(root)
+    return replace(options, domains=governance_domains(view) if view.is_complete else Domains.single(0))
 
 
 def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:
@@ -119,8 +127,10 @@ def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:
 
 
 def policy_source(policy: EnclavePolicy, options: ProvisionOptions) -> PermissionsSource:
+    domains = options.domains or Domains.single(0)
+
     def document(subject: str, validity: Validity) -> bytes:
-        return permissions_document(subject, policy, validity=validity, domains=options.domains, rmw=options.rmw)
+        return permissions_document(subject, policy, validity=validity, domains=domains, rmw=options.rmw)
 
     return document
 
@@ -184,13 +194,14 @@ def _complete_keystore(
     opened: Store, options: ProvisionOptions, now: datetime
 ) -> tuple[list[str], list[str]]:
     """Missing parts of the keystore itself, and a governance that covers the domains."""
+    domains = options.domains or governance_domains(KeystoreView(opened.root))
     creation = replace(
-        options.creation, domains=options.domains, access=options.access, durable=options.durable, now=now
+        options.creation, domains=domains, access=options.access, durable=options.durable, now=now
     )
     report = complete(opened, creation)
     done = list(report.actions)
-    if renew_governance(opened, options.domains, options.access, now):
-        done.append(f"governance signed for domains {options.domains}")
+    if renew_governance(opened, domains, options.access, now):
+        done.append(f"governance signed for domains {domains}")
     return done, list(report.warnings)
 
 
@@ -213,38 +224,3 @@ def _write_all(
                 if progress is not None:
                     progress(position, len(todo))
     return tuple(reports.values())
-
-
-_DOMAIN_IDS = re.compile(rb"<id>\s*(\d{1,3})\s*</id>|<min>\s*(\d{1,3})\s*</min>\s*<max>\s*(\d{1,3})\s*</max>")
-
-
-def governance_stands(view: KeystoreView, domains: Domains) -> bool:
-    """Cheaply: signed by the present permissions CA, and each of ``domains`` is listed in it."""
-    signed = safe_files.read_if_there(view.root, layout.GOVERNANCE)
-    if signed is None:
-        return False
-    present = smime.read(signed, printable(view.root / layout.GOVERNANCE))
-    if not present.embeds(view.ca(Role.PERMISSIONS).der):
-        return False
-    ranges = [(int(one or low), int(one or high)) for one, low, high in _DOMAIN_IDS.findall(present.document)]
-    return all(any(low <= first and last <= high for low, high in ranges) for first, last in domains.ranges)
-
-
-def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
-    """Sign the governance again if its domains or its signer no longer fit; whether that was needed.
-
-    Raises InvalidInput when it has several rules and none for a domain: then a person must decide.
-    """
-    from keystore.creation import write_governance
-    from keystore.trusted_documents import trusted_document
-
-    view = KeystoreView(opened.root)
-    if governance_stands(view, domains):
-        return False
-    place = printable(view.root / layout.GOVERNANCE)
-    document = trusted_document(view, layout.GOVERNANCE)
-    governance = parse_governance(document, place)
-    if not governance.covers(domains):
-        document = governance_document(governance.extended_to(domains))
-    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
-    return True

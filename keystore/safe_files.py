@@ -121,8 +121,8 @@ def private_problem(path: Path, info: os.stat_result) -> str | None:
     quoted = shlex.quote(str(path))
     if info.st_uid != os.geteuid():
         return (
-            f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that user, "
-            f"or take it over: chown -R {os.geteuid()} {quoted}"
+            f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that "
+            f"user, or take it over: chown -R {os.geteuid()} {quoted}"
         )
     if info.st_mode & _WRITABLE_BY_OTHERS:
         return f"{printable(path)} can be written by others (mode {mode_text(info)}): chmod go-w {quoted}"

@@ -1,7 +1,7 @@
 """What a keystore remembers about itself: ``secure-keystore.json``, beside what SROS2 knows. Pure.
 
-Absent in keystores made by SROS2; then the defaults hold. It also marks a directory as a keystore in the making,
-so that an interrupted ``create`` can be completed while a foreign directory is left alone.
+Absent in keystores made by SROS2; then the defaults hold. It also marks a directory as a keystore in the
+making, so that an interrupted ``create`` can be completed while a foreign directory is left alone.
 """
 
 from __future__ import annotations
@@ -49,4 +49,6 @@ class Settings:
                 timedelta(seconds=int(content["lifetime_seconds"])),
             )
         except (ValueError, KeyError, TypeError, OverflowError):
-            raise DamagedKeystore(f"{place} is not the settings file of a keystore; restore or remove it") from None
+            raise DamagedKeystore(
+                f"{place} is not the settings file of a keystore; restore or remove it"
+            ) from None

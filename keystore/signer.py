@@ -121,12 +121,16 @@ def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> Priva
     encrypted = b"ENCRYPTED" in pem
     if encrypted and passphrase is None:
         raise SigningUnavailable(
-            f"{place} is encrypted; give its passphrase with --passphrase-file, --passphrase-fd or --passphrase-env"
+            f"{place} is encrypted; give its passphrase with --passphrase-file, -fd or -env"
         )
     try:
-        key = serialization.load_pem_private_key(pem, passphrase.value() if encrypted and passphrase else None)
+        key = serialization.load_pem_private_key(
+            pem, passphrase.value() if encrypted and passphrase else None
+        )
     except (ValueError, TypeError, UnsupportedAlgorithm):
-        wrong = "cannot be decrypted; is the passphrase right?" if encrypted else "holds no usable private key"
+        wrong = (
+            "cannot be decrypted; is the passphrase right?" if encrypted else "holds no usable private key"
+        )
         raise SigningUnavailable(f"{place} {wrong}") from None
     if not isinstance(key, (ec.EllipticCurvePrivateKey, rsa.RSAPrivateKey)):
         raise SigningUnavailable(f"{place} is neither an EC nor an RSA key; DDS-Security knows only these")
@@ -138,7 +142,9 @@ def open_signer(reference: bytes, place: str, access: CaAccess) -> Signer:
     if reference.lstrip().startswith(b"pkcs11:"):
         from keystore.pkcs11_signer import Pkcs11Signer
 
-        return Pkcs11Signer.open(reference.split()[0].decode("ascii", "replace"), access.pin, access.environment)
+        return Pkcs11Signer.open(
+            reference.split()[0].decode("ascii", "replace"), access.pin, access.environment
+        )
     return FileSigner(load_private_key(reference, access.passphrase, place))
 
 

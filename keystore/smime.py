@@ -2,10 +2,10 @@
 
     document (XML bytes) + Signer -> .p7s        .p7s -> SignedDocument -> checked against the permissions CA
 
-``cryptography``'s S/MIME writer spends over a millisecond per document: it signs in about 0.1 ms and then sends
-the result through Python's ``email`` generator, which parses and re-flows headers in pure Python. A signed
-document of ours has a fixed shape, so it is concatenated here; and since only the raw signature comes from a
-``Signer``, a key in a token signs the same way as one in a file.
+``cryptography``'s S/MIME writer spends over a millisecond per document: it signs in about 0.1 ms and then
+sends the result through Python's ``email`` generator, which parses and re-flows headers in pure Python. A
+signed document of ours has a fixed shape, so it is concatenated here; and since only the raw signature
+comes from a ``Signer``, a key in a token signs the same way as one in a file.
 
 What is signed are the bytes ``Content-Type: text/plain`` CRLF CRLF + document with CRLF line ends. Verifiers
 canonicalise line ends, so the file itself may be stored with either.
@@ -98,10 +98,9 @@ def _multipart(content: bytes, pkcs7: bytes) -> bytes:
     boundary = b"----" + hashlib.sha256(b"boundary" + content).hexdigest()[:32].upper().encode()
     encoded = binascii.b2a_base64(pkcs7, newline=False)
     lines = b"\r\n".join(encoded[at : at + 64] for at in range(0, len(encoded), 64))
+    head = b'MIME-Version: 1.0\r\nContent-Type: multipart/signed; protocol="application/x-pkcs7-signature"; '
     return b"".join((
-        b"MIME-Version: 1.0\r\n",
-        b'Content-Type: multipart/signed; protocol="application/x-pkcs7-signature"; micalg="sha-256"; boundary="',
-        boundary, b'"\r\n\r\nThis is an S/MIME signed message\r\n\r\n--',
+        head, b'micalg="sha-256"; boundary="', boundary, b'"\r\n\r\nThis is an S/MIME signed message\r\n\r\n--',
         boundary, b"\r\n", content, b"\r\n--",
         boundary, b"\r\n"
         b'Content-Type: application/x-pkcs7-signature; name="smime.p7s"\r\n'
@@ -192,7 +191,9 @@ def _signer_info(pkcs7: bytes) -> _SignerInfo:
     if digest_algorithm.children()[0].whole != der.parse(_SHA256).children()[0].whole:
         raise der.DerError("not SHA-256")
     issuer, serial = identifier.children()
-    values = {pair.children()[0].whole: pair.children()[1] for pair in attributes.expect(_CONSTRUCTED_0).children()}
+    values = {
+        pair.children()[0].whole: pair.children()[1] for pair in attributes.expect(_CONSTRUCTED_0).children()
+    }
     return _SignerInfo(
         issuer.whole,
         int.from_bytes(serial.content, "big"),
@@ -202,7 +203,9 @@ def _signer_info(pkcs7: bytes) -> _SignerInfo:
     )
 
 
-def _check_signature(info: _SignerInfo, signed: SignedDocument, authority: CertificateFacts, place: str) -> None:
+def _check_signature(
+    info: _SignerInfo, signed: SignedDocument, authority: CertificateFacts, place: str
+) -> None:
     from keystore.public_key import signature_is_valid
 
     if info.digest != hashlib.sha256(signed.content).digest():

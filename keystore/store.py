@@ -25,7 +25,6 @@ from keystore import layout, lock, safe_files
 from keystore.errors import StorageError
 
 PUBLIC_MODE, PRIVATE_MODE = 0o644, 0o600
-_DIRECTORY_MODES = {layout.PRIVATE: 0o700, layout.INCOMING: 0o700, layout.RETIRED: 0o700}
 _SYNC_EACH = 12
 _NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EOPNOTSUPP, errno.EINVAL}
 
@@ -72,7 +71,7 @@ class Store:
         if relative:
             self.ensure_directory(parent)
         path = self.root / relative
-        mode = _DIRECTORY_MODES.get(relative, 0o755)
+        mode = _directory_mode(relative)
         try:
             os.mkdir(path, mode)
             os.chmod(path, mode)
@@ -148,7 +147,7 @@ class Batch:
         self._moves.append((place, target))
 
     def directory(self, target: str, entries: Mapping[str, Content | Link]) -> None:
-        """A directory's files. A new directory appears at once; in an existing one each is replaced in turn."""
+        """A directory's files. A new directory appears at once; in an old one each is replaced."""
         if self._store.is_directory(target):
             for name, entry in entries.items():
                 place = self._place()
@@ -156,7 +155,7 @@ class Batch:
                 self._moves.append((place, f"{target}/{name}"))
             return
         place = self._place()
-        mode = _DIRECTORY_MODES.get(target, 0o755)
+        mode = _directory_mode(target)
         os.mkdir(place, mode)
         os.chmod(place, mode)
         for name, entry in entries.items():
@@ -240,6 +239,10 @@ def create_root(root: Path) -> None:
         return
     except OSError as error:
         raise StorageError.of(error, "creating the keystore") from None
+
+
+def _directory_mode(relative: str) -> int:
+    return 0o700 if relative.split("/")[0] == layout.PRIVATE else 0o755
 
 
 def _clear_staging(root: Path) -> None:

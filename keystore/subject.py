@@ -68,7 +68,9 @@ def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
     for enclave, bag in bags.items():
         by_bag.setdefault(bag, []).append(enclave)
     pairs = {(a, b) for group in by_bag.values() for a in group for b in group if a != b}
-    pairs |= {(a, b) for a, bag in open_ones.items() for b, lent in open_ones.items() if a != b and bag <= lent}
+    pairs |= {
+        (a, b) for a, bag in open_ones.items() for b, lent in open_ones.items() if a != b and bag <= lent
+    }
     return sorted(pairs)
 
 

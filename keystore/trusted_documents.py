@@ -1,7 +1,7 @@
 """Signed documents of this keystore, given out only after their signature was checked.
 
-What is about to be signed again must have been signed by us before: by the present permissions CA, by one of the
-trust bundle during a roll-over, or by a retired one.
+What is about to be signed again must have been signed by us before: by the present permissions CA, by one
+of the trust bundle during a roll-over, or by a retired one.
 """
 
 from __future__ import annotations

@@ -39,7 +39,9 @@ class Validity:
             whole = moment.astimezone(timezone.utc).replace(microsecond=0)
             object.__setattr__(self, name, min(whole, LATEST))
         if self.not_after <= self.not_before:
-            raise InvalidInput(f"a validity ends ({iso(self.not_after)}) before it begins ({iso(self.not_before)})")
+            raise InvalidInput(
+                f"a validity ends ({iso(self.not_after)}) before it begins ({iso(self.not_before)})"
+            )
 
     @classmethod
     def starting(

@@ -45,7 +45,9 @@ class KeystoreView:
 
     def require_complete(self) -> None:
         if not self.root.is_dir():
-            raise NotAKeystore(f"there is no keystore at {printable(self.root)}; make one: secure-keystore create")
+            raise NotAKeystore(
+                f"there is no keystore at {printable(self.root)}; make one: secure-keystore create"
+            )
         if not self.is_complete:
             raise NotAKeystore(
                 f"{printable(self.root)} is not a complete keystore (public/, enclaves/governance.p7s); "

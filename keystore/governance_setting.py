@@ -1,0 +1,52 @@
+"""A keystore given another governance: signed when it differs, copies in enclaves kept in step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from keystore import layout, lock, store
+from keystore.authority import Role
+from keystore.creation import write_governance
+from keystore.enclaves import keep
+from keystore.governance import Governance, governance_document
+from keystore.governance_file import governance_stands, signed_governance
+from keystore.provisioning import ProvisionOptions, Wish, bring_about
+from keystore.signer import CaAccess
+from keystore.validity import utc_now
+from keystore.view import KeystoreView, resolve_root
+
+
+@dataclass(frozen=True, slots=True)
+class GovernanceOptions:
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+
+
+def set_governance(
+    keystore: Path | str, governance: Governance, *, options: GovernanceOptions | None = None
+) -> bool:
+    """Sign ``governance`` and put it in force; whether it differs from before.
+
+    It must be deployed to all participants at once: those with different protection kinds do not talk.
+    """
+    chosen = options or GovernanceOptions()
+    root = resolve_root(keystore)
+    KeystoreView(root).require_complete()
+    document = governance_document(governance)
+    with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        view = KeystoreView(root)
+        twin = root / layout.GOVERNANCE_XML
+        same = (
+            signed_governance(view).document == document and twin.is_file() and twin.read_bytes() == document
+        )
+        changed = not (same and governance_stands(view, None))
+        if changed:
+            write_governance(opened, document, view.authority(Role.PERMISSIONS, chosen.access), utc_now())
+    provisioning = ProvisionOptions(
+        domains=governance.domains(), create=False, access=chosen.access, lock_timeout=chosen.lock_timeout
+    )
+    wishes = {name: Wish(keep) for name in KeystoreView(root).enclaves()}
+    bring_about(root, wishes, replace(provisioning, durable=chosen.durable))
+    return changed

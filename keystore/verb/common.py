@@ -1,0 +1,167 @@
+"""Options that several verbs share, and how reports look."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from keystore.errors import InvalidInput
+from keystore.validity import parse_duration, parse_end, utc_now
+
+if TYPE_CHECKING:
+    from keystore.provisioning import ProvisionOptions, ProvisionReport
+    from keystore.signer import CaAccess
+
+DEFAULT_LOCK_TIMEOUT = 30.0
+_BAR_WIDTH = 30
+
+
+def add_keystore(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("keystore", metavar="KEYSTORE", type=Path, help="root directory of the keystore")
+
+
+def add_format(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--format", choices=("text", "json"), default="text", help="how to print (text)")
+
+
+def add_signing(parser: argparse.ArgumentParser) -> None:
+    """Passphrase and PIN by file, descriptor or environment variable: arguments can be read by others."""
+    group = parser.add_argument_group("CA keys")
+    passphrase = group.add_mutually_exclusive_group()
+    passphrase.add_argument(
+        "--passphrase-file", metavar="FILE", type=Path, help="file with the CA keys' passphrase"
+    )
+    passphrase.add_argument("--passphrase-fd", metavar="N", type=int, help="open descriptor to read it from")
+    passphrase.add_argument("--passphrase-env", metavar="NAME", help="environment variable that holds it")
+    pin = group.add_mutually_exclusive_group()
+    pin.add_argument("--pin-file", metavar="FILE", type=Path, help="file with the PIN of the PKCS#11 token")
+    pin.add_argument("--pin-env", metavar="NAME", help="environment variable that holds the PIN")
+
+
+def add_lock(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--lock-timeout", metavar="SECONDS", type=float, default=DEFAULT_LOCK_TIMEOUT,
+        help="how long to wait for another run (30)",
+    )  # fmt: skip
+
+
+def add_validity(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--valid-for",
+        metavar="TIME",
+        help="90d, 12h, 10y from now, or until an ISO date (default: the keystore's)",
+    )
+    parser.add_argument(
+        "--backdate", metavar="TIME", help="begin this much earlier, for clocks that lag (1d)"
+    )
+
+
+def add_subjects(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--compatible-subjects", action="store_true",
+        help="CN=/path as SROS2 writes it, for use with 'ros2 security create_permission'; on Cyclone DDS "
+        "some enclaves could then use the permissions of others: such names are refused",
+    )  # fmt: skip
+    parser.add_argument(
+        "--allow-subject-overlap", action="store_true", help="with compatible subjects: accept such names"
+    )
+
+
+def access(arguments: argparse.Namespace) -> CaAccess:
+    from keystore.signer import CaAccess, Secret
+
+    given = vars(arguments)
+    passphrase = Secret(given["passphrase_file"], given["passphrase_fd"], given["passphrase_env"])
+    pin = Secret(file=given["pin_file"], variable=given["pin_env"])
+    return CaAccess(
+        passphrase=passphrase if passphrase != Secret() else None,
+        pin=pin if pin != Secret() else None,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """``--valid-for`` and ``--backdate`` as the functions want them."""
+
+    lifetime: timedelta | None
+    until: datetime | None
+    backdate: timedelta
+
+
+def span(arguments: argparse.Namespace) -> Span:
+    from keystore.validity import DEFAULT_BACKDATE
+
+    text: str | None = arguments.valid_for
+    backdate = parse_duration(arguments.backdate) if arguments.backdate else DEFAULT_BACKDATE
+    if text is None:
+        return Span(None, None, backdate)
+    try:
+        return Span(parse_duration(text), None, backdate)
+    except InvalidInput:
+        return Span(None, parse_end(text, utc_now()), backdate)
+
+
+def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
+    """From the arguments of ``add_signing``, ``add_lock``, ``add_validity`` and ``add_subjects``."""
+    from keystore.provisioning import ProvisionOptions
+    from keystore.subject import SubjectScheme
+
+    validity = span(arguments)
+    return ProvisionOptions(
+        lifetime=validity.lifetime,
+        valid_until=validity.until,
+        backdate=validity.backdate,
+        subjects=SubjectScheme.COMPATIBLE if arguments.compatible_subjects else None,
+        allow_subject_overlap=arguments.allow_subject_overlap,
+        access=access(arguments),
+        lock_timeout=arguments.lock_timeout,
+        progress=ProgressBar() if sys.stderr.isatty() else None,
+        **more,
+    )
+
+
+@dataclass
+class ProgressBar:
+    """Appears on stderr once a run has taken more than a second, and leaves no trace."""
+
+    _started: float = field(default_factory=time.monotonic)
+
+    def __call__(self, done: int, total: int) -> None:
+        if time.monotonic() - self._started < 1.0:
+            return
+        filled = _BAR_WIDTH * done // max(total, 1)
+        bar = f"\r[{'#' * filled}{'.' * (_BAR_WIDTH - filled)}] {done}/{total} enclaves"
+        end = "\r\033[K" if done == total else ""
+        print(bar + end, end="", file=sys.stderr, flush=True)
+
+
+def print_json(content: Any) -> None:
+    print(json.dumps(content, indent=2, sort_keys=True, default=str))
+
+
+def print_lines(lines: Iterable[str]) -> None:
+    for line in lines:
+        print(line)
+
+
+def print_report(report: ProvisionReport) -> None:
+    """What a provisioning run did, enclave by enclave; what it left alone as a count."""
+    print_lines(report.created)
+    changed = [enclave for enclave in report.enclaves if enclave.actions]
+    for enclave in changed:
+        print(f"{enclave.enclave}: {', '.join(enclave.actions)} ({'; '.join(enclave.reasons)})")
+    if unchanged := len(report.enclaves) - len(changed):
+        print(f"{unchanged} enclave{'s' if unchanged != 1 else ''} unchanged")
+    warn(report.warnings)
+
+
+def warn(warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        print(f"secure-keystore: warning: {warning}", file=sys.stderr)

@@ -1,0 +1,73 @@
+"""Create a keystore, or complete one whose creation was interrupted.
+
+Identity and permissions get separate CAs. A complete keystore is left as it is.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument(
+        "--domain-id", metavar="IDS", default="0", help="domains of the governance: 0, 0-10, 3,7 or all"
+    )
+    parser.add_argument(
+        "--governance", metavar="FILE.yaml", type=Path, help="governance instead of SROS2's default"
+    )
+    parser.add_argument(
+        "--curve", choices=("P-256", "P-384"), default="P-256", help="P-384 works on Fast DDS only"
+    )
+    parser.add_argument("--ca-valid-for", metavar="TIME", default="10y", help="validity of the CAs (10y)")
+    common.add_validity(parser)
+    for which in ("identity", "permissions"):
+        parser.add_argument(f"--{which}-ca-name", metavar="CN", help=f"common name of the {which} CA")
+        parser.add_argument(
+            f"--{which}-ca", metavar=("CERT", "KEY"), nargs=2, type=Path,
+            help="import an existing CA; KEY is a PEM file, or a file with a pkcs11: URI",
+        )  # fmt: skip
+    parser.add_argument(
+        "--encrypt-ca-keys", action="store_true", help="encrypt new CA keys with the passphrase"
+    )
+    common.add_subjects(parser)
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from datetime import timedelta
+
+    from keystore.authority import Curve, Role
+    from keystore.creation import CreateOptions, ImportedCa, create_keystore
+    from keystore.domains import Domains
+    from keystore.governance_yaml import load_governance_yaml
+    from keystore.subject import SubjectScheme
+    from keystore.validity import DEFAULT_LIFETIME, parse_end, utc_now
+
+    validity = common.span(arguments)
+    now = utc_now()
+    lifetime: timedelta = validity.lifetime or (validity.until - now if validity.until else DEFAULT_LIFETIME)
+    given = vars(arguments)
+    options = CreateOptions(
+        domains=Domains.parse(arguments.domain_id),
+        governance=load_governance_yaml(arguments.governance) if arguments.governance else None,
+        subjects=SubjectScheme.COMPATIBLE if arguments.compatible_subjects else SubjectScheme.EXACT,
+        curve=Curve(arguments.curve),
+        ca_lifetime=parse_end(arguments.ca_valid_for, now) - now,
+        lifetime=lifetime,
+        backdate=validity.backdate,
+        names={role: given[f"{role.value}_name"] for role in Role if given[f"{role.value}_name"]},
+        imported={role: ImportedCa(*given[role.value]) for role in Role if given[role.value]},
+        encrypt_ca_keys=arguments.encrypt_ca_keys,
+        access=common.access(arguments),
+        lock_timeout=arguments.lock_timeout,
+        now=now,
+    )
+    report = create_keystore(arguments.keystore, options)
+    common.print_lines(report.actions or ("the keystore is complete already, nothing was changed",))
+    common.warn(report.warnings)
+    return 0

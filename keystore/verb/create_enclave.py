@@ -1,0 +1,31 @@
+"""Create enclaves: key, certificate and permissions that grant nothing, unless --allow-all.
+
+Existing enclaves keep keys and permissions; what is missing or expired is made anew.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+", help="absolute name, such as /front/camera")
+    parser.add_argument("--allow-all", action="store_true", help="grant every topic, service and action")
+    common.add_validity(parser)
+    common.add_subjects(parser)
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.enclaves import create_enclaves
+
+    options = common.provision_options(arguments)
+    report = create_enclaves(
+        arguments.keystore, arguments.enclaves, allow_all=arguments.allow_all, options=options
+    )
+    common.print_report(report)
+    return 0

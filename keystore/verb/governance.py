@@ -1,0 +1,35 @@
+"""Put another governance in force, from YAML; signs only when it differs.
+
+All participants need it at the same time: with different protection kinds they do not talk, without an error.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument(
+        "file", metavar="FILE.yaml", type=Path, help="see docs: version, domain_rules, topic_rules"
+    )
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.governance_setting import GovernanceOptions, set_governance
+    from keystore.governance_yaml import load_governance_yaml
+
+    governance = load_governance_yaml(arguments.file)
+    options = GovernanceOptions(access=common.access(arguments), lock_timeout=arguments.lock_timeout)
+    changed = set_governance(arguments.keystore, governance, options=options)
+    print(
+        "governance signed; deploy it to all participants"
+        if changed
+        else "the governance is the same already"
+    )
+    return 0

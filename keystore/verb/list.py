@@ -1,0 +1,23 @@
+"""List the enclaves of a keystore."""
+
+from __future__ import annotations
+
+import argparse
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    common.add_format(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.enclaves import list_enclaves
+
+    names = list_enclaves(arguments.keystore)
+    if arguments.format == "json":
+        common.print_json({"version": 1, "enclaves": names})
+    else:
+        common.print_lines(names)
+    return 0

@@ -1,0 +1,35 @@
+"""Revoke enclaves and delete them; all remaining enclaves get the CRL.
+
+Cyclone DDS and Fast DDS refuse revoked peers when they start with the new crl.pem, so deploy afterwards;
+RTI Connext is not given a CRL by its rmw.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+")
+    parser.add_argument("--no-revoke", action="store_true", help="only delete: copies elsewhere stay valid")
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.revocation import RemoveOptions, remove
+
+    options = RemoveOptions(
+        revoke=not arguments.no_revoke,
+        access=common.access(arguments),
+        lock_timeout=arguments.lock_timeout,
+    )
+    report = remove(arguments.keystore, arguments.enclaves, options=options)
+    common.print_lines(f"removed {name}" for name in report.removed)
+    if report.revoked:
+        print(f"{report.revoked} certificates are revoked; deploy the new crl.pem to all enclaves")
+    common.warn(report.warnings)
+    return 0

@@ -1,0 +1,82 @@
+"""Renew what ends soon, repair what is exposed, or replace the CAs.
+
+Without enclaves: all certificates that end within --within, with their permissions, the CRL, and the
+repairs that verify names. With enclaves: those. --ca start|switch|finish replaces CAs in three steps, to
+be deployed one after the other. Fast DDS then trusts old and new side by side; Cyclone DDS reads only the
+first CA of a file, so its participants must take 'switch' together.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from keystore.verb import common
+
+if TYPE_CHECKING:
+    from keystore.provisioning import ProvisionOptions, ProvisionReport
+
+_ROLES = ("identity", "permissions", "both")
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="*", help="enclaves to renew in any case")
+    parser.add_argument("--within", metavar="TIME", default="30d", help="what ends sooner is renewed (30d)")
+    parser.add_argument("--all", action="store_true", help="renew every enclave")
+    parser.add_argument("--new-keys", action="store_true", help="new private keys too, not only certificates")
+    parser.add_argument("--ca", choices=("start", "switch", "finish"), help="a step of replacing CAs")
+    parser.add_argument("--ca-role", choices=_ROLES, default="both", help="which CA to replace (both)")
+    parser.add_argument("--ca-valid-for", metavar="TIME", default="10y", help="validity of new CAs (10y)")
+    parser.add_argument(
+        "--encrypt-ca-keys", action="store_true", help="encrypt new CA keys with the passphrase"
+    )
+    common.add_validity(parser)
+    common.add_subjects(parser)
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.creation import CreateOptions
+    from keystore.validity import parse_end, utc_now
+
+    now = utc_now()
+    creation = CreateOptions(ca_lifetime=parse_end(arguments.ca_valid_for, now) - now)
+    options = common.provision_options(arguments, creation=creation)
+    report = _roll_over(arguments, options) if arguments.ca else _renew(arguments, options)
+    common.print_report(report)
+    return 0
+
+
+def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
+    from keystore.renewal import RenewOptions, renew
+    from keystore.validity import parse_duration
+
+    wanted = RenewOptions(
+        within=parse_duration(arguments.within),
+        everything=arguments.all,
+        new_keys=arguments.new_keys,
+        encrypt_ca_keys=arguments.encrypt_ca_keys,
+        provisioning=options,
+    )
+    return renew(arguments.keystore, arguments.enclaves or None, options=wanted)
+
+
+def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
+    from keystore.authority import Role
+    from keystore.errors import InvalidInput
+    from keystore.rollover import Step, roll_over
+
+    if arguments.enclaves:
+        raise InvalidInput("--ca concerns all enclaves; do not name any")
+    roles = tuple(Role) if arguments.ca_role == "both" else (Role(f"{arguments.ca_role}_ca"),)
+    step = Step(arguments.ca)
+    report = roll_over(arguments.keystore, step, roles, options=options, encrypt=arguments.encrypt_ca_keys)
+    following = {
+        Step.START: "deploy to all, then: --ca switch",
+        Step.SWITCH: "deploy (Cyclone DDS: to all at once), then: --ca finish",
+        Step.FINISH: "deploy; the old CA is trusted no more",
+    }
+    return replace(report, created=(*report.created, following[step]))

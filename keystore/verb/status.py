@@ -1,0 +1,83 @@
+"""Show what of the keystore ends when, the earliest first.
+
+Exit status for monitoring: 0 all well, 3 something ends within the margin, 4 something has ended.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import TYPE_CHECKING, Any
+
+from keystore.verb import common
+
+if TYPE_CHECKING:
+    from datetime import datetime
+
+    from keystore.expiry import Expiry, StatusReport
+
+SOON, ENDED = 3, 4
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("--within", metavar="TIME", default="30d", help="what counts as soon (30d)")
+    parser.add_argument(
+        "--all", action="store_true", help="list everything in text too, not only what is due"
+    )
+    common.add_format(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.expiry import status
+    from keystore.validity import parse_duration
+
+    report = status(arguments.keystore)
+    due = report.due(parse_duration(arguments.within))
+    if arguments.format == "json":
+        common.print_json(_json(report, due))
+    else:
+        _print(report, report.expiries if arguments.all else due)
+    if any(not one.is_valid(report.now) for one in due):
+        return ENDED
+    return SOON if due else 0
+
+
+def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
+    from keystore.validity import iso
+
+    return {
+        "version": 1,
+        "keystore": str(report.keystore),
+        "now": iso(report.now),
+        "enclaves": list(report.enclaves),
+        "expiries": [
+            {
+                "what": one.what,
+                "enclave": one.enclave,
+                "not_before": iso(one.not_before),
+                "not_after": iso(one.not_after),
+                "days_left": (one.not_after - report.now).days,
+                "valid": one.is_valid(report.now),
+                "due": one in due,
+            }
+            for one in report.expiries
+        ],
+    }
+
+
+def _print(report: StatusReport, shown: tuple[Expiry, ...]) -> None:
+    from keystore.validity import iso
+
+    print(f"{len(report.enclaves)} enclaves in {report.keystore}")
+    for one in shown:
+        print(f"{iso(one.not_after)}  {_left(one, report.now):>14}  {one.subject}")
+    if not shown and report.expiries:
+        first = report.expiries[0]
+        print(f"nothing is due; the first to end is the {first.subject}, {iso(first.not_after)}")
+
+
+def _left(one: Expiry, now: datetime) -> str:
+    if one.not_before > now:
+        return "not yet valid"
+    days = (one.not_after - now).days
+    return f"{days} days left" if days >= 0 else "expired"

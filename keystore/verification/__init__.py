@@ -1,0 +1,65 @@
+"""The whole keystore checked: files, CAs, governance, every enclave. Reads only, follows no strange link.
+
+verify(keystore) -> VerifyReport          each finding with its place and what repairs it
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+
+from keystore.errors import KeystoreError
+from keystore.signer import CaAccess
+from keystore.validity import utc_now
+from keystore.verification.authorities import check_authorities
+from keystore.verification.enclaves import check_enclaves
+from keystore.verification.files import check_files
+from keystore.verification.finding import Finding as Finding
+from keystore.verification.finding import Severity as Severity
+from keystore.view import KeystoreView, resolve_root
+
+
+@dataclass(frozen=True, slots=True)
+class VerifyReport:
+    """``findings``: worst first, then by place."""
+
+    keystore: Path
+    enclaves: int
+    findings: tuple[Finding, ...]
+
+    @property
+    def is_good(self) -> bool:
+        """Neither errors nor exposures."""
+        return not any(finding.severity.fails for finding in self.findings)
+
+
+def verify(
+    keystore: Path | str, *, access: CaAccess | None = None, now: datetime | None = None
+) -> VerifyReport:
+    """Check everything; raises NotAKeystore only when there is nothing to check."""
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    order = list(Severity)
+    found = sorted(
+        _findings(view, access or CaAccess(), now or utc_now()),
+        key=lambda finding: (order.index(finding.severity), finding.place, finding.code),
+    )
+    return VerifyReport(view.root, len(view.enclaves()), tuple(found))
+
+
+def _findings(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[Finding]:
+    from keystore.revocation import revoked_serials
+
+    yield from check_files(view.root)
+    try:
+        yield from check_authorities(view, access, now)
+    except KeystoreError as error:
+        yield Finding(Severity.ERROR, "unreadable", "public", str(error), "restore it from a backup")
+        return
+    try:
+        revoked = frozenset(revoked_serials(view))
+    except KeystoreError:
+        revoked = frozenset()  # the CRL itself was reported above
+    yield from check_enclaves(view, revoked, now)

@@ -1,0 +1,240 @@
+"""Each enclave: key, certificate, permissions, links, and whether they belong together."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from datetime import datetime
+
+from keystore import certificate, layout, safe_files, smime
+from keystore.authority import Role
+from keystore.certificate import CertificateFacts
+from keystore.der import DerError
+from keystore.enclave_state import key_matches
+from keystore.errors import InvalidInput, KeystoreError
+from keystore.permissions_read import Grant, parse_permissions
+from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
+from keystore.public_key import key_kind
+from keystore.subject import (
+    SubjectScheme,
+    borrowable,
+    cannot_be_told_apart,
+    common_name,
+    scheme_of,
+    subject_name,
+)
+from keystore.validity import LATEST, Validity, iso, parse_moment
+from keystore.verification.authorities import CYCLONE_KINDS, issued_by
+from keystore.verification.finding import Finding, Severity
+from keystore.view import KeystoreView
+
+_WILDCARD = re.compile(r"[*?\[]")
+
+
+def check_enclaves(view: KeystoreView, revoked: frozenset[int], now: datetime) -> Iterator[Finding]:
+    names: dict[str, str] = {}
+    serials: dict[int, str] = {}
+    for enclave in view.enclaves():
+        check = _EnclaveCheck(view, enclave, revoked, now)
+        yield from check.findings()
+        if check.facts is None:
+            continue
+        names[enclave] = check.facts.common_name or ""
+        other = serials.setdefault(check.facts.serial, enclave)
+        if other != enclave:
+            yield check.error(
+                "serial-reused", layout.CERT, f"same serial number as {other}; one CRL entry hits both"
+            )
+    yield from _check_subjects(names)
+
+
+def _check_subjects(names: dict[str, str]) -> Iterator[Finding]:
+    compatible = [enclave for enclave, cn in names.items() if scheme_of(cn) is SubjectScheme.COMPATIBLE]
+    pairs = borrowable(names)
+    if pairs:
+        yield Finding(
+            Severity.EXPOSURE, "borrowed-permissions", layout.ENCLAVES,
+            f"on Cyclone DDS (every version so far) {cannot_be_told_apart(pairs)}: it compares subjects as "
+            "bags of path segments",
+            "secure-keystore renew KEYSTORE gives exact subjects",
+        )  # fmt: skip
+    elif compatible:
+        yield Finding(
+            Severity.NOTE, "compatible-subjects", layout.ENCLAVES,
+            f"{len(compatible)} enclaves have SROS2's subjects (CN=/path); a new enclave could make their "
+            "permissions borrowable on Cyclone DDS",
+            "secure-keystore renew KEYSTORE ENCLAVE... gives exact subjects",
+        )  # fmt: skip
+
+
+class _EnclaveCheck:
+    def __init__(self, view: KeystoreView, enclave: str, revoked: frozenset[int], now: datetime):
+        self._view = view
+        self._enclave = enclave
+        self._directory = layout.enclave_directory(enclave)
+        self._revoked = revoked
+        self._now = now
+        self.facts: CertificateFacts | None = None
+
+    def error(self, code: str, file: str, message: str) -> Finding:
+        repair = f"secure-keystore renew KEYSTORE {self._enclave}"
+        return Finding(Severity.ERROR, code, f"{self._directory}/{file}", message, repair)
+
+    def _finding(self, severity: Severity, code: str, file: str, message: str, repair: str = "") -> Finding:
+        return Finding(severity, code, f"{self._directory}/{file}", message, repair)
+
+    def _read(self, name: str) -> bytes | None:
+        return safe_files.read_if_there(self._view.root, f"{self._directory}/{name}")
+
+    def findings(self) -> Iterator[Finding]:
+        try:
+            yield from self._missing()
+            yield from self._certificate()
+            yield from self._links()
+            yield from self._permissions()
+        except KeystoreError as error:
+            yield self.error("unreadable", "", str(error))
+
+    def _missing(self) -> Iterator[Finding]:
+        for name in layout.RUNTIME_FILES:
+            if self._read(name) is None:
+                yield self.error("missing", name, "missing: a process cannot start with this enclave")
+
+    def _certificate(self) -> Iterator[Finding]:
+        pem = self._read(layout.CERT)
+        if pem is None:
+            return
+        try:
+            self.facts = certificate.read_pem(pem)
+        except DerError as error:
+            yield self.error("certificate", layout.CERT, f"not a usable certificate: {error}")
+            return
+        yield from self._chain(self.facts)
+        yield from self._subject(self.facts)
+        key = self._read(layout.KEY)
+        if key is not None and not key_matches(key, self.facts):
+            yield self.error(
+                "key-mismatch", layout.KEY, "does not belong to cert.pem; Cyclone DDS starts but never talks"
+            )
+        if key_kind(self.facts.public_key) not in CYCLONE_KINDS:
+            kind = key_kind(self.facts.public_key)
+            yield self._finding(
+                Severity.WARNING, "key-kind", layout.CERT, f"a {kind} key: Cyclone DDS refuses it"
+            )
+
+    def _chain(self, facts: CertificateFacts) -> Iterator[Finding]:
+        bundle = self._view.ca_bundle(Role.IDENTITY)
+        issuer = next((ca for ca in bundle if issued_by(facts, ca)), None)
+        if issuer is None:
+            yield self.error("wrong-ca", layout.CERT, "not signed by the identity CA of this keystore")
+        elif facts.validity.not_after > issuer.validity.not_after:
+            yield self._finding(
+                Severity.WARNING, "outlives-ca", layout.CERT,
+                f"valid until {iso(facts.validity.not_after)}, its CA until {iso(issuer.validity.not_after)}",
+            )  # fmt: skip
+        if not facts.validity.covers(self._now):
+            yield self.error(
+                "expired", layout.CERT,
+                f"valid from {iso(facts.validity.not_before)} to {iso(facts.validity.not_after)}",
+            )  # fmt: skip
+        if facts.serial in self._revoked:
+            yield self.error(
+                "revoked", layout.CERT, "revoked: peers refuse it; remove the enclave or renew it"
+            )
+        if facts.can_sign_mail and self._view.shares_one_ca:
+            yield self._finding(
+                Severity.EXPOSURE, "leaf-can-sign", layout.CERT,
+                "its key can sign permissions that older DDS versions accept (shared CA, no EKU)",
+                "secure-keystore renew KEYSTORE",
+            )  # fmt: skip
+
+    def _subject(self, facts: CertificateFacts) -> Iterator[Finding]:
+        allowed = {common_name(self._enclave, scheme) for scheme in SubjectScheme} | {self._enclave}
+        if facts.common_name not in allowed or facts.name_parts != 1:
+            yield self.error("wrong-subject", layout.CERT, "its subject is not that of this enclave")
+
+    def _links(self) -> Iterator[Finding]:
+        wanted = list(layout.enclave_links(self._enclave))
+        if self._view.has_crl:
+            wanted.append(layout.ENCLAVE_CRL)
+            if self._read(layout.ENCLAVE_CRL) is None:
+                yield self.error(
+                    "no-crl", layout.ENCLAVE_CRL, "missing: this enclave would accept revoked peers"
+                )
+        for name in wanted:
+            relative = f"{self._directory}/{name}"
+            if safe_files.link_target(self._view.root, relative) is not None:
+                continue  # the target was checked with all files
+            copy = self._read(name)
+            if copy is not None and copy != safe_files.read_if_there(
+                self._view.root, layout.link_source(name)
+            ):
+                yield self.error("copy-differs", name, f"a copy that differs from {layout.link_source(name)}")
+
+    def _permissions(self) -> Iterator[Finding]:
+        p7s = self._read(layout.PERMISSIONS)
+        if p7s is None:
+            return
+        place = f"{self._directory}/{layout.PERMISSIONS}"
+        try:
+            signed = smime.read(p7s, place)
+            smime.check(signed, self._view.ca_bundle(Role.PERMISSIONS), place)
+            grants = parse_permissions(signed.document, place)
+        except KeystoreError as error:
+            yield self.error("permissions", layout.PERMISSIONS, str(error))
+            return
+        twin = self._read(layout.PERMISSIONS_XML)
+        if twin is not None and twin.replace(b"\r\n", b"\n") != signed.document:
+            yield self.error(
+                "twin-differs", layout.PERMISSIONS_XML, "differs from the signed permissions.p7s in force"
+            )
+        yield from self._grants(grants)
+        if len(p7s) >= WARN_BYTES:
+            severity = Severity.ERROR if len(p7s) > FAST_DDS_LIMIT_BYTES else Severity.WARNING
+            text = f"{len(p7s)} bytes; Fast DDS carries at most {FAST_DDS_LIMIT_BYTES}"
+            yield self._finding(severity, "too-large", layout.PERMISSIONS, text, "split the enclave")
+
+    def _grants(self, grants: tuple[Grant, ...]) -> Iterator[Finding]:
+        if len(grants) > 1:
+            yield self._finding(
+                Severity.WARNING, "several-grants", layout.PERMISSIONS,
+                f"{len(grants)} grants; of those with one subject only the first counts",
+                f"secure-keystore renew KEYSTORE {self._enclave}",
+            )  # fmt: skip
+        if self.facts is None:
+            return
+        subject = subject_name(self.facts.common_name or "")
+        mine = next((grant for grant in grants if grant.subject_name.strip() == subject), None)
+        if mine is None:
+            yield self.error(
+                "wrong-grant", layout.PERMISSIONS, f"no grant for {subject}, the subject of cert.pem"
+            )
+            return
+        yield from self._validity(mine, self.facts)
+        wide = sorted(
+            {
+                topic
+                for rule in mine.rules
+                for topic in (*rule.publish, *rule.subscribe)
+                if _WILDCARD.search(topic)
+            }
+        )
+        if wide:
+            shown = ", ".join(wide[:4]) + (" ..." if len(wide) > 4 else "")
+            yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, f"grants by wildcard: {shown}")
+
+    def _validity(self, grant: Grant, facts: CertificateFacts) -> Iterator[Finding]:
+        try:
+            validity = Validity(parse_moment(grant.not_before), parse_moment(grant.not_after))
+        except InvalidInput as error:
+            yield self.error("permissions-dates", layout.PERMISSIONS, str(error))
+            return
+        if not validity.covers(self._now):
+            dates = f"valid from {grant.not_before} to {grant.not_after}"
+            yield self.error("permissions-expired", layout.PERMISSIONS, dates)
+        elif validity.not_after != facts.validity.not_after or parse_moment(grant.not_after) > LATEST:
+            yield self._finding(
+                Severity.WARNING, "validity-differs", layout.PERMISSIONS,
+                "not valid as long as the certificate",
+                f"secure-keystore renew KEYSTORE {self._enclave}",
+            )  # fmt: skip

@@ -1,0 +1,139 @@
+"""Every entry of the keystore: known, of the right kind, private where it must be. Never follows a link."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+from keystore import layout, safe_files
+from keystore.authority import Role
+from keystore.enclave_name import check_distinct, validate_enclave_name
+from keystore.errors import InvalidEnclaveName, printable
+from keystore.verification.finding import Finding, Severity
+
+_TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES})
+_KNOWN = frozenset({
+    layout.LOCK, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
+    layout.SHARED_CA_CERT, layout.SHARED_CA_KEY,
+    *(layout.ca_cert(role) for role in Role),
+    *(layout.ca_key(role) for role in Role), *(layout.ca_key_uri(role) for role in Role),
+})  # fmt: skip
+_NEXT_CAS = frozenset(
+    f"{layout.NEXT}/{role.value}/{name}" for role in Role for name in (layout.KEY, layout.CERT)
+)
+_UNFINISHED = (layout.STAGING, layout.INCOMING)
+
+
+def check_files(root: Path) -> Iterator[Finding]:
+    names: list[str] = []
+    for relative, info in _walk(root, ""):
+        if stat.S_ISLNK(info.st_mode):
+            yield from _check_link(root, relative)
+        elif stat.S_ISDIR(info.st_mode):
+            yield from _check_directory(root, relative, info, names)
+        else:
+            yield from _check_file(root, relative, info)
+    try:
+        check_distinct(names)
+    except InvalidEnclaveName as error:
+        yield Finding(
+            Severity.ERROR, "case-collision", error.name, str(error), "remove one of the two enclaves"
+        )
+
+
+def _walk(root: Path, relative: str) -> Iterator[tuple[str, os.stat_result]]:
+    with os.scandir(root / relative) as entries:
+        ordered = sorted(entries, key=lambda entry: entry.name)
+    for entry in ordered:
+        name = f"{relative}/{entry.name}".lstrip("/")
+        info = entry.stat(follow_symlinks=False)
+        yield name, info
+        if stat.S_ISDIR(info.st_mode) and name not in _UNFINISHED:
+            yield from _walk(root, name)
+
+
+def _check_link(root: Path, relative: str) -> Iterator[Finding]:
+    target = safe_files.link_target(root, relative) or ""
+    if target not in safe_files.allowed_targets(relative):
+        message = str(safe_files.strange_link(root, relative, target))
+        yield Finding(Severity.ERROR, "strange-link", relative, message, _command("rm", root / relative))
+    elif not os.path.exists(root / relative):
+        yield Finding(
+            Severity.ERROR, "dangling-link", relative, f"points at {printable(target)}, which is missing",
+            "restore the file, or run secure-keystore renew",
+        )  # fmt: skip
+
+
+def _check_directory(root: Path, relative: str, info: os.stat_result, names: list[str]) -> Iterator[Finding]:
+    if relative in _UNFINISHED:
+        yield Finding(
+            Severity.WARNING, "interrupted", relative, "an interrupted run left this behind",
+            "any secure-keystore command that writes completes or clears it",
+        )  # fmt: skip
+        return
+    yield from _check_owner(root, relative, info, private=relative.split("/")[0] == layout.PRIVATE)
+    if relative in _TOP or relative == layout.RETIRED or relative.startswith(layout.NEXT):
+        return
+    if relative.startswith(layout.ENCLAVES + "/"):
+        name = relative.removeprefix(layout.ENCLAVES)
+        try:
+            names.append(validate_enclave_name(name))
+        except InvalidEnclaveName as error:
+            yield _stray(root, relative, f"no enclave can have this name: {error.reason}")
+    else:
+        yield _stray(root, relative, "no keystore has this directory")
+
+
+def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Finding]:
+    if not stat.S_ISREG(info.st_mode):
+        yield _stray(root, relative, "neither file, directory nor link")
+        return
+    directory, _, name = relative.rpartition("/")
+    secret = directory == layout.PRIVATE or name == layout.KEY
+    yield from _check_owner(root, relative, info, private=secret)
+    if relative in _KNOWN or (directory == layout.RETIRED and name.endswith(".cert.pem")):
+        return
+    if relative in _NEXT_CAS:
+        return
+    if directory.split("/")[0] == layout.ENCLAVES and name in layout.ENCLAVE_FILES:
+        return
+    if name.endswith(".p11"):
+        yield _stray(root, relative, "rcl prefers it to the .pem beside it, and Fast DDS takes only keys so")
+    else:
+        yield _stray(root, relative, "no keystore has this file")
+
+
+def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bool) -> Iterator[Finding]:
+    path = root / relative
+    if private and (problem := safe_files.private_problem(path, info)):
+        yield Finding(Severity.ERROR, "unsafe-owner", relative, problem, problem.rpartition(": ")[2])
+    elif info.st_mode & 0o022:
+        yield Finding(
+            Severity.ERROR, "writable-by-others", relative,
+            f"others can write it (mode {safe_files.mode_text(info)})", _command("chmod go-w", path),
+        )  # fmt: skip
+    if private and info.st_mode & 0o077 and not info.st_mode & 0o022:
+        yield Finding(
+            Severity.ERROR, "readable-by-others", relative,
+            f"others can read it (mode {safe_files.mode_text(info)}); whoever did holds the key",
+            _command("chmod go-rwx", path) + "; new keys: secure-keystore renew --new-keys",
+        )  # fmt: skip
+
+
+def _stray(root: Path, relative: str, why: str) -> Finding:
+    path = root / relative
+    holds_key = path.is_file() and b"PRIVATE KEY" in path.read_bytes()[:4096]
+    return Finding(
+        Severity.ERROR if holds_key else Severity.WARNING,
+        "stray-key" if holds_key else "stray",
+        relative,
+        ("a private key that no DDS process reads" if holds_key else why) + "; it does not belong here",
+        _command("rm -r" if path.is_dir() else "rm", path),
+    )
+
+
+def _command(verb: str, path: Path) -> str:
+    return f"{verb} {shlex.quote(str(path))}"
