@@ -5,8 +5,17 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from keystore import der
+
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.types import PublicKeyTypes
+
+# Imported CAs may certify themselves with more than SHA-256.
+_ECDSA_SHA384 = der.encode(der.SEQUENCE, der.object_identifier("1.2.840.10045.4.3.3"))
+_RSA_SHA384, _RSA_SHA512 = (
+    der.encode(der.SEQUENCE, der.object_identifier(f"1.2.840.113549.1.1.{arc}"), der.encode(der.NULL))
+    for arc in (12, 13)
+)
 
 
 @lru_cache(maxsize=16)
@@ -16,18 +25,23 @@ def _load(spki: bytes) -> PublicKeyTypes:
     return load_der_public_key(spki)
 
 
-def signature_is_valid(spki: bytes, signature: bytes, data: bytes) -> bool:
-    """SHA-256 with ECDSA or RSA PKCS#1 v1.5; ``spki`` is the DER SubjectPublicKeyInfo."""
+def signature_is_valid(spki: bytes, signature: bytes, data: bytes, algorithm: bytes | None = None) -> bool:
+    """ECDSA or RSA PKCS#1 v1.5; ``spki`` is the DER SubjectPublicKeyInfo.
+
+    ``algorithm`` is the DER AlgorithmIdentifier of a certificate; None and unknown ones count as SHA-256.
+    """
     from cryptography.exceptions import InvalidSignature
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
 
     key = _load(spki)
+    larger = {_ECDSA_SHA384: hashes.SHA384(), _RSA_SHA384: hashes.SHA384(), _RSA_SHA512: hashes.SHA512()}
+    digest = larger.get(algorithm or b"", hashes.SHA256())
     try:
         if isinstance(key, ec.EllipticCurvePublicKey):
-            key.verify(signature, data, ec.ECDSA(hashes.SHA256()))
+            key.verify(signature, data, ec.ECDSA(digest))
         elif isinstance(key, rsa.RSAPublicKey):
-            key.verify(signature, data, padding.PKCS1v15(), hashes.SHA256())
+            key.verify(signature, data, padding.PKCS1v15(), digest)
         else:
             return False
     except InvalidSignature:

@@ -1,0 +1,33 @@
+"""Give every enclave of an SROS2 policy file exactly its permissions, creating enclaves that are missing."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("policy", metavar="POLICY.xml", type=Path, help="SROS2 policy, version 0.2.0")
+    parser.add_argument("--domain-id", metavar="IDS", help="domains of the permissions (default: the governance's)")
+    common.add_validity(parser)
+    common.add_subjects(parser)
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.domains import Domains
+    from keystore.enclaves import apply_policy
+    from keystore.policy_xml import read_policy
+
+    document = read_policy(arguments.policy)
+    common.warn(document.warnings)
+    domains = Domains.parse(arguments.domain_id) if arguments.domain_id else None
+    report = apply_policy(
+        arguments.keystore, document.policy, options=common.provision_options(arguments, domains=domains)
+    )
+    common.print_report(report)
+    return 0
