@@ -11,7 +11,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 
-from nodl.infer.values import ABSENT, BOTTOM, Cells, FieldCells, HeapObject, Value, contains, join, widen
+from nodl.infer.values import ABSENT, BOTTOM, Cells, FieldCells, HeapObject, LocalCells, Value, contains, join, widen
 
 Alternative = Callable[[], bool]  # runs one branch; tells whether its end can be reached
 Written = dict[tuple[int, object], tuple[Cells, object, Value]]  # by cell: its value at the end of a branch
@@ -24,7 +24,7 @@ class State:
         self.stamp = 0
         self.depth = 0  # how many branches or loops surround the current point
 
-    def write(self, cells: Cells, key: object, value: Value, *, local: bool = False) -> None:
+    def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
         """Strong update. ``local``: only the running function can see the cell (no new stamp)."""
         old = cells.get(key)
         if old is value or (old is not None and _same(old, value)):
@@ -88,7 +88,7 @@ class State:
         """Give each cell written since ``mark`` (except in ``own``) every value it held since then."""
         seen: Written = {}
         for cells, key, old in self._trail[mark:]:
-            if cells is own:
+            if cells is own or (type(cells) is LocalCells and cells.dead):
                 continue
             place = (id(cells), key)
             entry = seen.get(place)
@@ -105,7 +105,8 @@ class State:
         stable = True
         first: dict[tuple[int, object], tuple[Cells, object, Value | None]] = {}
         for cells, key, old in self._trail[mark:]:
-            first.setdefault((id(cells), key), (cells, key, old))
+            if type(cells) is not LocalCells or not cells.dead:
+                first.setdefault((id(cells), key), (cells, key, old))
         for cells, key, old in first.values():
             current = cells.get(key)
             if current is None:
@@ -125,7 +126,7 @@ class State:
         return {
             (id(cells), key): (cells, key, cells[key])
             for cells, key, _ in self._trail[mark:]
-            if key in cells
+            if key in cells and (type(cells) is not LocalCells or not cells.dead)
         }
 
     def _undo(self, mark: int) -> None:
@@ -146,7 +147,7 @@ class State:
             for outcome in outcomes:
                 if place in outcome:
                     value = join(value, outcome[place][2])
-            self.write(cells, key, value)
+            self.write(cells, key, value, type(cells) is LocalCells and not cells.shared)
 
 
 def _same(old: Value, new: Value) -> bool:

@@ -90,6 +90,20 @@ def external(path: str) -> Value:
     return value
 
 
+class LocalCells(dict[object, Value]):
+    """The variables of one function call.
+
+    ``shared``: inner functions can see them. ``dead``: the call has returned and nobody can see them.
+    """
+
+    __slots__ = ("dead", "shared")
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.dead = False
+        self.shared = False
+
+
 class HeapObject:
     """An object with mutable contents. A ``summary`` stands for several concrete ones (weak updates)."""
 

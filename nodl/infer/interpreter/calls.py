@@ -23,6 +23,7 @@ from nodl.infer.values import (
     Instance,
     Items,
     Key,
+    LocalCells,
     NativeMethod,
     Partial,
     Unknown,
@@ -61,7 +62,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     return _remembered(run, function, cells, call)
 
 
-def _remembered(run: Run, function: FunctionValue, cells: dict[object, Value], call: Call) -> Value:
+def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
     """A call that leaves the state as it found it gives the same again while the state is the same."""
     key = (function, tuple(cells.values()), id(call.node) if run.context else 0)
     known = run.memo.get(key)
@@ -74,12 +75,19 @@ def _remembered(run: Run, function: FunctionValue, cells: dict[object, Value], c
     return result
 
 
-def _run_body(run: Run, function: FunctionValue, cells: dict[object, Value], call: Call) -> Value:
+def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
     closure = function.closure
     assert closure is None or isinstance(closure, Frame)
-    frame = Frame(function.module, cells, closure, run.state.depth)
-    frame.function = function
     previous = run.enter(id(call.node))
+    key = (run.context, id(function.node))
+    earlier = run.captured_cells.get(key)
+    if earlier is not None:  # inner functions of an earlier call live on: both calls share the variables
+        for name, value in cells.items():
+            run.state.write(earlier, name, join(earlier.get(name, BOTTOM), value))
+        cells = earlier
+    frame = Frame(function.module, cells, closure, run.state.depth)
+    frame.again = earlier is not None
+    frame.function = function
     run.stack.append(function.node)
     mark = run.state.mark()
     node = function.node
@@ -88,9 +96,13 @@ def _run_body(run: Run, function: FunctionValue, cells: dict[object, Value], cal
     else:
         passes = run.execute(node.body, frame)
         if frame.early:
-            run.state.join_seen(mark, None if frame.captured else cells)
+            run.state.join_seen(mark, None if cells.shared else cells)
         if passes:
             frame.returned = join(frame.returned, NONE)
+    if cells.shared:
+        run.captured_cells[key] = cells
+    else:
+        cells.dead = True
     run.stack.pop()
     run.context = previous
     if frame.yielded is not None:
@@ -98,13 +110,15 @@ def _run_body(run: Run, function: FunctionValue, cells: dict[object, Value], cal
     return frame.returned or ANY
 
 
-def _run_recursive(run: Run, function: FunctionValue, cells: dict[object, Value], call: Call) -> Value:
+def _run_recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
     summary = Summary(dict(cells))
     run.summaries[function.node] = summary
     run.repeated += 1
     for _ in range(6):
         summary.changed = False
-        result = _run_body(run, function, dict(summary.parameters), call)
+        cells = LocalCells()
+        cells.update(summary.parameters)
+        result = _run_body(run, function, cells, call)
         merged = join(summary.result, result)
         if merged is summary.result and not summary.changed:
             break
@@ -116,7 +130,7 @@ def _run_recursive(run: Run, function: FunctionValue, cells: dict[object, Value]
     return summary.result or ANY
 
 
-def _recursive_result(run: Run, summary: Summary, cells: dict[object, Value]) -> Value:
+def _recursive_result(run: Run, summary: Summary, cells: LocalCells) -> Value:
     for key, value in cells.items():
         old = summary.parameters.get(key, BOTTOM)
         new = widen(old, value, summary.widened > 2)
@@ -130,11 +144,11 @@ def _recursive_result(run: Run, summary: Summary, cells: dict[object, Value]) ->
 # --- binding ----------------------------------------------------------------------------------------------
 
 
-def bind(run: Run, function: FunctionValue, call: Call) -> dict[object, Value]:
+def bind(run: Run, function: FunctionValue, call: Call) -> LocalCells:
     """The parameters' values; what the caller does not give takes its default."""
     given, parameters = call.args, function.node.args
     names = [parameter.arg for parameter in (*parameters.posonlyargs, *parameters.args)]
-    cells: dict[object, Value] = {}
+    cells = LocalCells()
     first_default = len(names) - len(function.defaults)
     used: set[str] = set()
     for index, name in enumerate(names):

@@ -33,7 +33,7 @@ _DATACLASSES = frozenset({"dataclasses.dataclass", "attr.s", "attrs.define", "at
 def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> FunctionValue:
     closure = frame.closure if frame.is_class else frame
     if not frame.is_class:
-        frame.captured = True
+        frame.capture()
     owner = frame.cells.get("[class]") if frame.is_class else None
     owner_class = owner[0] if owner and isinstance(owner[0], ClassValue) else None
     key = (run.context, id(node), "function")
@@ -100,7 +100,7 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     assert isinstance(cls, ClassValue)
     body = Frame(frame.module, cls.cells, frame.closure if frame.is_class else frame, frame.depth)
     if not frame.is_class:
-        frame.captured = True
+        frame.capture()
     body.is_class = True
     body.cells["[class]"] = (cls,)
     body.function = frame.function

@@ -16,6 +16,7 @@ from nodl.infer.values import (
     Dictionary,
     Items,
     Key,
+    LocalCells,
     Value,
     join,
 )
@@ -170,11 +171,14 @@ def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
 
 def _inner_frame(frame: Frame) -> Frame:
     closure = frame.closure if frame.is_class else frame
-    inner = Frame(frame.module, dict(frame.cells) if frame.is_class else {}, closure, frame.depth)
+    cells = LocalCells()
+    if frame.is_class:
+        cells.update(frame.cells)
+    inner = Frame(frame.module, cells, closure, frame.depth)
     inner.function = frame.function
-    inner.captured = True
+    inner.capture()
     if not frame.is_class:
-        frame.captured = True
+        frame.capture()
     return inner
 
 

@@ -26,6 +26,7 @@ from nodl.infer.values import (
     HeapObject,
     Instance,
     Items,
+    LocalCells,
     ModuleValue,
     Partial,
     Sequence,
@@ -46,7 +47,7 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "captured", "cells", "closure", "depth", "early", "function", "globals", "is_class", "module",
+        "again", "cells", "closure", "depth", "early", "function", "globals", "is_class", "module",
         "nonlocals", "returned", "unsettled", "yielded",
     )  # fmt: skip
 
@@ -60,10 +61,19 @@ class Frame:
         self.yielded: Value | None = None
         self.early = False  # some path left before the end
         self.unsettled = False  # a break or continue since the loop asked last
-        self.captured = False  # inner functions can see the cells
+        self.again = False  # the cells also hold an earlier call, whose inner functions live on
         self.is_class = False
         self.globals: set[str] = set()
         self.nonlocals: set[str] = set()
+
+    @property
+    def captured(self) -> bool:
+        return type(self.cells) is LocalCells and self.cells.shared
+
+    def capture(self) -> None:
+        """Inner functions can see the cells from now on."""
+        if type(self.cells) is LocalCells:
+            self.cells.shared = True
 
 
 @dataclass(slots=True)
@@ -149,6 +159,8 @@ class Run:
         self.context = 0
         self._contexts: dict[tuple[int, object], int] = {}
         self._context_ids = itertools.count(1)
+        self._tuples: dict[object, Value] = {}
+        self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
         self._allocated: dict[tuple[object, ...], HeapObject] = {}
 
     # --- syntax -----------------------------------------------------------------------------------------
@@ -172,13 +184,21 @@ class Run:
     # --- variables --------------------------------------------------------------------------------------
 
     def assign_name(self, name: str, value: Value, frame: Frame) -> None:
+        cells = frame.cells
         if name in frame.globals:
             self.state.write(frame.module.cells, name, value)
         elif name in frame.nonlocals:
             self._assign_nonlocal(name, value, frame)
+        elif type(cells) is not LocalCells:
+            self.state.write(cells, name, value)
+        elif frame.captured:
+            if frame.again:
+                value = join(cells.get(name, BOTTOM), value)
+            self.state.write(cells, name, value)
+        elif self.state.depth == frame.depth:
+            cells[name] = value  # no branch to undo: nobody else will ask
         else:
-            shared = frame.captured or frame.closure is None or frame.is_class
-            self.state.write(frame.cells, name, value, local=not shared)
+            self.state.write(cells, name, value, True)
 
     def _assign_nonlocal(self, name: str, value: Value, frame: Frame) -> None:
         outer = frame.closure
@@ -246,7 +266,17 @@ class Run:
             found.summary = True
         return found
 
+    def tuple_of(self, parts: tuple[Value, ...]) -> Value:
+        """A tuple; it never changes, so equal ones are one object and need no allocation site."""
+        key = (parts, tuple(type(part[0]) if part else None for part in parts))
+        found = self._tuples.get(key)
+        if found is None:
+            found = self._tuples[key] = (Sequence("tuple", Items(parts)),)
+        return found
+
     def sequence(self, node: ast.AST, kind: str, items: Items) -> Value:
+        if kind == "tuple" and items.exact is not None:
+            return self.tuple_of(items.exact)
         obj = self.allocate(node, kind, lambda: Sequence(kind, items))
         if obj.summary:
             self.state.store(obj, "[items]", (items,))

@@ -136,16 +136,11 @@ def _enumerate(run: Run, call: Call) -> Value:
     start = sole(call.args.at(1, "start") or (0,))
     if items.exact is not None and type(start) is int:
         pairs = tuple(
-            _fresh_tuple(((start + index,), element)) for index, element in enumerate(items.exact)
+            run.tuple_of(((start + index,), element)) for index, element in enumerate(items.exact)
         )
         return run.sequence(call.node, "list", Items(pairs))
-    pair = _fresh_tuple((unknown("a number of a loop"), items.any_element() or ANY))
+    pair = run.tuple_of((unknown("a number of a loop"), items.any_element() or ANY))
     return run.sequence(call.node, "list", Items(None, pair))
-
-
-def _fresh_tuple(parts: tuple[Value, ...]) -> Value:
-    """A tuple is never changed, so it needs no allocation site."""
-    return (Sequence("tuple", Items(parts)),)
 
 
 def _zip(run: Run, call: Call) -> Value:
@@ -154,8 +149,8 @@ def _zip(run: Run, call: Call) -> Value:
         return ANY
     if all(column.exact is not None for column in columns):
         rows = zip(*(column.exact or () for column in columns), strict=False)
-        return run.sequence(call.node, "list", Items(tuple(_fresh_tuple(tuple(row)) for row in rows)))
-    row = _fresh_tuple(tuple(column.any_element() or ANY for column in columns))
+        return run.sequence(call.node, "list", Items(tuple(run.tuple_of(tuple(row)) for row in rows)))
+    row = run.tuple_of(tuple(column.any_element() or ANY for column in columns))
     return run.sequence(call.node, "list", Items(None, row))
 
 

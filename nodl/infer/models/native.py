@@ -200,12 +200,12 @@ def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
     keys, values = keys_of(owner), values_of(owner)
     if keys.exact is not None and values.exact is not None:
         pairs = tuple(
-            (Sequence("tuple", Items((key, value))),)
+            run.tuple_of((key, value))
             for key, value in zip(keys.exact, values.exact, strict=True)
         )
         return run.sequence(call.node, "list", Items(pairs))
-    pair = Sequence("tuple", Items((keys.any_element() or ANY, values.any_element() or ANY)))
-    return run.sequence(call.node, "list", Items(None, (pair,)))
+    pair = run.tuple_of((keys.any_element() or ANY, values.any_element() or ANY))
+    return run.sequence(call.node, "list", Items(None, pair))
 
 
 def _update(run: Run, owner: Dictionary, call: Call) -> Value:

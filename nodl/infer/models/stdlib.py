@@ -20,7 +20,6 @@ from nodl.infer.values import (
     Items,
     Key,
     Partial,
-    Sequence,
     Value,
     constant_strings,
     join,
@@ -85,7 +84,7 @@ def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
 def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
     namespace = _parse_args(run, parser, call)
     rest = run.sequence(call.node, "list", Items(None, unknown("command line arguments")))
-    return (Sequence("tuple", Items((namespace, rest))),)
+    return run.tuple_of((namespace, rest))
 
 
 def _namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
@@ -218,9 +217,9 @@ def _product(run: Run, call: Call) -> Value:
     for column in columns:
         if column.exact is None or len(rows) * len(column.exact) > builtin.MAX_RANGE:
             row = tuple(each.any_element() or ANY for each in columns)
-            return run.sequence(call.node, "list", Items(None, (Sequence("tuple", Items(row)),)))
+            return run.sequence(call.node, "list", Items(None, run.tuple_of(row)))
         rows = [(*row, item) for row in rows for item in column.exact]
-    pairs = tuple((Sequence("tuple", Items(row)),) for row in rows)
+    pairs = tuple(run.tuple_of(row) for row in rows)
     return run.sequence(call.node, "list", Items(pairs))
 
 
