@@ -1,0 +1,162 @@
+"""Remap rules: what rcl's lexer accepts, and which rule changes which name (rcl arguments.c, remap.c)."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nodl.remap import (
+    InvalidRemapRuleError,
+    NodeNames,
+    RemapKind,
+    RemapRules,
+    parse_rule,
+    parse_rules,
+)
+
+
+def rules(*texts: str, local: tuple[str, ...] = ()) -> RemapRules:
+    return RemapRules(
+        local=parse_rules((text, "local") for text in local),
+        process=parse_rules((text, "process") for text in texts),
+    )
+
+
+ACCEPTED = {
+    "__node:=n": (RemapKind.NODE_NAME, None),
+    "__name:=n": (RemapKind.NODE_NAME, None),
+    "old:__node:=n": (RemapKind.NODE_NAME, "old"),
+    "__ns:=/": (RemapKind.NAMESPACE, None),
+    "__ns:=/a/b": (RemapKind.NAMESPACE, None),
+    "__ns:=/a/": (RemapKind.NAMESPACE, None),
+    "old:__ns:=/a": (RemapKind.NAMESPACE, "old"),
+    "_:=kq": (RemapKind.ANY_NAME, None),
+    "a:=b": (RemapKind.ANY_NAME, None),
+    "~/a:=~/b": (RemapKind.ANY_NAME, None),
+    "/a/b:=c": (RemapKind.ANY_NAME, None),
+    "n:/a1:=/b2": (RemapKind.ANY_NAME, "n"),
+    "rostopic:=/a": (RemapKind.ANY_NAME, None),
+    "rosservice:/a:=b": (RemapKind.ANY_NAME, "rosservice"),
+    "rostopic://a:=b": (RemapKind.TOPIC, None),
+    "rostopic:///a:=b": (RemapKind.TOPIC, None),
+    "rosservice://a:=b": (RemapKind.SERVICE, None),
+    "n:rosservice://~/a:=b": (RemapKind.SERVICE, "n"),
+}
+
+
+@pytest.mark.parametrize("text", ACCEPTED)
+def test_rules_that_rcl_accepts(text: str) -> None:
+    rule = parse_rule(text)
+    assert (rule.kind, rule.node) == ACCEPTED[text]
+
+
+REJECTED = (
+    *("", "a", ":", "1", "~", ":=", "a:=", ":=b", "::=", "1:=", "~:=", "~:=b", "a:=~"),
+    *("/:=b", "a:=/", "a/:=b", "a:=b/", "a//b:=c", "a b:=c", "a:=b c", "a-b:=c", "a.b:=c", "1a:=b", "a/1b:=c"),
+    *("a__b:=c", "a:=b__c", "__x:=b", "a:=__node", "~abc:=d", "a:=~abc", "{node}:=a", "f{oo:=/b", "a:=/b}c"),
+    *("n1:n2:a:=b", "/ns/n:a:=b", "rostopic://n:a:=b", "a:=b:=c", "a:=rostopic://b", "rostopic://:=b"),
+    *("rostopic::=b", "__node:=", "__node:=a/b", "__ns:=", "__ns:=a", "__ns:=//", "__ns:=/1", "a\n:=b"),
+    *(":__node:=n", "~:__node:=n", "*:=a", "a:=**", r"a:=\1", "n__x:a:=b"),
+)
+
+
+@pytest.mark.parametrize("text", REJECTED)
+def test_rules_at_which_rcl_refuses_to_start(text: str) -> None:
+    with pytest.raises(InvalidRemapRuleError):
+        parse_rule(text)
+
+
+def test_a_bad_rule_is_told_with_its_place() -> None:
+    with pytest.raises(InvalidRemapRuleError, match=r"demo.launch.xml:7: invalid remap rule 'a__b:=c': .*'__'"):
+        parse_rule("a__b:=c", "demo.launch.xml:7")
+
+
+# name in code, rule, topic, service; for node /ns/n
+MATCHES = [
+    ("a", "a:=b", "/ns/b", "/ns/b"),
+    ("a", "/ns/a:=b", "/ns/b", "/ns/b"),
+    ("a", "/a:=b", "/ns/a", "/ns/a"),
+    ("/a", "a:=b", "/a", "/a"),
+    ("/a", "/a:=/b", "/b", "/b"),
+    ("~/a", "~/a:=c", "/ns/c", "/ns/c"),
+    ("~/a", "n/a:=c", "/ns/c", "/ns/c"),
+    ("a", "rosservice://a:=b", "/ns/a", "/ns/b"),
+    ("a", "rostopic://a:=b", "/ns/b", "/ns/a"),
+    ("a", "n:a:=b", "/ns/b", "/ns/b"),
+    ("a", "other:a:=b", "/ns/a", "/ns/a"),
+    ("a", "a:=~/b", "/ns/n/b", "/ns/n/b"),
+]
+
+
+@pytest.mark.parametrize(("name", "rule", "topic", "service"), MATCHES)
+def test_matching(name: str, rule: str, topic: str, service: str) -> None:
+    names = NodeNames("n", "/ns", rules(rule))
+    assert (names.topic(name).name, names.service(name).name) == (topic, service)
+
+
+def test_the_first_match_wins_and_nothing_is_applied_to_the_result() -> None:
+    names = NodeNames("n", "/", rules("a:=b", "b:=c", "a:=d"))
+    assert names.topic("a").name == "/b"
+    assert names.topic("b").name == "/c"
+
+
+def test_local_rules_come_before_those_of_the_process() -> None:
+    names = NodeNames("n", "/", rules("a:=global", "b:=global", local=("a:=own",)))
+    assert names.topic("a").name == "/own"
+    assert [rule.origin for rule in names.topic("a").rules] == ["local"]
+    assert names.topic("b").name == "/global"
+
+
+def test_node_name_and_namespace_take_the_first_rule_that_applies() -> None:
+    chosen = rules("other:__node:=x", "__node:=y", "__node:=z", "y:__ns:=/new", "n:__ns:=/old")
+    assert chosen.node_name("n").name == "y"
+    assert chosen.namespace("/", "y").name == "/new"  # NODE: compares with the new name
+    assert RemapRules().node_name("n").name == "n"
+
+
+def test_a_rule_for_the_original_name_no_longer_matches_names_of_the_renamed_node() -> None:
+    # rcl_resolve_name hands the final node name to the matching, rcl_remap_node_name the original one
+    assert NodeNames("new", "/", rules("old:a:=b")).topic("a").name == "/a"
+    assert NodeNames("new", "/", rules("new:a:=b")).topic("a").name == "/b"
+
+
+def test_action_names_as_a_whole_follow_topic_rules() -> None:
+    names = NodeNames("n", "/", rules("fib:=fibonacci"))
+    assert names.action("fib", as_a_whole=True).name == "/fibonacci"
+    assert names.action("fib", as_a_whole=False).name == "/fib"
+    assert NodeNames("n", "/", rules("rosservice://fib:=x")).action("fib", as_a_whole=True).name == "/fib"
+    assert names.action_parts("/fib") is None
+
+
+def test_parts_of_an_action_are_remapped_one_by_one() -> None:
+    names = NodeNames("n", "/", rules("fib/_action/feedback:=news", "rosservice://fib/_action/send_goal:=go"))
+    parts = names.action_parts("/fib")
+    assert parts is not None
+    assert {k: r.name for k, r in parts.topics.items()} == {"feedback": "/news", "status": "/fib/_action/status"}
+    assert parts.services["send_goal"].name == "/go"
+    assert parts.services["get_result"].name == "/fib/_action/get_result"
+
+
+words = st.from_regex(r"[a-z]{1,4}", fullmatch=True)
+names_in_code = st.builds(lambda head, tail: head + tail, st.sampled_from(["", "/", "~/"]), words)
+
+
+@given(st.lists(st.tuples(names_in_code, names_in_code), max_size=5), names_in_code)
+def test_a_name_that_no_rule_matches_stays(pairs: list[tuple[str, str]], name: str) -> None:
+    plain = NodeNames("node", "/space")
+    chosen = rules(*(f"{a}:={b}" for a, b in pairs))
+    resolved = NodeNames("node", "/space", chosen).topic(name)
+    first = next((b for a, b in pairs if plain.expand(a) == plain.expand(name)), None)
+    assert resolved.name == plain.expand(name if first is None else first)
+    assert bool(resolved.rules) == (first is not None)
+
+
+@given(st.text(max_size=20))
+def test_any_text_is_either_a_rule_or_an_error_of_ours(text: str) -> None:
+    try:
+        rule = parse_rule(text)
+    except InvalidRemapRuleError:
+        return
+    assert "__" not in rule.match + rule.replacement
+    assert parse_rule(rule.text) == rule
