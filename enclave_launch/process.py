@@ -113,3 +113,4 @@ class Evaluation:
     launcher_calls: tuple[LauncherCall, ...] = ()
     unforeseeable: tuple[Unforeseeable, ...] = ()
     warnings: tuple[str, ...] = ()
+    distro: str = "rolling"  # whose rules were followed

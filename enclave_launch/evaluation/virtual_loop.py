@@ -123,6 +123,14 @@ class VirtualLoop:
             return True
         return False
 
+    def fire_due(self) -> bool:
+        """Call the next timer if it is due by now, without moving the clock."""
+        while self._timers and self._timers[0][2].cancelled_:
+            heapq.heappop(self._timers)
+        if self._timers and self._timers[0][0] <= self._now:
+            return self.fire_next()
+        return False
+
     def save(self) -> tuple[float, list[tuple[float, int, VirtualTimer]]]:
         return self._now, list(self._timers)
 

@@ -9,11 +9,15 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.launch.actions.include_launch_description import IncludeLaunchDescription
+from enclave_launch.evaluation.include import OpenFile, opened
 from enclave_launch.evaluation.location import annotate, include_step
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
     from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
+
+
+Surroundings = tuple[tuple[str, ...], tuple[OpenFile, ...]]
 
 
 def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[Any]:
@@ -22,14 +26,13 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
     An exception ends the walk; it carries the place of the entity that raised it (``location.place_of``).
     """
     futures: list[Any] = []
-    before = context.includes
-    stack: list[tuple[Iterator[LaunchDescriptionEntity], tuple[str, ...]]] = [(iter((entity,)), before)]
-    current: LaunchDescriptionEntity = entity
+    outside = context.includes, context.open_files
+    stack: list[tuple[Iterator[LaunchDescriptionEntity], Surroundings]] = [(iter((entity,)), outside)]
+    current: LaunchDescriptionEntity | None = entity
     try:
         while stack:
-            siblings, includes = stack[-1]
-            context.includes = includes
-            current = next(siblings, None)  # type: ignore[assignment]
+            siblings, (context.includes, context.open_files) = stack[-1]
+            current = next(siblings, None)
             if current is None:
                 stack.pop()
                 continue
@@ -38,16 +41,16 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
             if future is not None:
                 futures.append((current, future))
             if sub_entities is not None:
-                stack.append((iter(sub_entities), _includes_below(current, context)))
-    except Exception as error:
+                stack.append((iter(sub_entities), _surroundings_below(current, context)))
+    except Exception as error:  # noted where it happened, and raised again
         annotate(error, current, context)
         raise
     finally:
-        context.includes = before
+        context.includes, context.open_files = outside
     return futures
 
 
-def _includes_below(entity: LaunchDescriptionEntity, context: LaunchContext) -> tuple[str, ...]:
+def _surroundings_below(entity: LaunchDescriptionEntity, context: LaunchContext) -> Surroundings:
     if isinstance(entity, IncludeLaunchDescription):
-        return (*context.includes, include_step(entity))
-    return context.includes
+        return (*context.includes, include_step(entity)), opened(entity, context)
+    return context.includes, context.open_files

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.event import Event
     from enclave_launch.description.launch.launch_context import LaunchContext
     from enclave_launch.description.launch.some_entities_type import SomeEntitiesType
+    from enclave_launch.source_location import SourceLocation
 
 
 class BaseEventHandler:
@@ -20,6 +21,8 @@ class BaseEventHandler:
 
     event_class: type[Event] | None = None
     target: object | None = None
+    internal = False  # launch's own: part of how it works, not of what the launch file says
+    source_location: SourceLocation | None = None  # of the action that registered it
 
     def __init__(self, *, matcher: Callable[[Event], bool], handle_once: bool = False) -> None:
         self.__matcher = matcher
@@ -93,3 +96,11 @@ class EventHandler(BaseEventHandler):
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         super().handle(event, context)
         return self.__entities
+
+    def foresee(self, started: Sequence[Any]) -> Event | None:
+        """The exit, or the first output, of a started process that the matcher takes."""
+        if type(self).matches is not BaseEventHandler.matches or self.event_class is not None:
+            return None
+        from enclave_launch.evaluation.suppositions import suppose_process_event
+
+        return suppose_process_event(self.matches, started)

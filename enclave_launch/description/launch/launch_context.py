@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.event import Event
     from enclave_launch.description.launch.event_handler import BaseEventHandler
     from enclave_launch.description.launch.substitution import Substitution
+    from enclave_launch.evaluation.include import OpenFile
 
 
 class Locals:
@@ -38,7 +39,7 @@ class LaunchContext:
     """Launch configurations, environment, locals, events. Upstream's class, plus:
 
     ``host`` the way to the world; ``on_event`` what is being handled, ``None`` during the visit of the file;
-    ``includes`` the "file:line" of each include that we are in.
+    ``includes`` the "file:line" of each include that we are in; ``open_files`` the files themselves.
     """
 
     def __init__(
@@ -61,6 +62,7 @@ class LaunchContext:
         self._completion_futures: list[Any] = []
         self.on_event: str | None = None
         self.includes: tuple[str, ...] = ()
+        self.open_files: tuple[OpenFile, ...] = ()
         self._timer_handler_installed = False
 
     @property

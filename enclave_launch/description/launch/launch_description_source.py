@@ -36,22 +36,37 @@ class LaunchDescriptionSource:
         """
         if self.__launch_description is not None:
             return self.__launch_description
+        location = self.location_without_context()
+        if location is None:
+            return None
         try:
-            return self._get_launch_description(self._location_without_context())
+            return self._get_launch_description(location)
         except Exception:  # whatever the file raises: upstream goes on without it, and so must we
             return None
 
-    def _location_without_context(self) -> str:
+    def location_without_context(self) -> str | None:
+        """The path, performed in an empty context; ``None`` when it cannot, or when there is nothing to load."""
         from enclave_launch.description.launch.launch_context import LaunchContext
 
-        return perform_substitutions(LaunchContext(), self.__location)
+        if self.__launch_description is not None:
+            return None
+        try:
+            return perform_substitutions(LaunchContext(), self.__location)
+        except Exception:  # any substitution, ours or a third party's
+            return None
+
+    def expand(self, context: LaunchContext) -> str:
+        """The path, performed at the first call."""
+        if self.__expanded_location is None:
+            self.__expanded_location = perform_substitutions(context, self.__location)
+        return self.__expanded_location
 
     def get_launch_description(self, context: LaunchContext) -> LaunchDescription:
         """The description, loaded if necessary."""
-        if self.__expanded_location is None:
-            self.__expanded_location = perform_substitutions(context, self.__location)
+        location = self.expand(context)
         if self.__launch_description is None:
-            self.__launch_description = self._get_launch_description(self.__expanded_location)
+            known = context.host.loads.take(self, location)
+            self.__launch_description = self._get_launch_description(location) if known is None else known
         return self.__launch_description
 
     def _get_launch_description(self, location: str) -> LaunchDescription:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
     from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
 
+_FILE_LOCALS = ("current_launch_file_path", "current_launch_file_directory")
 Arguments = Iterable[tuple["SomeSubstitutionsType", "SomeSubstitutionsType"]]
 
 
@@ -50,6 +51,7 @@ class IncludeLaunchDescription(Action):
             launch_description_source = AnyLaunchDescriptionSource(launch_description_source)
         self.__source: LaunchDescriptionSource = launch_description_source
         self.__launch_arguments = () if launch_arguments is None else tuple(launch_arguments)
+        self.entered_with: dict[str, Any] = {}  # the launch configurations when it was executed
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
@@ -97,14 +99,21 @@ class IncludeLaunchDescription(Action):
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         from enclave_launch.evaluation.include import prepare_include
 
+        self.entered_with = dict(context.launch_configurations)
         description = prepare_include(self, context)
         if description is None:
             return []
+        before = {name: context.get_locals_as_dict().get(name) for name in _FILE_LOCALS}
         self.__set_file_locals(context)
         from enclave_launch.evaluation.arguments import check_required_arguments
 
         check_required_arguments(description, self.__argument_names(context))
         arguments = [SetLaunchConfiguration(name, value) for name, value in self.__launch_arguments]
+        if context.host.release.has(Feature.SCOPED_FILE_LOCALS) and None not in before.values():
+            from enclave_launch.description.launch.actions.opaque_function import OpaqueFunction
+
+            leave = OpaqueFunction(function=lambda context: context.extend_locals(before))
+            return [*arguments, description, leave]
         return [*arguments, description]
 
     def __set_file_locals(self, context: LaunchContext) -> None:

@@ -165,6 +165,7 @@ class _OnTimerEvent(BaseEventHandler):
     """The one handler, per context, of all its timers."""
 
     event_class = TimerEvent
+    internal = True
 
     def __init__(self) -> None:
         super().__init__(matcher=lambda event: isinstance(event, TimerEvent))
@@ -177,6 +178,7 @@ class _OnTimerEvent(BaseEventHandler):
 
 class _CancelOnShutdown(BaseEventHandler):
     event_class = Shutdown
+    internal = True
 
     def __init__(self, timer: TimerAction) -> None:
         super().__init__(matcher=lambda event: isinstance(event, Shutdown))

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 class OnActionEventBase(BaseEventHandler):
     """Handles events of one class about one action, about those a callable accepts, or about all (``None``).
 
-    ``on_event``: an entity, several, or a callable ``(event, context)`` that gives them.
+    ``on_event``: an entity, several, or a callable ``(event, context)`` that gives them (``callback``).
     """
 
     def __init__(
@@ -45,7 +45,7 @@ class OnActionEventBase(BaseEventHandler):
         self.__target_action_cls = target_action_cls
         self.event_class = target_event_cls
         self.target = None if callable(action_matcher) else action_matcher
-        self.__callback = on_event if callable(on_event) else None
+        self.callback = on_event if callable(on_event) else None
         self.__entities = [] if callable(on_event) else _checked(on_event)
 
     def __is_mine(self, event: Event) -> bool:
@@ -63,10 +63,10 @@ class OnActionEventBase(BaseEventHandler):
         super().handle(event, context)
         if self.__entities:
             return self.__entities  # type: ignore[return-value]
-        return self.__callback(event, context) if self.__callback is not None else None
+        return self.callback(event, context) if self.callback is not None else None
 
     def computes(self) -> bool:
-        return self.__callback is not None
+        return self.callback is not None
 
     def describe(self) -> tuple[str, list[Any]]:
         text, entities = super().describe()
@@ -74,7 +74,7 @@ class OnActionEventBase(BaseEventHandler):
 
     @property
     def handler_description(self) -> str:
-        return "<actions>" if self.__entities else str(self.__callback)
+        return "<actions>" if self.__entities else str(self.callback)
 
     @property
     def matcher_description(self) -> str:
@@ -99,8 +99,3 @@ def _checked(on_event: Any) -> list[LaunchDescriptionEntity | None]:
                 f"'LaunchDescriptionEntity' but got '{type(entity)}'"
             )
     return entities
-
-
-def process_event_arguments(action: Any) -> dict[str, Any]:
-    """The arguments of a made-up process event."""
-    return {"pid": 0, **(action.process_details or {})}

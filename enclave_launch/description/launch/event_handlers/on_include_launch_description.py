@@ -17,6 +17,7 @@ class OnIncludeLaunchDescription(BaseEventHandler):
     """Visits the description that an event brings; every launch has one of these."""
 
     event_class = IncludeLaunchDescription
+    internal = True
 
     def __init__(self, **kwargs: Any) -> None:
         super().__init__(matcher=lambda event: isinstance(event, IncludeLaunchDescription), **kwargs)

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.description.launch.event_handlers.on_action_event_base import (
-    OnActionEventBase,
-    process_event_arguments,
-)
+from enclave_launch.description.launch.event_handlers.on_action_event_base import OnActionEventBase
 from enclave_launch.description.launch.events.process import ProcessIO
+from enclave_launch.evaluation.suppositions import process_event_arguments
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.event import Event

@@ -27,6 +27,7 @@ class OnShutdown(BaseEventHandler):
     ) -> None:
         super().__init__(matcher=lambda event: isinstance(event, Shutdown), **kwargs)
         self.__on_shutdown = on_shutdown
+        self.callback = on_shutdown if callable(on_shutdown) else None
 
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         super().handle(event, context)

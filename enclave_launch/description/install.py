@@ -1,0 +1,123 @@
+"""Our ``launch``, ``launch_ros``, ``launch_xml``, ``launch_yaml`` and ``ament_index_python`` under those names.
+
+Only while we evaluate: a Python launch file and the helpers that it imports then build our classes. Installed
+packages of these names, and modules already imported with them, are hidden meanwhile and come back untouched.
+Child processes are not concerned: nothing but this interpreter's import system changes.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import import_module
+from importlib.abc import Loader, MetaPathFinder
+from importlib.machinery import ModuleSpec
+from importlib.util import find_spec
+from pathlib import Path
+from types import ModuleType
+
+PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")
+_OURS = "enclave_launch.description."
+
+_depth = 0
+_guests: dict[str, ModuleType] = {}  # modules of others that were imported with our classes
+
+
+@contextmanager
+def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
+    """Within the block the public names are ours; may be nested.
+
+    The Python packages of the ament ``prefixes`` can be imported too, as in a sourced workspace.
+    """
+    global _depth
+    if _depth:
+        yield
+        return
+    _depth += 1
+    hidden = _hide_real()
+    before = set(sys.modules)
+    for name, module in _guests.items():
+        sys.modules.setdefault(name, module)
+    path = list(sys.path)
+    sys.path.extend(folder for folder in _python_folders(prefixes) if folder not in sys.path)
+    sys.meta_path.insert(0, _FINDER)
+    try:
+        yield
+    finally:
+        sys.meta_path.remove(_FINDER)
+        sys.path[:] = path
+        _withdraw(before)
+        sys.modules.update(hidden)
+        _depth -= 1
+
+
+class _Finder(MetaPathFinder):
+    def find_spec(
+        self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if not is_public(fullname) or find_spec(_OURS + fullname) is None:
+            return None
+        return ModuleSpec(fullname, _Alias())
+
+
+class _Alias(Loader):
+    """Gives our module itself, which keeps its own name and spec."""
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        module = import_module(_OURS + spec.name)
+        self._own_spec = module.__spec__
+        return module
+
+    def exec_module(self, module: ModuleType) -> None:
+        module.__spec__ = self._own_spec
+
+
+_FINDER = _Finder()
+
+
+def is_public(module: str) -> bool:
+    """Is it one of the names we take over, or a submodule?"""
+    return module.partition(".")[0] in PUBLIC_NAMES
+
+
+def _hide_real() -> dict[str, ModuleType]:
+    """Take the real packages, and what was imported with them, out of ``sys.modules``."""
+    if not any(name in sys.modules for name in PUBLIC_NAMES):
+        return {}
+    names = {name for name in sys.modules if is_public(name)}
+    names |= _dependents(set(sys.modules) - names, is_public)
+    return {name: sys.modules.pop(name) for name in names}
+
+
+def _withdraw(before: set[str]) -> None:
+    """Take our names, and what was imported with them, out of ``sys.modules``."""
+    for name in [name for name in sys.modules if is_public(name)]:
+        del sys.modules[name]
+    new = {name for name in sys.modules if name not in before and not name.startswith("enclave_launch")}
+    for name in _dependents(new, lambda module: module.startswith(_OURS)):
+        _guests[name] = sys.modules.pop(name)
+
+
+def _dependents(names: set[str], belongs: Callable[[str], bool]) -> set[str]:
+    """Of ``names``, the modules of each top-level package in which some module holds such an object."""
+    tops = {name.partition(".")[0] for name in names if _holds(sys.modules[name], belongs)}
+    return {name for name in names if name.partition(".")[0] in tops}
+
+
+def _holds(module: ModuleType, belongs: Callable[[str], bool]) -> bool:
+    for value in list(getattr(module, "__dict__", {}).values()):
+        origin = value.__name__ if isinstance(value, ModuleType) else getattr(type(value), "__module__", "")
+        if isinstance(value, type) or callable(value):
+            origin = getattr(value, "__module__", None) or ""
+        if isinstance(origin, str) and belongs(origin):
+            return True
+    return False
+
+
+def _python_folders(prefixes: Sequence[str]) -> Iterator[str]:
+    """Where colcon and Debian put the Python packages of an install prefix."""
+    for prefix in prefixes:
+        for base, leaf in (("lib", "site-packages"), ("local/lib", "dist-packages")):
+            for folder in sorted(Path(prefix, base).glob(f"python3*/{leaf}")):
+                yield str(folder)

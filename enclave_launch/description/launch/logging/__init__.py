@@ -1,0 +1,106 @@
+"""``launch.logging``: named loggers and where the log files go.
+
+Loggers are those of the standard library, below ``launch``. What is shown and written while a launch runs is
+the runtime's business; nothing here creates a file.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import logging
+
+
+def get_logger(name: str | None = None) -> logging.Logger:
+    """The logger of this name, ``launch`` without one. Silent unless the application sets logging up."""
+    import logging
+
+    root = logging.getLogger("launch")
+    if not root.handlers:
+        root.addHandler(logging.NullHandler())
+    return root if name is None else logging.getLogger(name)
+
+
+def get_output_loggers(process_name: str, output_config: object) -> tuple[logging.Logger, logging.Logger]:
+    """Loggers for stdout and stderr of a process."""
+    return get_logger(f"{process_name}-stdout"), get_logger(f"{process_name}-stderr")
+
+
+class LaunchConfig:
+    """``level`` of the root logger, ``log_dir`` of this run. Other settings are kept and have no effect here."""
+
+    def __init__(self) -> None:
+        self.reset()
+
+    def reset(self) -> None:
+        self._log_dir: str | None = None
+        self.screen_handler: Any = None
+        self.file_handlers: dict[str, Any] = {}
+
+    @property
+    def level(self) -> int:
+        return get_logger().level
+
+    @level.setter
+    def level(self, new_level: int) -> None:
+        get_logger().setLevel(new_level)
+
+    @property
+    def log_dir(self) -> str:
+        """``ROS_LOG_DIR``, else ``ROS_HOME/log``, else ``~/.ros/log``, with a folder of this run below."""
+        if self._log_dir is None:
+            self._log_dir = os.path.join(_base(), _run_name())
+        return self._log_dir
+
+    @log_dir.setter
+    def log_dir(self, new_log_dir: str) -> None:
+        self._log_dir = os.path.abspath(os.path.expanduser(new_log_dir))
+
+    def get_log_file_path(self, file_name: str = "launch.log") -> str:
+        return os.path.join(self.log_dir, file_name)
+
+    def set_screen_format(self, *_: Any, **__: Any) -> None:
+        """Accepted for compatibility."""
+
+    def set_log_format(self, *_: Any, **__: Any) -> None:
+        """Accepted for compatibility."""
+
+
+launch_config = LaunchConfig()
+
+
+def log_launch_config(*, logger: logging.Logger | None = None) -> None:
+    (logger or get_logger()).info("All log files can be found below %s", launch_config.log_dir)
+
+
+def reset() -> None:
+    """Forget the log directory and all settings."""
+    launch_config.reset()
+
+
+def _base() -> str:
+    chosen = os.environ.get("ROS_LOG_DIR")
+    if not chosen:
+        chosen = os.path.join(os.environ.get("ROS_HOME") or os.path.join("~", ".ros"), "log")
+    return os.path.normpath(os.path.expanduser(chosen))
+
+
+def _run_name() -> str:
+    import socket
+    from datetime import datetime
+
+    return f"{datetime.now():%Y-%m-%d-%H-%M-%S-%f}-{socket.gethostname()}-{os.getpid()}"
+
+
+def __getattr__(name: str) -> Any:
+    if name == "LaunchLogger":
+        import logging
+
+        return logging.getLoggerClass()
+    if name == "handlers":
+        from importlib import import_module
+
+        return import_module(f"{__name__}.handlers")
+    raise AttributeError(f"module 'launch.logging' has no attribute {name!r}")

@@ -1,0 +1,158 @@
+"""A launch file and its arguments in, the processes it would start out: the dry run as one call.
+
+The visit and the events run against a ``PlanHost``; our process is left as it was: environment, modules, path.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
+from enclave_launch.evaluation.environment import environment_untouched
+from enclave_launch.evaluation.host import Host, PlanHost, active_host
+from enclave_launch.evaluation.location import place_of
+from enclave_launch.process import Evaluation
+from enclave_launch.source_location import SourceLocation
+
+Arguments = Sequence[tuple[str, str]]
+
+_one_at_a_time = threading.RLock()  # the environment and sys.modules belong to the whole process
+
+
+class EvaluationError(LaunchFileError):
+    """The launch file failed. ``partial``: what real launch would have started before that."""
+
+    partial: Evaluation = Evaluation((), ())
+
+
+def evaluate(
+    launch_file: str | os.PathLike[str],
+    arguments: Arguments = (),
+    *,
+    host: PlanHost | None = None,
+    launch_configurations: Mapping[str, str] | None = None,
+) -> Evaluation:
+    """Everything that ``ros2 launch launch_file name:=value ...`` would start, in launch order.
+
+    ``arguments`` are (name, value) pairs, as plain text; ``launch_configurations`` are set before the file is
+    included (``launch-prefix``). Python launch files, ``$(command)`` and ``OpaqueFunction`` run for real.
+
+    Raises ``EvaluationError`` (file, line, element, include chain; ``cause`` is launch's own exception).
+    """
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.evaluation.explore import Explorer
+    from enclave_launch.evaluation.visit import visit_all
+
+    host = host or PlanHost()
+    path = os.path.abspath(launch_file)
+    with evaluation_surroundings(host):
+        context = LaunchContext(host=host)
+        context.launch_configurations.update(launch_configurations or {})
+        try:
+            visit_all(top_description(path, arguments), context)
+            Explorer(context, host).run()
+        except EnclaveLaunchError:
+            raise
+        except Exception as error:  # launch files run code of their own: any exception is theirs
+            raise _as_launch_file_error(error, path, host) from error
+    return _evaluation(host)
+
+
+def top_description(path: str, arguments: Arguments) -> Any:
+    """The description that ``ros2 launch`` makes around a file: it includes the file with the arguments."""
+    from enclave_launch.description.launch.actions.include_launch_description import IncludeLaunchDescription
+    from enclave_launch.description.launch.launch_description import LaunchDescription
+    from enclave_launch.description.launch.launch_description_sources import AnyLaunchDescriptionSource
+
+    include = IncludeLaunchDescription(AnyLaunchDescriptionSource(path), launch_arguments=arguments)
+    include.source_location = None
+    return LaunchDescription([include])
+
+
+@contextmanager
+def evaluation_surroundings(host: Host) -> Iterator[None]:
+    """What evaluation needs around it, undone at the end: our packages under their public names, the host in
+    place, the environment as it was."""
+    from enclave_launch.description.install import installed
+
+    with ExitStack() as stack:
+        stack.enter_context(_one_at_a_time)
+        stack.enter_context(environment_untouched())
+        stack.enter_context(active_host(host))
+        stack.enter_context(installed(host.prefixes()))
+        yield
+
+
+def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
+    """``name:=value`` words; of a repeated name the last value counts.
+
+    Raises ``RuntimeError`` in launch's words for anything else.
+    """
+    parsed: dict[str, str] = {}
+    for word in words:
+        name, separator, value = word.partition(":=")
+        if not name or not separator or not value:
+            raise RuntimeError(f"malformed launch argument '{word}', expected format '<name>:=<value>'")
+        parsed[name] = value
+    return list(parsed.items())
+
+
+def _evaluation(host: PlanHost) -> Evaluation:
+    return Evaluation(
+        tuple(host.processes),
+        tuple(host.components),
+        tuple(host.calls),
+        tuple(host.unforeseen),
+        tuple(host.warnings),
+        host.release.distro.value,
+    )
+
+
+def _as_launch_file_error(error: Exception, path: str, host: PlanHost) -> EvaluationError:
+    from enclave_launch.frontend import error_location
+
+    shown = error_location.likeliest(error)
+    location = _location(error, path)
+    wrapped = EvaluationError(_message(error, shown), location, error)
+    wrapped.partial = _evaluation(host)
+    return wrapped
+
+
+def _location(error: Exception, path: str) -> SourceLocation:
+    """The innermost place known, with the include chain of the entity that was being visited."""
+    from enclave_launch.frontend import error_location
+
+    visited = place_of(error)
+    exact = error_location.location_of(error) or _user_frame(error)
+    if exact is None:
+        return visited or SourceLocation(path)
+    includes = visited.includes if visited is not None else ()
+    if visited is not None and visited.element == "include" and visited.file != exact.file:
+        includes = (*includes, str(visited))
+    return SourceLocation(exact.file, exact.line, exact.element, includes)
+
+
+def _user_frame(error: BaseException) -> SourceLocation | None:
+    """The innermost frame that is neither ours nor of the standard library: the user's own."""
+    import sysconfig
+    import traceback
+
+    ours = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    library = sysconfig.get_paths()["stdlib"]
+    found = None
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        file = frame.f_code.co_filename
+        if not file.startswith((ours, library, "<")) or file.startswith(library + "/site-packages"):
+            found = SourceLocation(file, line)
+    return found
+
+
+def _message(error: Exception, shown: BaseException) -> str:
+    text = shown.args[0] if isinstance(shown, KeyError) and shown.args else str(shown)
+    if isinstance(shown, (EnclaveLaunchError, RuntimeError)) and text:
+        return str(text)
+    return f"{type(shown).__name__}: {text}" if text else type(shown).__name__

@@ -1,0 +1,175 @@
+"""What only events would start: the second half of a dry run.
+
+After the visit of the launch file, first comes what happens in every run, in order: events that the file
+emitted itself, completions, process starts, timers by due time. Then each remaining handler is given a made-up
+event (a process exits, writes, a lifecycle node changes state) in the state of that moment, and everything is
+put back afterwards: one supposition must not colour the next. What a handler starts is followed further.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.launch.events.process import ProcessStarted
+from enclave_launch.description.launch.events.shutdown import Shutdown
+from enclave_launch.description.launch.events.timer_event import TimerEvent
+from enclave_launch.evaluation.events import chain, run_handler
+from enclave_launch.evaluation.location import location_of, place_of
+from enclave_launch.evaluation.suppositions import process_event_arguments
+from enclave_launch.process import Unforeseeable
+from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.event import Event
+    from enclave_launch.description.launch.event_handler import BaseEventHandler
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.evaluation.host import PlanHost
+
+
+class Explorer:
+    """Goes through the events of one dry run."""
+
+    def __init__(self, context: LaunchContext, host: PlanHost) -> None:
+        self._context = context
+        self._host = host
+        self._announced = 0  # processes whose start has been told
+        self._fired: set[int] = set()  # handlers that have run; each is supposed once
+        self._depth = 0
+        self._kept: list[object] = []  # keeps ids unique
+
+    def run(self) -> None:
+        self._settle_now()
+        ended_at_once = self._context.is_shutdown
+        self._settle()
+        if not ended_at_once:
+            self._context._set_is_shutdown(False)
+            self._suppose(known=frozenset(), new_from=0)
+        self._report_unreached()
+
+    # What happens in every run
+
+    def _settle(self) -> None:
+        """Handle all events and starts; jump to the next timer; until nothing is left."""
+        self._settle_now()
+        while self._host.loop.fire_next():
+            self._settle_now()
+
+    def _settle_now(self) -> None:
+        """Everything that happens before the clock moves."""
+        while self._host.loop.fire_due() or self._handle_event() or self._announce_start():
+            pass
+
+    def _handle_event(self) -> bool:
+        queue = self._context._event_queue
+        if queue.empty():
+            return False
+        event, mark = queue.get_nowait()
+        for handler in self._context._event_handlers.matching(event):
+            if self._depth == 0 or handler.internal or id(handler) not in self._fired:
+                self._run(handler, event, mark)
+        if isinstance(event, Shutdown):
+            self._context._set_is_shutdown(True)
+        return True
+
+    def _announce_start(self) -> bool:
+        """``OnProcessStart`` is certain for a process that was started."""
+        if self._announced >= len(self._host.started):
+            return False
+        action = self._host.started[self._announced]
+        mark = self._host.processes[self._announced].on_event
+        self._announced += 1
+        event = ProcessStarted(**process_event_arguments(action))
+        if self._context.would_handle_event(event):
+            self._context._event_queue.put_nowait(event, mark)
+        return True
+
+    def _run(self, handler: BaseEventHandler, event: Event, mark: str | None) -> None:
+        self._remember(handler)
+        mark = chain(mark, _label(handler, event))
+        if handler.computes() and not _is_ours(handler):
+            self._host.unforeseeable(Unforeseeable(f"what a callback returns for {mark}", self._place(handler)))
+            return
+        run_handler(self._context, handler, event, mark)
+
+    def _remember(self, handler: BaseEventHandler) -> None:
+        self._fired.add(id(handler))
+        self._kept.append(handler)
+
+    # What may happen
+
+    def _suppose(self, known: frozenset[int], new_from: int) -> None:
+        """Suppose an event for each handler that has not run.
+
+        ``known``: handlers that were there before the supposition we are in; of those only events about
+        processes started since (from index ``new_from``) are followed here, the others in their own turn.
+        """
+        for handler in self._context._event_handlers.all():
+            if handler.internal or id(handler) in self._fired:
+                continue
+            started = self._host.started[new_from:] if id(handler) in known else self._host.started
+            event = handler.foresee(started)
+            if event is not None:
+                self._try(event)
+
+    def _try(self, event: Event) -> None:
+        saved, clock = self._context.save(), self._host.loop.save()
+        known = frozenset(map(id, self._context._event_handlers.all()))
+        new_from = len(self._host.started)
+        self._depth += 1
+        try:
+            self._context._event_queue.put_nowait(event, None)
+            self._settle()
+            self._context._set_is_shutdown(False)
+            self._suppose(known, new_from)
+        except Exception as error:
+            if isinstance(_root(error), (PackageNotFoundError, ExecutableNotFoundError)):
+                raise
+            self._note_failure(event, error)
+        finally:
+            self._depth -= 1
+            self._context.restore(saved)
+            self._host.loop.restore(clock)
+
+    def _note_failure(self, event: Event, error: Exception) -> None:
+        """A handler that fails would end the launch at that moment; before it, nobody can be sure."""
+        place = place_of(error) or location_of(event, self._context)
+        what = f"on {event.name} {event.subject()}".rstrip()
+        self._host.warn(f"{place}: {what}: {error}")
+        self._host.unforeseeable(Unforeseeable(f"{what}: {error}", place))
+
+    def _report_unreached(self) -> None:
+        """Handlers with entities that no event of this dry run could reach."""
+        from enclave_launch.description.launch.event_handler import EventHandler
+
+        for handler in self._context._event_handlers.all():
+            if handler.internal or id(handler) in self._fired or not isinstance(handler, EventHandler):
+                continue
+            if handler.entities:
+                what = f"entities of {type(handler).__name__}, whose event cannot be told"
+                self._host.unforeseeable(Unforeseeable(what, self._place(handler)))
+
+    def _place(self, handler: BaseEventHandler) -> Any:
+        return location_of(handler, self._context)
+
+
+def _label(handler: BaseEventHandler, event: Event) -> str | None:
+    """``OnProcessExit talker-1``, ``timer 2.5``; ``None`` for what is launch's own working."""
+    if isinstance(event, TimerEvent):
+        return f"timer {event.subject()}" if handler.internal else None
+    if handler.internal:
+        return None
+    kind = type(handler).__name__
+    name = kind if kind.startswith("On") else event.name
+    return f"{name} {event.subject()}".rstrip()
+
+
+def _is_ours(handler: BaseEventHandler) -> bool:
+    """Is the callback part of this package, registered by one of its actions?"""
+    callback = getattr(handler, "callback", None)
+    return getattr(callback, "__module__", "").startswith("enclave_launch.")
+
+
+def _root(error: BaseException) -> BaseException:
+    while error.__cause__ is not None:
+        error = error.__cause__
+    return error

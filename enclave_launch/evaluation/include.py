@@ -1,0 +1,53 @@
+"""Loading what an include names, with the two ways it can go wrong that are ours to see: a file of a package
+that is not installed, and an include that never ends."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.evaluation.loading import CyclicIncludeError
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.actions.include_launch_description import (
+        IncludeLaunchDescription,
+    )
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.launch.launch_description import LaunchDescription
+
+MAX_DEPTH = 200
+"""Nested includes; upstream runs out of stack at about this depth."""
+
+OpenFile = tuple[str, dict[str, Any]]
+"""A file that is being visited, and the launch configurations with which it was entered."""
+
+
+def prepare_include(include: IncludeLaunchDescription, context: LaunchContext) -> LaunchDescription | None:
+    """The description to visit; ``None``, with a warning, for a file of a package that is not installed."""
+    source = include.launch_description_source
+    location = source.expand(context)
+    if context.host.is_missing(location) and not os.path.exists(location):
+        context.host.warn(f"not included, because its package is not installed: {location}")
+        return None
+    _check_cycle(location, context)
+    return source.get_launch_description(context)
+
+
+def _check_cycle(location: str, context: LaunchContext) -> None:
+    """The same file entered again with the same configurations will be entered for ever."""
+    path = os.path.abspath(location)
+    repeated = any(
+        known == path and configurations == context.launch_configurations
+        for known, configurations in context.open_files
+    )
+    if repeated or len(context.open_files) >= MAX_DEPTH:
+        cycle = [known for known, _ in context.open_files]
+        if path in cycle:
+            cycle = cycle[len(cycle) - 1 - cycle[::-1].index(path) :]
+        raise CyclicIncludeError("launch files include each other without end: " + " -> ".join([*cycle, path]))
+
+
+def opened(include: IncludeLaunchDescription, context: LaunchContext) -> tuple[OpenFile, ...]:
+    """The files open below ``include``."""
+    path = os.path.abspath(include.launch_description_source.location)
+    return (*context.open_files, (path, include.entered_with))
