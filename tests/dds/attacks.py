@@ -42,14 +42,14 @@ GRANTS: Mapping[str, Grant] = {
 
 @dataclass(frozen=True)
 class Attempt:
-    """``directory`` poses as somebody who may publish ``topic`` (a ROS name).
+    """``directory`` poses as somebody who may publish ``topic`` (a ROS name); ``None``: no security at all.
 
     ``claim``: the subject of the directory's certificate, and the one that a patched DDS library takes it
     for, to get past its own checks.
     """
 
     label: str
-    directory: Path
+    directory: Path | None
     topic: str
     claim: tuple[str, str] | None = None
 
@@ -87,9 +87,7 @@ class Workshop:
             yield replace(attempt, claim=claim)
 
     def self_signed_permissions(self, path: str) -> Attempt:
-        return self._attempt(
-            f"self-signed permissions {path}", path, SECRET, {"permissions.p7s": self._forge(path)}
-        )
+        return self._attempt(f"self-signed permissions {path}", path, SECRET, {"permissions.p7s": self._forge(path)})
 
     def self_signed_governance(self, path: str) -> Attempt:
         """Permissions and governance both: what is forged can then also be exempt from any check."""
@@ -166,4 +164,3 @@ def signed_text(path: Path) -> str:
     text = path.read_bytes().replace(b"\r\n", b"\n").decode()
     start = text.index("Content-Type: text/plain")
     return text[text.index("<", start) : text.index("</dds>", start) + len("</dds>")] + "\n"
-

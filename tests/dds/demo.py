@@ -63,4 +63,3 @@ class Node:
     def stop(self) -> Ended:
         self._process.terminate()
         return self.end()
-

@@ -38,9 +38,7 @@ class Credential:
     @classmethod
     def of_ca(cls, keystore: Path) -> Credential:
         """The identity CA of a keystore with its key on disk."""
-        key = serialization.load_pem_private_key(
-            (keystore / "private/identity_ca.key.pem").read_bytes(), None
-        )
+        key = serialization.load_pem_private_key((keystore / "private/identity_ca.key.pem").read_bytes(), None)
         assert isinstance(key, ec.EllipticCurvePrivateKey)
         certificate = (keystore / "public/identity_ca.cert.pem").read_bytes()
         return cls(key, x509.load_pem_x509_certificate(certificate))
@@ -63,9 +61,7 @@ class Credential:
         )
 
 
-def issue(
-    common_name: str, issuer: Credential | None = None, days: int = 3650, is_ca: bool = False
-) -> Credential:
+def issue(common_name: str, issuer: Credential | None = None, days: int = 3650, is_ca: bool = False) -> Credential:
     """``days`` until the end; negative: it ended so many days ago."""
     key = ec.generate_private_key(ec.SECP256R1())
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])
@@ -156,33 +152,38 @@ def directory_of(keystore: Path, path: str) -> Path:
 def create(keystore: Path, domain: int, grants: Mapping[str, Grant]) -> Credential:
     """Write ``keystore`` and return its CA."""
     ca = issue("sros2CA", is_ca=True)
-    governance = ca.sign(GOVERNANCE.format(domain=domain))
+    for folder, name, content in (("public", "cert", ca.certificate_pem), ("private", "key", ca.key_pem)):
+        (keystore / folder).mkdir(parents=True)
+        (keystore / folder / f"ca.{name}.pem").write_bytes(content)
+        for role in ("identity_ca", "permissions_ca"):
+            (keystore / folder / f"{role}.{name}.pem").symlink_to(f"ca.{name}.pem")
+    governance = GOVERNANCE.format(domain=domain)
+    (keystore / "enclaves").mkdir()
+    (keystore / "enclaves" / "governance.xml").write_text(governance, encoding="utf-8")
+    (keystore / "enclaves" / "governance.p7s").write_bytes(ca.sign(governance))
     for path, grant in grants.items():
-        write_enclave(directory_of(keystore, path), path, domain, grant, ca, issue(path, ca), governance)
+        _create_enclave(keystore, path, domain, grant, ca)
     return ca
 
 
-def write_enclave(
-    directory: Path,
-    path: str,
-    domain: int,
-    grant: Grant,
-    ca: Credential,
-    identity: Credential,
-    governance: bytes,
-) -> None:
+def _create_enclave(keystore: Path, path: str, domain: int, grant: Grant, ca: Credential) -> None:
+    directory = directory_of(keystore, path)
+    directory.mkdir(parents=True, exist_ok=True)
     now = datetime.datetime.now(datetime.timezone.utc)
     permissions = PERMISSIONS.format(
         path=path, domain=domain, rules=grant.rules(), not_before=now - _DAY, not_after=now + 3650 * _DAY
     )
+    identity = issue(path, ca)
     files = {
         "cert.pem": identity.certificate_pem,
         "key.pem": identity.key_pem,
-        "identity_ca.cert.pem": ca.certificate_pem,
-        "permissions_ca.cert.pem": ca.certificate_pem,
-        "governance.p7s": governance,
+        "permissions.xml": permissions.encode(),
         "permissions.p7s": ca.sign(permissions),
     }
-    directory.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         (directory / name).write_bytes(content)
+    depth = len([part for part in path.split("/") if part])
+    for role in ("identity_ca", "permissions_ca"):
+        (directory / f"{role}.cert.pem").symlink_to(f"{'../' * (depth + 1)}public/{role}.cert.pem")
+    if depth:
+        (directory / "governance.p7s").symlink_to(f"{'../' * depth}governance.p7s")

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import itertools
 import shutil
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
@@ -42,28 +43,42 @@ def _workshop(tmp_path: Path, name: str) -> Workshop:
     return Workshop(tmp_path / name, attempts)
 
 
-def voices(
+@dataclass(frozen=True)
+class Outcome:
+    """``admitted``: whose own DDS let it publish; ``heard``: whom the victim heard. Labels of attempts."""
+
+    admitted: set[str]
+    heard: set[str]
+
+
+NOBODY = Outcome(set(), set())
+
+
+def outcome(
     dds: Probe,
     domain_id: int,
     workshop: Workshop,
     attempts: Sequence[Attempt],
-    expected: set[str],
+    expected: Collection[str] = (),
     patched: Path | None = None,
-) -> set[str]:
-    """Who of ``attempts`` the victim hears beside an honest talker; ``patched``: preloaded into attackers."""
+) -> Outcome:
+    """Try ``attempts`` beside an honest talker, wait until the victim has heard it and the ``expected`` ones.
+
+    ``patched`` is preloaded into the talkers. Who got past his own DDS then authenticates with the victim:
+    that takes longer than with the honest one, where the victim sees reason to refuse.
+    """
     talkers = [workshop.honest(HONEST), *attempts]
     listener, talking = dds.talk(
         domain_id,
         attacks.victim(workshop.enclave(VICTIM)),
         [attempt.participant(patched is not None) for attempt in talkers],
-        expected | {HONEST_VOICE},
+        {*expected, HONEST_VOICE},
+        settle=4.0 if patched else 2.0,
         environment={"LD_PRELOAD": str(patched)} if patched else None,
     )
     assert HONEST_VOICE in listener.voices, f"the victim heard not even the honest talker\n{listener.log}"
-    if patched:
-        turned_down = sorted(label for label, allowed in talking.participants.items() if not allowed)
-        assert not turned_down, f"the patched library still refuses {turned_down}"
-    return listener.voices - {HONEST_VOICE}
+    admitted = {attempt.label for attempt in attempts if talking.may(attempt.label, "publish", f"rt{attempt.topic}")}
+    return Outcome(admitted, listener.voices - {HONEST_VOICE})
 
 
 def batches(attempts: Sequence[Attempt], size: int = 7) -> Iterator[Sequence[Attempt]]:
@@ -84,19 +99,23 @@ def bag_matches() -> set[str]:
     }
 
 
+def labels(attempts: Sequence[Attempt]) -> set[str]:
+    return {attempt.label for attempt in attempts}
+
+
 def test_permissions_cannot_be_borrowed(
     dds: Probe, sros2: Workshop, ours: Workshop, domain_id: int, patched_dds: Path
 ) -> None:
     """All ordered pairs: the identity of one enclave with the permissions of another."""
     assert len(bag_matches()) == 11
     accepted = bag_matches() if dds.name == "Cyclone DDS" else set[str]()
-
-    assert voices(dds, domain_id, sros2, list(sros2.borrowed()), accepted) == accepted
+    attempts = list(sros2.borrowed())
+    assert outcome(dds, domain_id, sros2, attempts, accepted) == Outcome(accepted, accepted)
 
     attempts = list(ours.borrowed())
-    assert voices(dds, domain_id, ours, attempts, set()) == set()
+    assert outcome(dds, domain_id, ours, attempts) == NOBODY
     for batch in batches(attempts):
-        assert voices(dds, domain_id, ours, batch, set(), patched_dds) == set()
+        assert outcome(dds, domain_id, ours, batch, patched=patched_dds) == Outcome(labels(batch), set())
 
 
 def test_an_enclave_cannot_sign_its_own_documents(
@@ -109,26 +128,28 @@ def test_an_enclave_cannot_sign_its_own_documents(
         ]
 
     attempts = forged(sros2)
-    everyone = {attempt.label for attempt in attempts}
-    assert voices(dds, domain_id, sros2, attempts, everyone) == everyone
+    everyone = labels(attempts)
+    assert outcome(dds, domain_id, sros2, attempts, everyone) == Outcome(everyone, everyone)
 
     attempts = forged(ours)
-    assert voices(dds, domain_id, ours, attempts, set()) == set()
-    assert voices(dds, domain_id, ours, attempts, set(), patched_dds) == set()
+    assert outcome(dds, domain_id, ours, attempts) == NOBODY
+    assert outcome(dds, domain_id, ours, attempts, patched=patched_dds) == Outcome(everyone, set())
 
 
 def test_false_expired_and_tampered_credentials_are_refused(
     dds: Probe, ours: Workshop, domain_id: int, patched_dds: Path
 ) -> None:
-    """What DDS itself sees through, whoever made the keystore. The untouched enclave is heard."""
-    attempts = [
-        ours.honest("/a"),
-        ours.tampered_permissions("/a"),
-        ours.unknown_authority("/a"),
-        ours.expired_identity("/a", sros2_style.Credential.of_ca(ours.keystore)),
-    ]
-    assert voices(dds, domain_id, ours, attempts, {"honest /a"}) == {"honest /a"}
-    assert voices(dds, domain_id, ours, attempts, {"honest /a"}, patched_dds) == {"honest /a"}
+    """What DDS itself sees through, whoever made the keystore; the untouched enclave is heard."""
+    honest, unknown = ours.honest("/a"), ours.unknown_authority("/a")
+    expired = ours.expired_identity("/a", sros2_style.Credential.of_ca(ours.keystore))
+    attempts = [honest, unknown, expired, ours.tampered_permissions("/a")]
+    # The world of an unknown CA is consistent in itself: only the victim can refuse it.
+    at_home = labels([honest, unknown])
+    assert outcome(dds, domain_id, ours, attempts, {honest.label}) == Outcome(at_home, {honest.label})
+    patched = outcome(dds, domain_id, ours, attempts, {honest.label}, patched_dds)
+    assert patched.heard == {honest.label}
+    # Cyclone DDS looks at the end of an identity a second time, where our patch does not reach.
+    assert labels(attempts) - patched.admitted <= {expired.label}
 
 
 def test_a_revoked_identity_is_refused(
@@ -137,10 +158,17 @@ def test_a_revoked_identity_is_refused(
     """A copy made before its enclave was removed; SROS2, which writes no revocation list, cannot stop it."""
     stolen = sros2.stolen_copy(REVOKED)
     shutil.rmtree(sros2.enclave(REVOKED))
-    assert voices(dds, domain_id, sros2, [stolen], {stolen.label}) == {stolen.label}
+    alive = Outcome({stolen.label}, {stolen.label})
+    assert outcome(dds, domain_id, sros2, [stolen], {stolen.label}) == alive
 
     stolen = ours.stolen_copy(REVOKED)
-    assert voices(dds, domain_id, ours, [stolen], {stolen.label}) == {stolen.label}
+    assert outcome(dds, domain_id, ours, [stolen], {stolen.label}) == alive
     remove(ours.keystore, [REVOKED])
-    assert voices(dds, domain_id, ours, [stolen], set()) == set()
-    assert voices(dds, domain_id, ours, [stolen], set(), patched_dds) == set()
+    assert outcome(dds, domain_id, ours, [stolen]) == Outcome({stolen.label}, set())
+    assert outcome(dds, domain_id, ours, [stolen], patched=patched_dds) == Outcome({stolen.label}, set())
+
+
+def test_nobody_without_credentials_is_heard(dds: Probe, ours: Workshop, domain_id: int) -> None:
+    """A participant without any security may create what it likes, and reaches nobody."""
+    outsider = Attempt("outsider", None, attacks.SECRET)
+    assert outcome(dds, domain_id, ours, [outsider]) == Outcome({"outsider"}, set())
