@@ -1,13 +1,13 @@
 """YAML text -> plain Python values, with the line of each mapping and list. Pure.
 
-Values are those of ``yaml.safe_load``: libyaml reads the text where it can, PyYAML's own scanner decides
-about what libyaml rejects, so that the same files load with the same errors as upstream's. Anchors and
-aliases work; a text whose aliases stand for an excessive number of values, or that nests excessively, is
-refused.
+Values are those of ``yaml.safe_load``: libyaml reads the text where it reads the same, PyYAML's own scanner
+the rest, so that the same files load with the same errors as upstream's. Anchors and aliases work; a text
+whose aliases stand for an excessive number of values, or that nests excessively, is refused.
 """
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -20,6 +20,7 @@ MAX_EXPANDED_NODES = 4_000_000  # values in a document once each alias is writte
 
 _SafeLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CParser: Any = getattr(yaml, "CLoader", yaml.Loader)
+_LIBYAML_DIFFERS = re.compile(r"[\t!?\ufeff]")  # trailing tab, lone tag, "?" in flow, inner mark: by fuzzing
 _MAYBE_DEEP = re.compile(rf"^(?: {{{MAX_NESTING}}}|.*(?:[-?:]\s+){{{MAX_NESTING // 2}}})", re.MULTILINE)
 
 
@@ -38,10 +39,10 @@ class YamlDocument:
 def parse_yaml(text: str) -> YamlDocument:
     """Text -> its one document (``None`` when empty). Raises ``yaml.YAMLError`` or ``RefusedYaml``."""
     _refuse_deep_nesting(text)
-    try:
-        return _load(text, _SafeLoader)
-    except yaml.YAMLError:
-        return _load(text, yaml.SafeLoader)
+    if not _LIBYAML_DIFFERS.search(text):
+        with contextlib.suppress(yaml.YAMLError):
+            return _load(text, _SafeLoader)
+    return _load(text, yaml.SafeLoader)
 
 
 def _load(text: str, base: Any) -> YamlDocument:

@@ -93,7 +93,7 @@ def test_errors_have_upstreams_type_and_text_and_a_place(
 
 def test_a_bad_template_is_placed_at_its_own_element() -> None:
     with pytest.raises(ValueError, match="No terminal matches") as caught:
-        instantiate('<node\n pkg="p" exec="e">\n  <env name="a" value="1"/>\n<remap from="a" to="$(b )"/></node>')
+        instantiate('<node\n pkg="p" exec="e">\n\n<remap from="$(b )" to="c"/></node>')
     place = location_of(caught.value)
     assert place is not None and (place.line, place.element) == (4, "remap")
 

@@ -31,6 +31,8 @@ SAME_AS_PYYAML = {
     "block text": "a: |\n  x\n  y\nb: >\n  x\n  y\n",
     "set and ordered map": "a: !!set {x, y}\nb: !!omap [x: 1]\n",
     "document start and end": "---\na: 1\n...\n",
+    "lone tag, which libyaml reads as text": "a: !",
+    "inner mark, which libyaml drops": "\n\ufeffa: 1",
 }
 
 
@@ -42,6 +44,8 @@ def test_same_values_as_pyyaml(text: str) -> None:
 REFUSED_BY_PYYAML = {
     "NUL": "a: \0",
     "tab": "a:\n\t- b",
+    "trailing tab, which libyaml accepts": "a: 1\t",
+    "question mark in a flow list, which libyaml accepts": "[a?]",
     "unclosed": "a: [1, 2",
     "two documents": "a: 1\n---\nb: 2\n",
     "python object": "a: !!python/object/apply:os.system ['true']",

@@ -12,6 +12,8 @@ from enclave_launch.source_location import SourceLocation
 if TYPE_CHECKING:
     from enclave_launch.frontend.xml_tree import XmlElement
 
+_VALUE_TYPES = frozenset({str, int, float, bool, None})  # certainly no lists of entities
+
 
 class Entity(BaseEntity):
     """One XML element; attributes are coerced to the type that is asked for."""
@@ -53,15 +55,16 @@ class Entity(BaseEntity):
 
     def assert_entity_completely_parsed(self) -> None:
         element = self._element
-        if unread := {child.tag for child in element} - self._read_children:
+        if element.children and (unread := {child.tag for child in element} - self._read_children):
             raise ValueError(f"Unexpected nested tag(s) found in `{element.tag}`: {unread}")
-        if unread := element.attrib.keys() - self._read_attributes:
+        if len(self._read_attributes) != len(element.attrib):
+            unread = element.attrib.keys() - self._read_attributes
             raise ValueError(f"Unexpected attribute(s) found in `{element.tag}`: {unread}")
 
     def get_attr(
         self, name: str, *, data_type: Any = str, optional: bool = False, can_be_str: bool = True
     ) -> Any:
-        if data_type is not str and check_is_list_entity(data_type):
+        if data_type not in _VALUE_TYPES and check_is_list_entity(data_type):
             return self._children_named(name, data_type, optional)
         attributes = self._element.attrib
         text = attributes.get(name)
@@ -71,10 +74,10 @@ class Entity(BaseEntity):
             raise self._missing(name, data_type)
         self._read_attributes.add(name)
         value: str | list[str] = text
-        name_sep = name + "-sep"
-        if name_sep in attributes:
-            self._read_attributes.add(name_sep)
-            value = text.split(attributes[name_sep])
+        separator = attributes.get(name + "-sep")
+        if separator is not None:
+            self._read_attributes.add(name + "-sep")
+            value = text.split(separator)
         elif data_type is str:
             return text
         return self._typed(name, value, data_type, can_be_str)

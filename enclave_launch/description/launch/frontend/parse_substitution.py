@@ -10,6 +10,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.launch.frontend import expose
+from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
 from enclave_launch.evaluation.host import current_release
 from enclave_launch.frontend.substitution_grammar import (
     Call,
@@ -39,6 +40,8 @@ def parse_substitution(string_value: str) -> list[Substitution]:
     arguments that the substitution refuses.
     """
     global _shared_for
+    if "$(" not in string_value:
+        return [TextSubstitution(text=unescape(string_value))]
     release = current_release()
     if release is not _shared_for:
         _parse_shared.cache_clear()
@@ -88,8 +91,6 @@ def _parse_shared(string_value: str) -> tuple[Substitution, ...] | None:
 
 
 def _instantiate(template: Template, text: str) -> list[Substitution]:
-    from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
-
     return [
         _instantiate_call(part, text) if isinstance(part, Call) else TextSubstitution(text=part)
         for part in template
