@@ -8,7 +8,6 @@ directory and installed from there, so that no crash can leave a certificate bes
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
@@ -18,11 +17,13 @@ from keystore import authority, layout, lock, safe_files, smime, store
 from keystore.authority import Authority, Curve, Role
 from keystore.domains import Domains
 from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printable
-from keystore.governance import Governance, governance_document
+from keystore.governance import Governance, governance_document, parse_governance
+from keystore.governance_file import covers, governance_stands
 from keystore.settings import Settings
-from keystore.signer import CaAccess, FileSigner, Secret, Signer, open_signer
+from keystore.signer import CaAccess, FileSigner, Secret, open_signer
 from keystore.store import Content, Store
 from keystore.subject import SubjectScheme
+from keystore.trusted_documents import trusted_document
 from keystore.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
 from keystore.view import KeystoreView, resolve_root
 
@@ -297,18 +298,17 @@ def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
     return smime.sign(document, ca.facts, ca.signer, now)
 
 
-def private_mode_problems(root: Path) -> list[str]:
-    """Keys and ``private/`` that others may read (SROS2 writes them so), as paths relative to ``root``."""
-    names = [layout.PRIVATE, *(layout.ca_key(role) for role in Role), layout.SHARED_CA_KEY]
-    return [name for name in names if _readable_by_others(root / name)]
+def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
+    """Sign the governance again if its domains or its signer no longer fit; whether that was needed.
 
-
-def _readable_by_others(path: Path) -> bool:
-    try:
-        return bool(stat.S_IMODE(os.stat(path).st_mode) & 0o077)
-    except OSError:
+    Raises InvalidInput when it has several rules and none for a domain: then a person must decide.
+    """
+    view = KeystoreView(opened.root)
+    if governance_stands(view, domains):
         return False
-
-
-def signer_of(made: Authority) -> Signer:
-    return made.signer
+    document = trusted_document(view, layout.GOVERNANCE)
+    governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
+    if not covers(governance.domains(), domains):
+        document = governance_document(governance.extended_to(domains))
+    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
+    return True

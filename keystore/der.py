@@ -7,7 +7,6 @@ are accepted, which is all X.509 and CMS use (ITU-T X.690 section 10).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from datetime import datetime, timezone
 from typing import NamedTuple
 
@@ -39,7 +38,7 @@ class Element(NamedTuple):
         return self.data[self.start : self.end]
 
     def children(self) -> list[Element]:
-        return list(_elements(self.data, self.body, self.end))
+        return _elements(self.data, self.body, self.end)
 
     def expect(self, tag: int) -> Element:
         if self.tag != tag:
@@ -49,31 +48,31 @@ class Element(NamedTuple):
 
 def parse(data: bytes) -> Element:
     """The single value that ``data`` consists of; raises DerError."""
-    found = list(_elements(data, 0, len(data)))
+    found = _elements(data, 0, len(data))
     if len(found) != 1:
         raise DerError("expected one value")
     return found[0]
 
 
-def _elements(data: bytes, at: int, end: int) -> Iterator[Element]:
-    while at < end:
-        element = _element(data, at, end)
-        yield element
-        at = element.end
-
-
-def _element(data: bytes, at: int, limit: int) -> Element:
-    if at + 2 > limit:
-        raise DerError("cut short")
-    length, body = data[at + 1], at + 2
-    if length >= 0x80:
-        width = length & 0x7F
-        if not 1 <= width <= 4 or body + width > limit:
-            raise DerError("unsupported length")
-        length, body = int.from_bytes(data[body : body + width], "big"), body + width
-    if body + length > limit:
-        raise DerError("cut short")
-    return Element(data, data[at], at, body, body + length)
+def _elements(data: bytes, at: int, limit: int) -> list[Element]:
+    """One flat loop: certificates are read by the hundred before every launch."""
+    found = []
+    while at < limit:
+        if at + 2 > limit:
+            raise DerError("cut short")
+        start, length = at, data[at + 1]
+        at += 2
+        if length >= 0x80:
+            width = length & 0x7F
+            if not 1 <= width <= 4 or at + width > limit:
+                raise DerError("unsupported length")
+            length = int.from_bytes(data[at : at + width], "big")
+            at += width
+        if at + length > limit:
+            raise DerError("cut short")
+        found.append(Element(data, data[start], start, at, at + length))
+        at += length
+    return found
 
 
 def encode(tag: int, *parts: bytes) -> bytes:

@@ -19,7 +19,7 @@ from keystore import certificate, layout, safe_files, smime
 from keystore.authority import Role
 from keystore.certificate import CertificateFacts
 from keystore.der import DerError
-from keystore.errors import DamagedKeystore, UnsafeKeystore
+from keystore.errors import DamagedKeystore, UnsafeKeystore, printable
 from keystore.subject import SubjectScheme, common_name, subject_name
 from keystore.validity import Validity
 from keystore.view import KeystoreView
@@ -86,8 +86,8 @@ def inspect(
 
 
 def _refuse_link(view: KeystoreView, directory: str) -> None:
-    path = str(view.root)
-    for part in directory.split("/"):
+    path = f"{view.root}/{layout.ENCLAVES}"
+    for part in directory.split("/")[1:]:
         path = f"{path}/{part}"
         try:
             if stat.S_ISLNK(os.lstat(path).st_mode):
@@ -100,13 +100,13 @@ def _refuse_link(view: KeystoreView, directory: str) -> None:
 
 def _key_mode(view: KeystoreView, directory: str) -> bool | None:
     """None without a key, else whether others can read it."""
-    path = view.root / directory / layout.KEY
+    path = f"{view.root}/{directory}/{layout.KEY}"
     try:
         info = os.lstat(path)
     except (FileNotFoundError, NotADirectoryError):
         return None
     if not stat.S_ISREG(info.st_mode):
-        raise UnsafeKeystore(f"{str(path)!r} is not a regular file; remove it")
+        raise UnsafeKeystore(f"{printable(path)} is not a regular file; remove it")
     if problem := safe_files.private_problem(path, info):
         raise UnsafeKeystore(problem)
     return bool(info.st_mode & 0o077)

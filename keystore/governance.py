@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING
-from xml.sax.saxutils import escape
 
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, printable
@@ -105,11 +104,6 @@ class Governance:
         return Governance((replace(rule, domains=both),))
 
 
-def covers(outer: Domains, inner: Domains) -> bool:
-    """Whether ``outer`` has every domain of ``inner``."""
-    return all(any(a <= first and last <= b for a, b in outer.ranges) for first, last in inner.ranges)
-
-
 _HEAD = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
     '<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation='
@@ -141,8 +135,10 @@ def _leaf(name: str, value: bool | str | Protection) -> str:
     if isinstance(value, bool):
         text = "true" if value else "false"
     else:
-        text = escape(value.value if isinstance(value, Protection) else value)
-    return f"<{name}>{text}</{name}>\n"
+        text = value.value if isinstance(value, Protection) else value
+    # Only a topic expression could hold a character that XML reserves.
+    escaped = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return f"<{name}>{escaped}</{name}>\n"
 
 
 _DOMAIN_LEAVES = (

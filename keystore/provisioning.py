@@ -10,35 +10,32 @@ by the next one, because ``enclave_state`` finds every missing step again.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from keystore import layout, lock, store
-from keystore.creation import CreateOptions, complete
+from keystore import layout
 from keystore.domains import Domains
-from keystore.enclave_name import check_distinct, validate_enclave_name
+from keystore.enclave_name import validate_enclave_name
 from keystore.enclave_state import EnclaveState, Identity, PermissionsSource, inspect
 from keystore.errors import InvalidInput, NotAKeystore, printable
-from keystore.governance_file import governance_domains, governance_stands, renew_governance
+from keystore.governance_file import governance_domains, governance_stands
 from keystore.permissions import permissions_document
 from keystore.policy import EnclavePolicy
 from keystore.signer import CaAccess
-from keystore.store import Store
 from keystore.subject import SubjectScheme
 from keystore.validity import DEFAULT_BACKDATE, Validity, utc_now
 from keystore.view import KeystoreView, resolve_root
 
 if TYPE_CHECKING:
-    from keystore.enclave_writing import EnclaveWriter
+    from keystore.creation import CreateOptions
 
 Progress = Callable[[int, int], None]
 """Called with (enclaves done, enclaves to do)."""
 
-_BATCH = 250
+DEFAULT_LOCK_TIMEOUT = 30.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +47,7 @@ class ProvisionOptions:
 
     domains: Domains | None = None
     create: bool = True
-    creation: CreateOptions = field(default_factory=CreateOptions)
+    creation: CreateOptions | None = None
     lifetime: timedelta | None = None
     valid_until: datetime | None = None
     backdate: timedelta = DEFAULT_BACKDATE
@@ -59,7 +56,7 @@ class ProvisionOptions:
     rmw: str | None = None
     allow_subject_overlap: bool = False
     access: CaAccess = field(default_factory=CaAccess)
-    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    lock_timeout: float = DEFAULT_LOCK_TIMEOUT
     durable: bool = True
     progress: Progress | None = None
     now: datetime | None = None
@@ -140,7 +137,7 @@ def bring_about(root: Path, wishes: Mapping[str, Wish], options: ProvisionOption
     now = options.now or utc_now()
     view = KeystoreView(root)
     if view.is_complete and not _interrupted(root):
-        states = [_inspect(view, name, wish, options, now) for name, wish in wishes.items()]
+        states = [inspect_wish(view, name, wish, options, now) for name, wish in wishes.items()]
         if governance_stands(view, options.domains) and all(state.is_good for state in states):
             return ProvisionReport(root, (), tuple(EnclaveReport(name, ()) for name in wishes))
     elif not options.create:
@@ -150,77 +147,19 @@ def bring_about(root: Path, wishes: Mapping[str, Wish], options: ProvisionOption
         )
     elif not view.can_be_completed and not view.is_complete:
         raise NotAKeystore(f"{printable(root)} exists and is no keystore; choose an empty or new directory")
-    return _bring_about_locked(root, wishes, options, now)
+    from keystore.provisioning_run import write_wishes  # brings cryptography: not on the warm path
+
+    return write_wishes(root, wishes, options, now)
 
 
 def _interrupted(root: Path) -> bool:
     return os.path.lexists(root / layout.INCOMING)
 
 
-def _inspect(
+def inspect_wish(
     view: KeystoreView, enclave: str, wish: Wish, options: ProvisionOptions, now: datetime
 ) -> EnclaveState:
     state = inspect(view, enclave, wish.permissions, now, now + options.renew_within)
     if wish.identity is Identity.GOOD or state.identity is Identity.PAIR:
         return state
     return replace(state, identity=wish.identity, permissions=True, reasons=(*state.reasons, "asked for"))
-
-
-def _bring_about_locked(
-    root: Path, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
-) -> ProvisionReport:
-    from keystore.enclave_writing import EnclaveWriter  # brings cryptography: not on the warm path
-
-    with _locked(root, options) as opened:
-        done, warnings = _complete_keystore(opened, options, now)
-        view = KeystoreView(root)
-        check_distinct(dict.fromkeys((*view.enclaves(), *wishes)))
-        writer = EnclaveWriter(opened, view, options, now)
-        states = [_inspect(view, name, wish, options, now) for name, wish in wishes.items()]
-        writer.check_subjects(states)
-        reports = _write_all(opened, writer, states, wishes, options.progress)
-    return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
-
-
-@contextmanager
-def _locked(root: Path, options: ProvisionOptions) -> Iterator[Store]:
-    if options.create:
-        store.create_root(root)
-    with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
-        yield opened
-
-
-def _complete_keystore(
-    opened: Store, options: ProvisionOptions, now: datetime
-) -> tuple[list[str], list[str]]:
-    """Missing parts of the keystore itself, and a governance that covers the domains."""
-    domains = options.domains or governance_domains(KeystoreView(opened.root))
-    creation = replace(
-        options.creation, domains=domains, access=options.access, durable=options.durable, now=now
-    )
-    report = complete(opened, creation)
-    done = list(report.actions)
-    if renew_governance(opened, domains, options.access, now):
-        done.append(f"governance signed for domains {domains}")
-    return done, list(report.warnings)
-
-
-def _write_all(
-    opened: Store,
-    writer: EnclaveWriter,
-    states: list[EnclaveState],
-    wishes: Mapping[str, Wish],
-    progress: Progress | None,
-) -> tuple[EnclaveReport, ...]:
-    """In batches: bounded loss when interrupted, few calls to make it durable."""
-    reports = {state.enclave: EnclaveReport(state.enclave, ()) for state in states}
-    todo = [state for state in states if not state.is_good]
-    for start in range(0, len(todo), _BATCH):
-        part = todo[start : start + _BATCH]
-        with opened.batch() as batch:
-            for position, state in enumerate(part, start + 1):
-                actions = writer.write(batch, state, wishes[state.enclave].permissions)
-                reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)
-                if progress is not None:
-                    progress(position, len(todo))
-    return tuple(reports.values())

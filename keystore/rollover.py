@@ -22,7 +22,7 @@ from pathlib import Path
 
 from keystore import authority, layout, safe_files, store
 from keystore.authority import Authority, Role, pem_certificate
-from keystore.creation import install_incoming, passphrase_for_new_keys, put_incoming
+from keystore.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
 from keystore.enclaves import keep
 from keystore.errors import InvalidInput
 from keystore.provisioning import ProvisionOptions, ProvisionReport, Wish, bring_about, with_domains
@@ -88,7 +88,7 @@ def _make_next(
 
 def new_ca(role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> tuple[Authority, bytes]:
     """A fresh CA and its key file."""
-    creation = options.creation
+    creation = options.creation or CreateOptions()
     validity = Validity.starting(now, creation.ca_lifetime, backdate=options.backdate)
     signer = authority.new_key(creation.curve)
     name = creation.names.get(role) or authority.default_ca_name(role)

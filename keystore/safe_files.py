@@ -6,6 +6,7 @@ which command repairs it.
 
 from __future__ import annotations
 
+import errno
 import os
 import shlex
 import stat
@@ -21,11 +22,10 @@ _WRITABLE_BY_OTHERS = 0o022
 def read(root: Path, relative: str) -> bytes:
     """The content of a keystore file; raises DamagedKeystore when it is missing, UnsafeKeystore for a strange
     link, StorageError otherwise."""
-    path = root / relative
     try:
-        return _read(path, _flags(root, relative))
+        return _read(root, relative)
     except FileNotFoundError:
-        raise DamagedKeystore(f"{printable(path)} is missing") from None
+        raise DamagedKeystore(f"{printable(root / relative)} is missing") from None
     except OSError as error:
         raise StorageError.of(error, "reading the keystore") from None
 
@@ -33,7 +33,7 @@ def read(root: Path, relative: str) -> bytes:
 def read_if_there(root: Path, relative: str) -> bytes | None:
     """As ``read``, None when there is no such file (a dangling link counts as none)."""
     try:
-        return _read(root / relative, _flags(root, relative))
+        return _read(root, relative)
     except (FileNotFoundError, NotADirectoryError):
         return None
     except OSError as error:
@@ -46,32 +46,35 @@ def read_private(root: Path, relative: str) -> bytes:
     return read(root, relative)
 
 
-def _read(path: Path, flags: int) -> bytes:
-    descriptor = os.open(path, flags)
+def _read(root: Path, relative: str) -> bytes:
+    """Text paths, not ``Path``: this runs a few hundred times before every launch."""
+    descriptor = _open(root, relative)
     try:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise UnsafeKeystore(f"{printable(path)} is not a regular file; remove it")
-        chunks = []
-        size = 0
-        while chunk := os.read(descriptor, 1 << 16):
-            chunks.append(chunk)
-            size += len(chunk)
-            if size > _MAX_FILE:
-                raise DamagedKeystore(f"{printable(path)} is larger than {_MAX_FILE} bytes")
-        return b"".join(chunks)
+        info = os.fstat(descriptor)
+        if not stat.S_ISREG(info.st_mode):
+            raise UnsafeKeystore(f"{printable(root / relative)} is not a regular file; remove it")
+        if info.st_size > _MAX_FILE:
+            raise DamagedKeystore(f"{printable(root / relative)} is larger than {_MAX_FILE} bytes")
+        content = os.read(descriptor, info.st_size + 1)
+        if len(content) != info.st_size:
+            raise DamagedKeystore(f"{printable(root / relative)} changed while it was read; try again")
+        return content
     finally:
         os.close(descriptor)
 
 
-def _flags(root: Path, relative: str) -> int:
-    """O_NONBLOCK keeps a planted FIFO from hanging us; links are followed only where SROS2 has them."""
+def _open(root: Path, relative: str) -> int:
+    """Links are followed only where SROS2 has them; O_NONBLOCK keeps a planted FIFO from hanging us."""
     flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
-    target = link_target(root, relative)
-    if target is None:
-        return flags | os.O_NOFOLLOW
+    try:
+        return os.open(f"{root}/{relative}", flags | os.O_NOFOLLOW)
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+    target = link_target(root, relative) or ""
     if target not in allowed_targets(relative):
         raise strange_link(root, relative, target)
-    return flags
+    return os.open(f"{root}/{relative}", flags)
 
 
 def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystore:
@@ -85,7 +88,7 @@ def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystore:
 def link_target(root: Path, relative: str) -> str | None:
     """Where the file points if it is a link, else None (also when it does not exist)."""
     try:
-        return os.readlink(root / relative)
+        return os.readlink(f"{root}/{relative}")
     except OSError:
         return None
 
@@ -116,17 +119,17 @@ def refuse_unsafe_private(root: Path, relative: str) -> None:
             raise UnsafeKeystore(problem)
 
 
-def private_problem(path: Path, info: os.stat_result) -> str | None:
+def private_problem(path: Path | str, info: os.stat_result) -> str | None:
     """What is wrong with the owner or mode of a private file or directory, with the repairing command."""
+    if info.st_uid == os.geteuid() and not info.st_mode & _WRITABLE_BY_OTHERS:
+        return None
     quoted = shlex.quote(str(path))
     if info.st_uid != os.geteuid():
         return (
             f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that "
             f"user, or take it over: chown -R {os.geteuid()} {quoted}"
         )
-    if info.st_mode & _WRITABLE_BY_OTHERS:
-        return f"{printable(path)} can be written by others (mode {mode_text(info)}): chmod go-w {quoted}"
-    return None
+    return f"{printable(path)} can be written by others (mode {mode_text(info)}): chmod go-w {quoted}"
 
 
 def refuse_unsafe_directory(path: Path) -> None:

@@ -6,7 +6,6 @@ making, so that an interrupted ``create`` can be completed while a foreign direc
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -28,6 +27,8 @@ class Settings:
     lifetime: timedelta = DEFAULT_LIFETIME
 
     def to_json(self) -> bytes:
+        import json
+
         content = {
             "version": _VERSION,
             "subjects": self.subjects.value,
@@ -39,6 +40,8 @@ class Settings:
     @classmethod
     def from_json(cls, text: bytes, place: str) -> Settings:
         """Raises DamagedKeystore for anything but what ``to_json`` writes."""
+        import json
+
         try:
             content: Any = json.loads(text)
             if content["version"] != _VERSION:

@@ -14,7 +14,6 @@ canonicalise line ends, so the file itself may be stored with either.
 from __future__ import annotations
 
 import binascii
-import hashlib
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import TYPE_CHECKING
@@ -57,7 +56,7 @@ def _with_crlf(document: bytes) -> bytes:
 
 def _signed_data(content: bytes, certificate: CertificateFacts, signer: Signer, now: datetime) -> bytes:
     """SignedData of RFC 5652 section 5.1, version 1, detached, with the signer's certificate."""
-    attributes = _attributes(hashlib.sha256(content).digest(), now)
+    attributes = _attributes(_sha256(content), now)
     signer_info = der.encode(
         der.SEQUENCE,
         der.integer(1),
@@ -79,6 +78,12 @@ def _signed_data(content: bytes, certificate: CertificateFacts, signer: Signer, 
     return der.encode(der.SEQUENCE, _SIGNED_DATA, der.encode(_CONSTRUCTED_0, body))
 
 
+def _sha256(data: bytes) -> bytes:
+    import hashlib  # loads libcrypto, which a launch that only compares does not need
+
+    return hashlib.sha256(data).digest()
+
+
 def _attributes(digest: bytes, now: datetime) -> bytes:
     """contentType, signingTime, messageDigest: in the ascending order DER demands of a SET OF."""
     pairs = (
@@ -95,7 +100,7 @@ def _signature_algorithm(certificate: CertificateFacts) -> bytes:
 
 def _multipart(content: bytes, pkcs7: bytes) -> bytes:
     # The digest makes the boundary one that cannot occur in the content, and the same content the same frame.
-    boundary = b"----" + hashlib.sha256(b"boundary" + content).hexdigest()[:32].upper().encode()
+    boundary = b"----" + _sha256(b"boundary" + content).hex()[:32].upper().encode()
     encoded = binascii.b2a_base64(pkcs7, newline=False)
     lines = b"\r\n".join(encoded[at : at + 64] for at in range(0, len(encoded), 64))
     head = b'MIME-Version: 1.0\r\nContent-Type: multipart/signed; protocol="application/x-pkcs7-signature"; '
@@ -208,7 +213,7 @@ def _check_signature(
 ) -> None:
     from keystore.public_key import signature_is_valid
 
-    if info.digest != hashlib.sha256(signed.content).digest():
+    if info.digest != _sha256(signed.content):
         raise DamagedKeystore(f"{place}: its content was changed after signing")
     if not signature_is_valid(authority.public_key, info.signature, info.attributes):
         raise DamagedKeystore(f"{place}: its signature is not by the permissions CA of this keystore")

@@ -8,7 +8,6 @@ those of everyone. Our common names contain none of these separators: each is on
 
 from __future__ import annotations
 
-import hashlib
 import re
 from collections.abc import Iterable, Mapping
 from enum import Enum
@@ -38,6 +37,8 @@ def common_name(enclave: str, scheme: SubjectScheme = SubjectScheme.EXACT) -> st
 
 
 def _short(enclave: str) -> str:
+    import hashlib  # loads libcrypto; only long names need it
+
     head = f"ros-{hashlib.sha256(enclave.encode()).hexdigest()[:40]}-"
     return head + enclave.replace("/", ".")[-(MAX_COMMON_NAME - len(head)) :].lstrip(".")
 

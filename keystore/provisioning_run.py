@@ -1,0 +1,88 @@
+"""The writing half of ``keystore.provisioning``: under the lock, in batches."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from keystore import store
+from keystore.creation import CreateOptions, complete, renew_governance
+from keystore.enclave_name import check_distinct
+from keystore.enclave_state import EnclaveState
+from keystore.enclave_writing import EnclaveWriter
+from keystore.governance_file import governance_domains
+from keystore.provisioning import (
+    EnclaveReport,
+    Progress,
+    ProvisionOptions,
+    ProvisionReport,
+    Wish,
+    inspect_wish,
+)
+from keystore.store import Store
+from keystore.view import KeystoreView
+
+# Bounds what an interrupted run loses, and how often the disk is waited for.
+_BATCH = 250
+
+
+def write_wishes(
+    root: Path, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
+) -> ProvisionReport:
+    """Complete the keystore, then every enclave that is not as wished."""
+    with _locked(root, options) as opened:
+        done, warnings = _complete_keystore(opened, options, now)
+        view = KeystoreView(root)
+        check_distinct(dict.fromkeys((*view.enclaves(), *wishes)))
+        writer = EnclaveWriter(opened, view, options, now)
+        states = [inspect_wish(view, name, wish, options, now) for name, wish in wishes.items()]
+        writer.check_subjects(states)
+        reports = _write_all(opened, writer, states, wishes, options.progress)
+    return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
+
+
+@contextmanager
+def _locked(root: Path, options: ProvisionOptions) -> Iterator[Store]:
+    if options.create:
+        store.create_root(root)
+    with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
+        yield opened
+
+
+def _complete_keystore(
+    opened: Store, options: ProvisionOptions, now: datetime
+) -> tuple[list[str], list[str]]:
+    """Missing parts of the keystore itself, and a governance that covers the domains."""
+    domains = options.domains or governance_domains(KeystoreView(opened.root))
+    creation = replace(
+        options.creation or CreateOptions(), domains=domains, access=options.access, durable=options.durable, now=now
+    )
+    report = complete(opened, creation)
+    done = list(report.actions)
+    if renew_governance(opened, domains, options.access, now):
+        done.append(f"governance signed for domains {domains}")
+    return done, list(report.warnings)
+
+
+def _write_all(
+    opened: Store,
+    writer: EnclaveWriter,
+    states: list[EnclaveState],
+    wishes: Mapping[str, Wish],
+    progress: Progress | None,
+) -> tuple[EnclaveReport, ...]:
+    """In batches: bounded loss when interrupted, few calls to make it durable."""
+    reports = {state.enclave: EnclaveReport(state.enclave, ()) for state in states}
+    todo = [state for state in states if not state.is_good]
+    for start in range(0, len(todo), _BATCH):
+        part = todo[start : start + _BATCH]
+        with opened.batch() as batch:
+            for position, state in enumerate(part, start + 1):
+                actions = writer.write(batch, state, wishes[state.enclave].permissions)
+                reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)
+                if progress is not None:
+                    progress(position, len(todo))
+    return tuple(reports.values())
