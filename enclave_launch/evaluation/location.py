@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from enclave_launch.frontend import error_location
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
@@ -28,9 +29,18 @@ def include_step(include: LaunchDescriptionEntity) -> str:
 
 
 def annotate(error: BaseException, entity: object, context: LaunchContext) -> None:
-    """Note on ``error`` which entity raised it; the innermost note stays."""
-    if place_of(error) is None:
-        setattr(error, _MARK, location_of(entity, context))
+    """Note on ``error`` which entity raised it; the innermost note stays.
+
+    An error in a file that an include was about to load stands in that file, not at the include.
+    """
+    if place_of(error) is not None:
+        return
+    place = location_of(entity, context)
+    inside = error_location.location_of(error)
+    if inside is not None:
+        includes = (*context.includes, str(place)) if inside.file != place.file else context.includes
+        place = SourceLocation(inside.file, inside.line, inside.element, includes)
+    setattr(error, _MARK, place)
 
 
 def place_of(error: BaseException) -> SourceLocation | None:
