@@ -294,10 +294,11 @@ def join(left: Value, right: Value) -> Value:
         return left
     if not left:
         return right
-    added = [atom for atom in right if not contains(left, atom)]
-    if not added:
-        return left
-    return _limited((*left, *added))
+    joined = left
+    for atom in right:
+        if not contains(joined, atom):
+            joined = (*joined, atom)
+    return left if joined is left else _limited(joined)
 
 
 def join_all(values: Iterable[Value]) -> Value:
@@ -358,7 +359,7 @@ def widen(old: Value, new: Value, texts_too: bool) -> Value:
     texts: list[str | Text] = []
     for atom in joined:
         if type(atom) in (int, float) and not contains(old, atom):
-            return (*kept, *(a for a in joined if not isinstance(a, int | float)), *ANY) if old else joined
+            return join(tuple(a for a in joined if type(a) not in (int, float)), ANY) if old else joined
         if isinstance(atom, str | Text):
             texts.append(atom)
         else:

@@ -129,9 +129,10 @@ def _fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
 
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
-    inner = _inner_frame(frame)
+    inner = _inner_frame(run, frame)
     collected: list[Value] = []
     exact = _generate(run, node.generators, 0, inner, lambda: collected.append(run.evaluate(node.elt, inner)))
+    _leave(inner)
     kind = "set" if isinstance(node, ast.SetComp) else "list"
     if exact:
         return run.sequence(node, kind, Items(tuple(collected)))
@@ -142,7 +143,7 @@ def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp,
 
 
 def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
-    inner = _inner_frame(frame)
+    inner = _inner_frame(run, frame)
     result = run.allocate(node, "dict", Dictionary)
 
     def add() -> None:
@@ -151,6 +152,7 @@ def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
         store_item(run, result, key, value)
 
     _generate(run, node.generators, 0, inner, add)
+    _leave(inner)
     return (result,)
 
 
@@ -169,17 +171,20 @@ def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
         run.state.write(obj.cells, OTHER_KEYS, join(obj.cells.get(OTHER_KEYS, BOTTOM), key))
 
 
-def _inner_frame(frame: Frame) -> Frame:
+def _inner_frame(run: Run, frame: Frame) -> Frame:
     closure = frame.closure if frame.is_class else frame
     cells = LocalCells()
     if frame.is_class:
         cells.update(frame.cells)
-    inner = Frame(frame.module, cells, closure, frame.depth)
+    inner = Frame(frame.module, cells, closure, run.state.depth)
     inner.function = frame.function
-    inner.capture()
-    if not frame.is_class:
-        frame.capture()
     return inner
+
+
+def _leave(inner: Frame) -> None:
+    """The variables of a comprehension die with it, unless a function made in it lives on."""
+    if type(inner.cells) is LocalCells and not inner.cells.shared:
+        inner.cells.dead = True
 
 
 def _generate(

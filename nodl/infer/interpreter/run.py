@@ -71,9 +71,12 @@ class Frame:
         return type(self.cells) is LocalCells and self.cells.shared
 
     def capture(self) -> None:
-        """Inner functions can see the cells from now on."""
-        if type(self.cells) is LocalCells:
-            self.cells.shared = True
+        """Inner functions can see the cells, and those around them, from now on."""
+        frame: Frame | None = self
+        while frame is not None and not frame.captured:
+            if type(frame.cells) is LocalCells:
+                frame.cells.shared = True
+            frame = frame.closure
 
 
 @dataclass(slots=True)
