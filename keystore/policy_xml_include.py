@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 MAX_DEPTH = 16
 MAX_FILES = 256
+MAX_INCLUDES = 5_000  # followed in all: files that include each other twice multiply
 MAX_TOTAL_BYTES = 4_000_000
 _NAMESPACES = ("http://www.w3.org/2001/XInclude", "http://www.w3.org/2003/XInclude")
 _INCLUDE_TAGS = frozenset(f"{{{namespace}}}include" for namespace in _NAMESPACES)
@@ -49,6 +50,7 @@ class IncludingReader:
         self._folder = None if folder is None else folder.resolve()
         self._roots: dict[Path, etree._Element] = {}
         self._bytes = 0
+        self._followed = 0
 
     def children(self, element: etree._Element, place: Place) -> Iterator[tuple[etree._Element, Place]]:
         """Each child element and where it is written. Raises ``PolicyError`` for an unsafe include."""
@@ -62,6 +64,9 @@ class IncludingReader:
     def _included(self, include: etree._Element, place: Place) -> Iterator[tuple[etree._Element, Place]]:
         where = place.at(include)
         path = self._path(include, place, where)
+        self._followed += 1
+        if self._followed > MAX_INCLUDES:
+            raise PolicyError(f"{where}: more than {MAX_INCLUDES} includes")
         chain = (*place.chain, f"{place.file}:{include.sourceline}")
         inner = Place(str(path), chain)
         if len(chain) > MAX_DEPTH or str(path) in (place.file, *(c.rpartition(":")[0] for c in chain)):
