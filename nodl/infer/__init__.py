@@ -6,6 +6,7 @@ at what launch starts as ``lib/<package>/<executable>``. What could not be found
 
 from __future__ import annotations
 
+from nodl.infer.executable import InferredExecutable, infer_executable
 from nodl.infer.system import InferredSystem, infer_paths
 
-__all__ = ["InferredSystem", "infer_paths"]
+__all__ = ["InferredExecutable", "InferredSystem", "infer_executable", "infer_paths"]

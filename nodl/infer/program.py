@@ -15,6 +15,16 @@ from pathlib import Path
 
 MAX_SOURCE_BYTES = 4_000_000
 
+# Libraries whose behaviour the models describe; their sources are never analysed.
+MODELLED = frozenset(
+    {
+        "rclpy", "tf2_ros", "tf2_py", "tf2_geometry_msgs", "message_filters", "image_transport_py", "cv_bridge",
+        "diagnostic_updater", "rosidl_runtime_py", "rosidl_parser", "ament_index_python", "launch",
+        "launch_ros", "numpy", "cv2", "yaml", "setuptools", "pkg_resources",
+    }
+)  # fmt: skip
+_INTERFACES = ("msg", "srv", "action")  # generated from interface files, so types and not programs
+
 
 @dataclass(eq=False)
 class SourceModule:
@@ -81,6 +91,8 @@ class Program:
 
     def _search(self, name: str, beside: str) -> str | None:
         steps = name.split(".")
+        if steps[0] in MODELLED or (len(steps) > 1 and steps[1] in _INTERFACES):
+            return None
         for root in (beside, *self.roots):
             found = self._below(root, steps)
             if found:

@@ -39,7 +39,7 @@ def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
     program = Program()
     for file in files:
         program.add_root(program.top_folder(file))
-    with _without_collector():
+    with without_collector():
         runs = [(run, origin) for file in files for run, origin in _runs(program, file)]
         called = {node for run, _ in runs for node in run.called}
         instantiated = {node for run, _ in runs for node in run.instantiated}
@@ -85,7 +85,7 @@ def _python_files(path: Path) -> Iterator[str]:
 
 
 @contextmanager
-def _without_collector() -> Iterator[None]:
+def without_collector() -> Iterator[None]:
     """Analysis makes many small objects that stay alive to its end; looking for garbage finds none."""
     enabled = gc.isenabled()
     gc.disable()
