@@ -19,7 +19,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import TypeAlias
 
 MAX_NESTING = 128  # where upstream ends in a RecursionError, too
@@ -87,7 +86,6 @@ def unescape(text: str) -> str:
     return _ESCAPED.sub(r"\1", text) if "\\" in text else text
 
 
-@lru_cache(maxsize=8192)
 def parse_template(text: str) -> Template:
     """Parse ``text``; the empty text is one empty text part.
 
@@ -128,6 +126,7 @@ class _Context:
 
 _ESCAPED = re.compile(r"\\(.)")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+_PLAIN_CALL = re.compile(rf"""\$\(({_NAME.pattern})((?: [^ '"\\$()]+)*)\)""")  # most calls; the same anywhere
 _DOLLAR = r"\$(?!\()|(?<=\\)\$"  # a dollar that begins no call
 _PARENTHESIS = r"(?<=\\)[()]"
 
@@ -173,12 +172,16 @@ class _Scanner:
         return tuple(parts)
 
     def call(self, context: _Context) -> Call:
-        self.position += 2
-        self.depth += 1
-        if self.depth > MAX_NESTING:
+        if self.depth == MAX_NESTING:
             raise TemplateSyntaxError(
                 f"substitutions are nested more than {MAX_NESTING} deep in '{self.text[:80]}...'", self.text
             )
+        plain = _PLAIN_CALL.match(self.text, self.position)
+        if plain is not None:
+            self.position = plain.end()
+            return Call(plain[1], tuple((arg,) for arg in plain[2].split(" ")[1:]), context.rule)
+        self.position += 2
+        self.depth += 1
         name = _NAME.match(self.text, self.position)
         if name is None:
             raise self.unexpected("the name of a substitution")

@@ -33,7 +33,7 @@ substitution_parse_methods: dict[str, ParseMethod] = {}
 # Names that not every release has; kept beside the registries, which third parties may read and which map to
 # plain callables upstream.
 _METHODS = {"action": action_parse_methods, "substitution": substitution_parse_methods}
-_gates: dict[tuple[str, str], Feature] = {}
+_GATES: dict[str, dict[str, Feature]] = {"action": {}, "substitution": {}}
 
 
 def instantiate_action(entity: Entity, parser: Parser) -> Action:
@@ -92,7 +92,7 @@ def expose_substitution(name: str, *, feature: Feature | None = None) -> Callabl
 
 def _lookup(kind: str, name: str) -> ParseMethod | None:
     """The registered parse method, imported if need be; ``None`` if the release in force has none."""
-    gate = _gates.get((kind, name))
+    gate = _GATES[kind].get(name)
     if gate is not None and not current_release().has(gate):
         return None
     method = _METHODS[kind].get(name)
@@ -117,7 +117,7 @@ def _exposer(kind: str, name: str, gate: Feature | None) -> Callable[[Exposed], 
             raise RuntimeError(f"Two {kind} parsing methods exposed with the same name: [{name}].")
         methods[name] = _checking_leftovers(method) if kind == "action" else method
         if gate is not None:
-            _gates[kind, name] = gate
+            _GATES[kind][name] = gate
         return exposed
 
     return expose

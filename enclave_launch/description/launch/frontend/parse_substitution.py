@@ -75,10 +75,10 @@ def _parse_if(value: Any) -> Any:
         return value
     if "$(" not in value:
         return unescape(value)
-    template = parse_template(value)
-    if len(template) == 1 and isinstance(template[0], str):
-        return template[0]
-    return parse_substitution(value)
+    parts = parse_substitution(value)
+    if len(parts) == 1 and isinstance(parts[0], TextSubstitution):
+        return parts[0].text
+    return parts
 
 
 @lru_cache(maxsize=16384)

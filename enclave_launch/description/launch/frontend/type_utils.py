@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, List, get_args  # noqa: UP035  (upstream's identifiers name typing.List)
+from typing import Any, List  # noqa: UP035  (upstream's identifiers name typing.List)
 
 from enclave_launch.description.launch.frontend.entity import Entity
-from enclave_launch.description.launch.utilities.type_utils import is_typing_list
 
 _TYPE_OF_IDENTIFIER: dict[str, Any] = {
     "str": str,
@@ -22,10 +21,10 @@ _TYPE_OF_IDENTIFIER: dict[str, Any] = {
 
 def check_is_list_entity(data_type: Any) -> bool:
     """Whether ``data_type`` is a list type whose items are entities."""
-    if not is_typing_list(data_type):
+    items = getattr(data_type, "__args__", None)
+    if not items or getattr(data_type, "__origin__", None) is not list:
         return False
-    items = get_args(data_type)
-    return bool(items) and isinstance(items[0], type) and issubclass(items[0], Entity)
+    return isinstance(items[0], type) and issubclass(items[0], Entity)
 
 
 def get_data_type_from_identifier(type_identifier: str) -> Any:
