@@ -1,0 +1,121 @@
+"""``secure-nodl infer``: interfaces from source, as JSON, text, policy or manifests to start from."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nodl.infer.report.expanded import ExpandedSystem
+    from nodl.infer.system import InferredSystem
+
+FORMATS = ("text", "json", "policy", "v1", "v2")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "infer",
+        help="infer nodes and their interfaces from source",
+        description="Infer nodes and their interfaces from Python (and, with the extra cpp, C++) source. "
+        "Nothing of the analysed program is executed.",
+    )
+    parser.add_argument(
+        "subjects", nargs="+", metavar="PACKAGE|PATH", help="an installed package, or files and folders"
+    )
+    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="write files into DIR")
+    parser.add_argument("--format", choices=FORMATS, default=None, help="text (default); with -o: v1")
+    parser.add_argument("--builtin", action="store_true", help="also show what every node has")
+    parser.add_argument(
+        "--accept-patterns", action="store_true", help="allow names known in part as patterns in a policy"
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def run(args: argparse.Namespace) -> int:
+    """0: nodes were found; 1: none; 2: a subject does not exist. Open questions go to standard error."""
+    try:
+        system = _infer(args.subjects)
+    except LookupError as error:
+        print(f"secure-nodl infer: {error.args[0]}", file=sys.stderr)
+        return 2
+    from nodl.infer.report.expanded import expand
+
+    expanded = expand(system)
+    chosen = args.format or ("v1" if args.output else "text")
+    documents = _documents(chosen, system, expanded, args)
+    if args.output:
+        _write(args.output, documents)
+    else:
+        sys.stdout.write("".join(documents.values()))
+    if expanded.unresolved and (chosen not in ("text", "json") or args.output):
+        print(f"{len(expanded.unresolved)} unresolved:", file=sys.stderr)
+        for question in expanded.unresolved:
+            print(f"  {question.source}: {question.why}", file=sys.stderr)
+    return 0 if system.nodes else 1
+
+
+def _documents(
+    chosen: str, system: InferredSystem, expanded: ExpandedSystem, args: argparse.Namespace
+) -> dict[str, str]:
+    if chosen == "json":
+        from nodl.infer.report.json_report import to_json
+
+        return {"inferred.json": to_json(expanded, built_in=args.builtin)}
+    if chosen == "policy":
+        from nodl.infer.report.policy_report import to_policy
+
+        return {"policy.xml": to_policy(expanded, accept_patterns=args.accept_patterns)}
+    if chosen == "text":
+        from nodl.infer.report.text_report import to_text
+
+        return {"inferred.txt": to_text(expanded, built_in=args.builtin)}
+    from nodl.infer.report.nodl_report import to_v1, to_v2
+
+    return to_v1(system) if chosen == "v1" else to_v2(system)
+
+
+def _write(folder: Path, documents: dict[str, str]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in documents.items():
+        (folder / name).write_text(text, encoding="utf-8")
+        print(folder / name)
+
+
+def _infer(subjects: list[str]) -> InferredSystem:
+    """Paths together, so that they find each other's modules; packages by their executables."""
+    from nodl.infer.system import InferredSystem, infer_paths
+
+    paths = [subject for subject in subjects if os.path.exists(subject)]
+    found = [infer_paths(paths)] if paths else []
+    found.extend(_infer_package(subject) for subject in subjects if subject not in paths)
+    return InferredSystem(
+        tuple(node for each in found for node in each.nodes),
+        tuple(gap for each in found for gap in each.gaps),
+        tuple(file for each in found for file in each.files),
+    )
+
+
+def _infer_package(package: str) -> InferredSystem:
+    from nodl.ament_index import PackageNotFoundError, package_prefix, search_prefixes
+    from nodl.infer.executable import infer_executable
+    from nodl.infer.system import InferredSystem
+    from nodl.node_interface import Gap
+    from nodl.source_ref import SourceRef
+
+    prefixes = search_prefixes()
+    try:
+        folder = Path(package_prefix(package, prefixes), "lib", package)
+    except (PackageNotFoundError, ValueError) as error:
+        raise LookupError(f"'{package}' is neither a file or folder nor an installed package: {error}") from None
+    files = sorted(p for p in folder.glob("*") if p.is_file() and os.access(p, os.X_OK))
+    nodes, gaps = [], []
+    for path in files:
+        inferred = infer_executable(package, path.name, prefixes=prefixes)
+        nodes.extend(inferred.interfaces)
+        if not inferred:
+            gaps.append(Gap(SourceRef(str(path)), inferred.why))
+    return InferredSystem(tuple(nodes), tuple(gaps), tuple(str(path) for path in files))
