@@ -30,6 +30,8 @@ def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Pat
     """Text becomes a ``TextSubstitution``, one substitution a list. Raises ``TypeError`` for anything else."""
     if isinstance(subs, str):
         return [TextSubstitution(text=subs)]
+    if isinstance(subs, list):
+        return [item if isinstance(item, Substitution) else _normalize(item) for item in subs]
     if is_a_subclass(subs, Substitution):
         return [subs]  # type: ignore[list-item]
     if _is_path(subs):
@@ -89,6 +91,8 @@ def ensure_argument_type(
     argument: Any, types: type | Iterable[type], argument_name: str, caller: str | None = None
 ) -> None:
     """Raise a ``TypeError``, in upstream's words, unless ``argument`` is of one of ``types``."""
+    if isinstance(types, (type, tuple)) and isinstance(argument, types):
+        return
     own = "'ensure_argument_type()' e"
     if not isinstance(types, (collections.abc.Iterable, type)):
         wanted = "type, collections.abc.Iterable of type"
