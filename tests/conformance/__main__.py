@@ -1,0 +1,59 @@
+"""``python -m tests.conformance [GROUP...]``: record in the case files what real launch does, per distribution.
+
+Needs the sources of real launch (see ``real_launch``). Rewrites only the ``expect`` sections.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from . import case_files, real_launch
+
+
+def main(groups: list[str]) -> None:
+    for path in sorted(case_files.CASES.glob("*.txt")):
+        if not groups or path.stem in groups:
+            record(path)
+
+
+def record(path: Path) -> None:
+    cases = case_files.load(path)
+    answers = {
+        distro: real_launch.run_all(cases, distro)
+        for distro in case_files.DISTROS
+        if real_launch.sources(distro) is not None
+    }
+    if not answers:
+        raise SystemExit("no sources of real launch given: see tests/conformance/real_launch.py")
+    blocks = ("\n" + path.read_text(encoding="utf-8")).split("\n=== ")
+    number = 0
+    for index, block in enumerate(blocks[1:], start=1):
+        if block.split("\n", 1)[0].strip() == "shared":
+            continue
+        blocks[index] = _with_expectations(block, {distro: texts[number] for distro, texts in answers.items()})
+        number += 1
+    path.write_text("\n=== ".join(blocks).lstrip("\n"), encoding="utf-8")
+    print(f"{path.stem}: {len(cases)} cases")
+
+
+def _with_expectations(block: str, answers: dict[str, str]) -> str:
+    sections = ("\n" + block).split("\n--- ")
+    kept = [section for section in sections if not section.startswith("expect")]
+    kept[-1] = kept[-1].rstrip()
+    if len(set(answers.values())) == 1:
+        kept.append("expect\n" + next(iter(answers.values())))
+    else:
+        kept += [f"expect {' '.join(distros)}\n{text}" for text, distros in _grouped(answers).items()]
+    return "\n--- ".join(kept).lstrip("\n") + "\n"
+
+
+def _grouped(answers: dict[str, str]) -> dict[str, list[str]]:
+    grouped: dict[str, list[str]] = {}
+    for distro in reversed(list(answers)):
+        grouped.setdefault(answers[distro], []).append(distro)
+    return grouped
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
