@@ -53,8 +53,8 @@ def scheme_of(cn: str) -> SubjectScheme:
 
 
 def pieces(cn: str) -> frozenset[tuple[str, str]]:
-    """The bag Cyclone compares: pieces between separators, each cut at its first ``=``."""
-    cut = (piece.partition("=") for piece in _SEPARATORS.split(subject_name(cn)))
+    """The bag Cyclone compares: non-empty pieces between separators, each cut at its first ``=``."""
+    cut = (piece.partition("=") for piece in _SEPARATORS.split(subject_name(cn)) if piece)
     return frozenset((key, value) for key, _, value in cut)
 
 
@@ -64,7 +64,7 @@ def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
     ``names`` maps enclave to common name. Sorted; empty for any set of names of the exact scheme.
     """
     bags = {enclave: pieces(cn) for enclave, cn in names.items()}
-    open_ones = {enclave: bag for enclave, bag in bags.items() if len(bag) > 1}
+    open_ones = {enclave: bag for enclave, bag in bags.items() if _SEPARATORS.search(names[enclave])}
     by_bag: dict[frozenset[tuple[str, str]], list[str]] = {}
     for enclave, bag in bags.items():
         by_bag.setdefault(bag, []).append(enclave)

@@ -1,0 +1,125 @@
+"""Certificates as the profile wants them, judged by openssl and by cryptography."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
+from hypothesis import given
+from hypothesis import strategies as st
+
+from keystore import authority, certificate, der
+from keystore.authority import Authority, Curve, IdentityIssuer, Role
+from keystore.errors import InvalidInput, SigningUnavailable
+from keystore.identity import new_identity
+from keystore.validity import Validity
+from tests.keystore.kit import DAY, NOW, openssl
+
+VALIDITY = Validity.starting(NOW, 90 * DAY)
+
+
+def ca(role: Role, curve: Curve = Curve.P256) -> Authority:
+    return authority.self_signed_ca(role, authority.default_ca_name(role), authority.new_key(curve), VALIDITY)
+
+
+@pytest.fixture(scope="module")
+def identity_ca() -> Authority:
+    return ca(Role.IDENTITY)
+
+
+def test_openssl_accepts_an_enclave_below_its_ca(identity_ca: Authority, tmp_path: Path) -> None:
+    made = new_identity(IdentityIssuer(identity_ca), "ros.a.b", VALIDITY)
+    (tmp_path / "ca.pem").write_bytes(identity_ca.pem())
+    (tmp_path / "cert.pem").write_bytes(made.cert)
+    at = str(int(NOW.timestamp()))
+    openssl("verify", "-x509_strict", "-attime", at, "-CAfile", tmp_path / "ca.pem", tmp_path / "cert.pem")
+    assert openssl("x509", "-noout", "-subject", "-in", tmp_path / "cert.pem").strip() == "subject=CN = ros.a.b"
+
+
+def test_the_profile_of_an_enclave(identity_ca: Authority) -> None:
+    made = new_identity(IdentityIssuer(identity_ca), "ros.a", VALIDITY)
+    cert = x509.load_pem_x509_certificate(made.cert)
+    usage = cert.extensions.get_extension_for_class(x509.KeyUsage)
+    assert usage.critical and usage.value.digital_signature and not usage.value.key_cert_sign
+    constraints = cert.extensions.get_extension_for_class(x509.BasicConstraints)
+    assert constraints.critical and not constraints.value.ca
+    extended = cert.extensions.get_extension_for_class(x509.ExtendedKeyUsage).value
+    assert [usage.dotted_string for usage in extended] == ["1.3.6.1.5.5.7.3.1", "1.3.6.1.5.5.7.3.2"]
+    assert cert.extensions.get_extension_for_class(x509.AuthorityKeyIdentifier)
+    assert cert.serial_number.bit_length() > 100
+    key = serialization.load_pem_private_key(made.key or b"", None)
+    assert isinstance(key, ec.EllipticCurvePrivateKey) and key.curve.name == "secp256r1"
+
+
+@pytest.mark.parametrize(("role", "documents"), [(Role.IDENTITY, False), (Role.PERMISSIONS, True)])
+def test_the_profile_of_each_ca(role: Role, documents: bool) -> None:
+    cert = x509.load_der_x509_certificate(ca(role).facts.der)
+    usage = cert.extensions.get_extension_for_class(x509.KeyUsage).value
+    assert usage.key_cert_sign and usage.digital_signature is documents
+    constraints = cert.extensions.get_extension_for_class(x509.BasicConstraints)
+    assert constraints.critical and constraints.value.ca and constraints.value.path_length == 0
+
+
+def test_cas_have_names_of_their_own() -> None:
+    assert ca(Role.IDENTITY).facts.subject != ca(Role.IDENTITY).facts.subject
+    for name in ("", "a" * 65, "a,b", "a/b", "a=b", 'a"b', "a\\b"):
+        with pytest.raises(InvalidInput):
+            authority.self_signed_ca(Role.IDENTITY, name, authority.new_key(Curve.P256), VALIDITY)
+
+
+def test_an_enclave_never_outlives_its_ca(identity_ca: Authority) -> None:
+    made = new_identity(IdentityIssuer(identity_ca), "ros.a", Validity.starting(NOW, 900 * DAY))
+    assert made.facts.validity == VALIDITY
+
+
+def test_a_ca_and_another_ones_key_are_told_apart(identity_ca: Authority) -> None:
+    with pytest.raises(SigningUnavailable, match="do not belong together"):
+        authority.authority_of(identity_ca.pem(), ca(Role.IDENTITY).signer, "ca.pem")
+
+
+def test_facts_agree_with_cryptography(identity_ca: Authority) -> None:
+    made = new_identity(IdentityIssuer(identity_ca), "ros.a", VALIDITY)
+    cert = x509.load_pem_x509_certificate(made.cert)
+    facts = certificate.read_pem(b"text before the block\n" + made.cert + identity_ca.pem())
+    assert facts.serial == cert.serial_number
+    assert facts.common_name == "ros.a" and facts.name_parts == 1
+    assert facts.subject == cert.subject.public_bytes() and facts.issuer == cert.issuer.public_bytes()
+    assert facts.validity.not_before == cert.not_valid_before_utc
+    assert facts.validity.not_after == cert.not_valid_after_utc
+    assert facts.public_key == authority.spki(made_public(cert))
+    assert facts.names_issuer(identity_ca.facts) and not facts.names_issuer(ca(Role.IDENTITY).facts)
+    assert not facts.can_sign_mail and ca(Role.PERMISSIONS).facts.can_sign_mail
+
+
+def made_public(cert: x509.Certificate) -> ec.EllipticCurvePublicKey | rsa.RSAPublicKey:
+    key = cert.public_key()
+    assert isinstance(key, (ec.EllipticCurvePublicKey, rsa.RSAPublicKey))
+    return key
+
+
+@given(st.binary(max_size=60))
+def test_garbage_is_refused_with_one_kind_of_error(data: bytes) -> None:
+    with pytest.raises(der.DerError):
+        certificate.read_der(data)
+
+
+@given(st.integers(0, 400), st.binary(min_size=1, max_size=3))
+def test_damaged_certificates_are_read_or_refused(position: int, damage: bytes) -> None:
+    whole = _SAMPLE.facts.der
+    data = whole[:position] + damage + whole[position + len(damage) :]
+    try:
+        certificate.read_der(data)
+    except der.DerError:
+        return
+
+
+_SAMPLE = ca(Role.IDENTITY)
+
+
+@given(st.integers(0, 2**200))
+def test_integers(value: int) -> None:
+    element = der.parse(der.integer(value))
+    assert int.from_bytes(element.content, "big", signed=True) == value

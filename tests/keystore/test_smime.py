@@ -1,0 +1,147 @@
+"""Signed documents: written as openssl and cryptography do, checked as strictly as the fixed DDS releases do."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
+from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
+from hypothesis import given
+from hypothesis import strategies as st
+
+from keystore import authority, smime
+from keystore.authority import Authority, Curve, IdentityIssuer, Role
+from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.identity import new_identity
+from keystore.signer import FileSigner, load_private_key
+from keystore.validity import Validity
+from tests.keystore.kit import DAY, NOW, openssl
+
+VALIDITY = Validity.starting(NOW, 90 * DAY)
+DOCUMENT = b'<?xml version="1.0" encoding="UTF-8"?>\n<dds>\n<!-- \xc3\xa9 -->\n</dds>\n'
+AT = str(int(NOW.timestamp()))
+
+
+def new_ca() -> Authority:
+    name = authority.default_ca_name(Role.PERMISSIONS)
+    return authority.self_signed_ca(Role.PERMISSIONS, name, authority.new_key(Curve.P256), VALIDITY)
+
+
+CA, OTHER = new_ca(), new_ca()
+
+
+def sign(document: bytes, by: Authority = CA) -> bytes:
+    return smime.sign(document, by.facts, by.signer, NOW)
+
+
+def check(p7s: bytes, by: Authority = CA) -> bytes:
+    signed = smime.read(p7s, "x.p7s")
+    smime.check(signed, [by.facts], "x.p7s")
+    return signed.document
+
+
+def test_openssl_verifies_what_we_sign(tmp_path: Path) -> None:
+    (tmp_path / "ca.pem").write_bytes(CA.pem())
+    (tmp_path / "x.p7s").write_bytes(sign(DOCUMENT))
+    openssl(
+        "smime", "-verify", "-text", "-attime", AT, "-CAfile", tmp_path / "ca.pem", "-in", tmp_path / "x.p7s",
+        "-out", tmp_path / "out",
+    )  # fmt: skip
+    assert (tmp_path / "out").read_bytes().replace(b"\r\n", b"\n") == DOCUMENT
+
+
+@pytest.mark.parametrize("extra", [(), ("-nodetach",), ("-md", "sha512")])
+def test_openssl_signs_what_we_read(tmp_path: Path, extra: tuple[str, ...]) -> None:
+    """Detached with SHA-256 is what we accept; other forms are refused, not misread."""
+    signer = CA.signer
+    assert isinstance(signer, FileSigner)
+    (tmp_path / "ca.pem").write_bytes(CA.pem())
+    (tmp_path / "key.pem").write_bytes(authority.key_pem(signer))
+    (tmp_path / "x.xml").write_bytes(DOCUMENT)
+    openssl(
+        "smime", "-sign", "-text", *extra, "-signer", tmp_path / "ca.pem", "-inkey", tmp_path / "key.pem",
+        "-in", tmp_path / "x.xml", "-out", tmp_path / "x.p7s",
+    )  # fmt: skip
+    if extra:
+        with pytest.raises(DamagedKeystore):
+            check((tmp_path / "x.p7s").read_bytes())
+    else:
+        assert check((tmp_path / "x.p7s").read_bytes()) == DOCUMENT
+
+
+@pytest.mark.parametrize("line_ends", [b"\r\n", b"\n"])
+def test_what_sros2_signs_is_read(line_ends: bytes) -> None:
+    """sros2 calls cryptography's builder with exactly these options."""
+    signer = CA.signer
+    assert isinstance(signer, FileSigner) and isinstance(signer.private_key, ec.EllipticCurvePrivateKey)
+    cert = x509.load_der_x509_certificate(CA.facts.der)
+    options = [pkcs7.PKCS7Options.Text, pkcs7.PKCS7Options.DetachedSignature]
+    builder = pkcs7.PKCS7SignatureBuilder().set_data(DOCUMENT)
+    made = builder.add_signer(cert, signer.private_key, hashes.SHA256()).sign(Encoding.SMIME, options)
+    assert check(made.replace(b"\r\n", b"\n").replace(b"\n", line_ends)) == DOCUMENT
+
+
+printable_lines = st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\r\n\0"), max_size=40), max_size=8)
+
+
+@given(printable_lines)
+def test_any_document_comes_back_unchanged(lines: list[str]) -> None:
+    document = "\n".join(lines).encode()
+    assert check(sign(document)) == document
+
+
+@pytest.mark.parametrize("document", [b"a\rb", b"a\0b", b"\r"])
+def test_bytes_that_verifiers_read_differently_are_not_signed(document: bytes) -> None:
+    with pytest.raises(InvalidInput):
+        sign(document)
+
+
+def test_changed_content_is_refused() -> None:
+    with pytest.raises(DamagedKeystore, match="changed after signing"):
+        check(sign(DOCUMENT).replace(b"</dds>", b"</ddx>"))
+
+
+def test_a_changed_signature_is_refused() -> None:
+    signed = smime.read(sign(DOCUMENT), "x")
+    broken = smime.SignedDocument(signed.content, signed.pkcs7[:-1] + bytes([signed.pkcs7[-1] ^ 1]))
+    with pytest.raises(DamagedKeystore):
+        smime.check(broken, [CA.facts], "x")
+
+
+def test_another_ca_is_refused() -> None:
+    with pytest.raises(DamagedKeystore, match="not the permissions CA"):
+        check(sign(DOCUMENT, OTHER))
+
+
+def test_a_certificate_below_the_ca_is_refused() -> None:
+    """CVE-2023-24010 and -24011: it chains to the CA, and that is not enough."""
+    made = new_identity(IdentityIssuer(CA), "ros.a", VALIDITY)
+    enclave = Authority(made.facts, FileSigner(load_private_key(made.key or b"", None, "key")))
+    with pytest.raises(DamagedKeystore, match="not the permissions CA"):
+        check(sign(DOCUMENT, enclave))
+
+
+def test_a_forger_with_the_cas_name_and_serial_is_refused() -> None:
+    """Issuer and serial alone prove nothing: the signature must be by the CA's key."""
+    forged = smime.sign(DOCUMENT, CA.facts, OTHER.signer, NOW)
+    with pytest.raises(DamagedKeystore, match="not by the permissions CA"):
+        check(forged)
+
+
+@pytest.mark.parametrize("p7s", [b"", b"x", b"\0" * 50, DOCUMENT, b'Content-Type: multipart/signed; boundary=""\n\n'])
+def test_what_is_no_smime_is_refused(p7s: bytes) -> None:
+    with pytest.raises(DamagedKeystore):
+        check(p7s)
+
+
+@given(st.integers(0, 3000), st.binary(min_size=1, max_size=4))
+def test_damage_is_refused_or_harmless(position: int, damage: bytes) -> None:
+    """Whatever is changed: either refused, or the document is still the signed one."""
+    whole = sign(DOCUMENT)
+    try:
+        assert check(whole[:position] + damage + whole[position + len(damage) :]) == DOCUMENT
+    except DamagedKeystore:
+        return

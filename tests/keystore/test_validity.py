@@ -1,0 +1,67 @@
+"""Dates that Cyclone DDS, Fast DDS and X.509 all understand."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta, timezone
+
+import pytest
+
+from keystore.errors import InvalidInput
+from keystore.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_moment
+from tests.keystore.kit import DAY, NOW
+
+
+def test_the_default_is_sros2s_day_of_back_dating() -> None:
+    validity = Validity.starting(NOW, 90 * DAY)
+    assert validity == Validity(NOW - DAY, NOW + 90 * DAY)
+
+
+def test_less_than_14_hours_of_back_dating_would_stop_fast_dds_west_of_utc() -> None:
+    assert Validity.starting(NOW, DAY, backdate=timedelta(hours=14)).not_before == NOW - timedelta(hours=14)
+    with pytest.raises(InvalidInput, match="14 h"):
+        Validity.starting(NOW, DAY, backdate=timedelta(hours=13))
+
+
+@pytest.mark.parametrize("lifetime", [timedelta(days=365 * 300), timedelta(days=365 * 9000)])
+def test_nothing_ends_after_what_cyclone_can_count(lifetime: timedelta) -> None:
+    assert Validity.starting(NOW, lifetime).not_after == LATEST
+
+
+def test_a_leaf_is_cut_to_its_ca() -> None:
+    ca = Validity.starting(NOW, 10 * DAY)
+    assert Validity.starting(NOW, 90 * DAY).within(ca) == ca
+
+
+def test_seconds_are_whole_and_zones_become_utc() -> None:
+    late = datetime(2031, 1, 1, 2, 0, 0, 123456, tzinfo=timezone(timedelta(hours=2)))
+    assert iso(Validity(late, late + DAY).not_before) == "2031-01-01T00:00:00Z"
+
+
+def test_ends_before_it_begins() -> None:
+    with pytest.raises(InvalidInput, match="before it begins"):
+        Validity(NOW, NOW - DAY)
+    with pytest.raises(InvalidInput, match="already have ended"):
+        Validity.starting(NOW, until=NOW - DAY)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [("90d", 90 * DAY), ("10y", 3650 * DAY), ("2w", 14 * DAY), ("12h", DAY / 2), ("45m", DAY / 32), ("30s", DAY / 2880)],
+)
+def test_durations(text: str, expected: timedelta) -> None:
+    assert parse_duration(text) == expected
+
+
+@pytest.mark.parametrize("text", ["", "90", "d", "-1d", "1.5d", "99999999d", "1d2h", "²d"])
+def test_no_durations(text: str) -> None:
+    with pytest.raises(InvalidInput):
+        parse_duration(text)
+
+
+def test_iso_dates_are_utc_unless_they_say_otherwise() -> None:
+    assert iso(parse_moment("2030-12-31")) == "2030-12-31T00:00:00Z"
+    assert iso(parse_moment("2030-12-31T10:00:00+02:00")) == "2030-12-31T08:00:00Z"
+    assert iso(parse_end("2035-01-01", NOW)) == "2035-01-01T00:00:00Z"
+    assert parse_end("1d", NOW) == NOW + DAY
+    with pytest.raises(InvalidInput, match="ISO date"):
+        parse_moment("next year")
