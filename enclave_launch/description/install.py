@@ -18,6 +18,8 @@ from pathlib import Path
 from types import ModuleType
 
 PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")
+FALLBACK_NAMES = ("lifecycle_msgs",)
+"""Taken over only where the package is not installed: launch files read constants from it."""
 _OURS = "enclave_launch.description."
 
 _depth = 0
@@ -42,10 +44,12 @@ def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
     path = list(sys.path)
     sys.path.extend(folder for folder in _python_folders(prefixes) if folder not in sys.path)
     sys.meta_path.insert(0, _FINDER)
+    sys.meta_path.append(_FALLBACK_FINDER)
     try:
         yield
     finally:
         sys.meta_path.remove(_FINDER)
+        sys.meta_path.remove(_FALLBACK_FINDER)
         sys.path[:] = path
         _withdraw(before)
         sys.modules.update(hidden)
@@ -53,10 +57,13 @@ def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
 
 
 class _Finder(MetaPathFinder):
+    def __init__(self, names: tuple[str, ...]) -> None:
+        self._names = names
+
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        if not is_public(fullname) or find_spec(_OURS + fullname) is None:
+        if fullname.partition(".")[0] not in self._names or find_spec(_OURS + fullname) is None:
             return None
         return ModuleSpec(fullname, _Alias())
 
@@ -73,7 +80,8 @@ class _Alias(Loader):
         module.__spec__ = self._own_spec
 
 
-_FINDER = _Finder()
+_FINDER = _Finder(PUBLIC_NAMES)
+_FALLBACK_FINDER = _Finder(FALLBACK_NAMES)
 
 
 def is_public(module: str) -> bool:
@@ -92,11 +100,16 @@ def _hide_real() -> dict[str, ModuleType]:
 
 def _withdraw(before: set[str]) -> None:
     """Take our names, and what was imported with them, out of ``sys.modules``."""
-    for name in [name for name in sys.modules if is_public(name)]:
-        del sys.modules[name]
+    for name, module in list(sys.modules.items()):
+        if is_public(name) or (name not in before and name.startswith(FALLBACK_NAMES) and _is_ours(module)):
+            del sys.modules[name]
     new = {name for name in sys.modules if name not in before and not name.startswith("enclave_launch")}
     for name in _dependents(new, lambda module: module.startswith(_OURS)):
         _guests[name] = sys.modules.pop(name)
+
+
+def _is_ours(module: ModuleType) -> bool:
+    return module.__name__.startswith(_OURS)
 
 
 def _dependents(names: set[str], belongs: Callable[[str], bool]) -> set[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Mapping
 from importlib import import_module
+from typing import Any
 
 from enclave_launch.evaluation.distro import Feature
 
@@ -14,25 +15,30 @@ def lazy_names(
     names: Mapping[str, str],
     submodules: tuple[str, ...] = (),
     gates: Mapping[str, Feature] | None = None,
-) -> tuple[Callable[[str], object], Callable[[], list[str]], list[str]]:
-    """``__getattr__``, ``__dir__`` and ``__all__`` of ``package``: public name -> submodule that defines it.
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """``__getattr__`` and ``__dir__`` of ``package``: public name -> submodule that defines it.
 
-    ``gates`` are names that some distributions lack: there they do not exist, as in the real package.
+    ``gates`` are names that some distributions lack: there they do not exist, as in the real package, and
+    ``__all__`` leaves them out.
     """
     gates = gates or {}
 
-    def get(name: str) -> object:
+    def available() -> list[str]:
+        return [name for name in names if _available(gates.get(name))]
+
+    def get(name: str) -> Any:
+        if name == "__all__":
+            return available()
         if name in submodules:
             return import_module(f"{package}.{name}")
         if name not in names or not _available(gates.get(name)):
             raise AttributeError(f"module {_public(package)!r} has no attribute {name!r}")
-        value: object = getattr(import_module(f"{package}.{names[name]}"), name)
+        value = getattr(import_module(f"{package}.{names[name]}"), name)
         if name not in gates:
             setattr(sys.modules[package], name, value)
         return value
 
-    public = [name for name in names if name not in gates]
-    return get, lambda: sorted([*public, *submodules]), public
+    return get, lambda: sorted([*available(), *submodules])
 
 
 def _available(gate: Feature | None) -> bool:

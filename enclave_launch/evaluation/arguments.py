@@ -46,6 +46,8 @@ def check_required_arguments(description: LaunchDescription, given: list[str]) -
 
     Configurations that happen to be set do not count, as upstream.
     """
+    # Whatever a Python file returned is asked as upstream asks it, so that None or a list fails alike.
+    description.get_launch_arguments_with_include_launch_description_actions  # noqa: B018
     for name, declared in _summarize(description).declared.items():
         if not declared.required:
             continue
@@ -66,9 +68,7 @@ def _known(names: list[str | None]) -> list[str]:
 
 def _summarize(description: LaunchDescription) -> Summary:
     summary = Summary()
-    # Whatever a Python file returned is asked as upstream asks it, so that None or a list fails alike.
-    description.get_launch_arguments_with_include_launch_description_actions  # noqa: B018
-    for entity, conditional in _walk(description.entities, False):
+    for entity, conditional in _walk(description.describe_sub_entities(), False):
         if isinstance(entity, DeclareLaunchArgument):
             conditional = conditional or entity.condition is not None
             entity._conditionally_included = conditional

@@ -43,9 +43,12 @@ def evaluate(
 
     Raises ``EvaluationError`` (file, line, element, include chain; ``cause`` is launch's own exception).
     """
+    from enclave_launch.description.launch.event_handlers.on_include_launch_description import (
+        OnIncludeLaunchDescription,
+    )
+    from enclave_launch.description.launch.events.include_launch_description import IncludeLaunchDescription
     from enclave_launch.description.launch.launch_context import LaunchContext
     from enclave_launch.evaluation.explore import Explorer
-    from enclave_launch.evaluation.visit import visit_all
 
     host = host or PlanHost()
     path = os.path.abspath(launch_file)
@@ -53,7 +56,8 @@ def evaluate(
         context = LaunchContext(host=host)
         context.launch_configurations.update(launch_configurations or {})
         try:
-            visit_all(top_description(path, arguments), context)
+            context.register_event_handler(OnIncludeLaunchDescription())
+            context.emit_event_sync(IncludeLaunchDescription(top_description(path, arguments)))
             Explorer(context, host).run()
         except EnclaveLaunchError:
             raise

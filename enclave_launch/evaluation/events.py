@@ -70,7 +70,7 @@ class HandlerTable:
         bucket = self._buckets.get(key, {})
         numbers = [number for number, known in bucket.items() if known is handler]
         if not numbers:
-            raise ValueError("event handler is not registered")
+            raise ValueError(f"{handler!r} is not in deque")
         del bucket[max(numbers)]
         self._of_class[key[0]] -= 1
 

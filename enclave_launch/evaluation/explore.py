@@ -35,6 +35,7 @@ class Explorer:
         self._announced = 0  # processes whose start has been told
         self._fired: set[int] = set()  # handlers that have run; each is supposed once
         self._depth = 0
+        self._made_up: set[int] = set()  # events that we only suppose
         self._kept: list[object] = []  # keeps ids unique
 
     def run(self) -> None:
@@ -80,13 +81,18 @@ class Explorer:
         self._announced += 1
         event = ProcessStarted(**process_event_arguments(action))
         if self._context.would_handle_event(event):
-            self._context._event_queue.put_nowait(event, mark)
+            self._emit_made_up(event, mark)
         return True
+
+    def _emit_made_up(self, event: Event, mark: str | None) -> None:
+        self._made_up.add(id(event))
+        self._kept.append(event)
+        self._context._event_queue.put_nowait(event, mark)
 
     def _run(self, handler: BaseEventHandler, event: Event, mark: str | None) -> None:
         self._remember(handler)
         mark = chain(mark, _label(handler, event))
-        if handler.computes() and not _is_ours(handler):
+        if id(event) in self._made_up and handler.computes() and not _is_ours(handler):
             self._host.unforeseeable(Unforeseeable(f"what a callback returns for {mark}", self._place(handler)))
             return
         run_handler(self._context, handler, event, mark)
@@ -117,7 +123,7 @@ class Explorer:
         new_from = len(self._host.started)
         self._depth += 1
         try:
-            self._context._event_queue.put_nowait(event, None)
+            self._emit_made_up(event, None)
             self._settle()
             self._context._set_is_shutdown(False)
             self._suppose(known, new_from)

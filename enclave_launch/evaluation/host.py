@@ -86,7 +86,9 @@ class Host(Protocol):
     def next_process_index(self) -> int:
         """N of the process name NAME-N, from 1."""
 
-    def start_process(self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext) -> Completion | None:
+    def start_process(
+        self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext
+    ) -> Completion | None:
         """Start ``process``; the result is done when it has ended for good. Does not wait."""
 
     def load_components(self, components: Sequence[ResolvedComponent], context: LaunchContext) -> None:
@@ -233,7 +235,9 @@ class PlanHost(BaseHost):
     def parameter_file(self, path: str) -> str | None:
         return self.parameter_files.get(path)
 
-    def start_process(self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext) -> Completion | None:
+    def start_process(
+        self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext
+    ) -> Completion | None:
         self.processes.append(process)
         self.started.append(action)
         return self._loop.create_future()

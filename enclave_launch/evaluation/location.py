@@ -18,7 +18,7 @@ def location_of(entity: object, context: LaunchContext) -> SourceLocation:
     """The place of ``entity``; the file being evaluated when it is not known itself."""
     place: SourceLocation | None = getattr(entity, "source_location", None)
     if place is None:
-        file = str(context.get_locals_as_dict().get("current_launch_file_path", "<unknown>"))
+        file = context.open_files[-1][0] if context.open_files else "<launch>"
         return SourceLocation(file, 0, type(entity).__name__, context.includes)
     return SourceLocation(place.file, place.line, place.element, context.includes)
 

@@ -6,7 +6,7 @@ API of upstream's package of this name; see ``enclave_launch.description``.
 from enclave_launch.description.lazy import lazy_names
 from enclave_launch.evaluation.distro import Feature
 
-__getattr__, __dir__, __all__ = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {
         "Action": "action",

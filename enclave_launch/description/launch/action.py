@@ -40,7 +40,7 @@ class Action(LaunchDescriptionEntity):
 
         if if_text is not None:
             return Action, {"condition": IfCondition(parser.parse_substitution(if_text))}
-        return Action, {"condition": UnlessCondition(parser.parse_substitution(unless_text))}
+        return Action, {"condition": UnlessCondition(parser.parse_substitution(unless_text or ""))}
 
     @property
     def condition(self) -> Condition | None:

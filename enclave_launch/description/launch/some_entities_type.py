@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import collections.abc
-from typing import Union
 
 from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
 
-SomeEntitiesType = Union[LaunchDescriptionEntity, collections.abc.Iterable[LaunchDescriptionEntity]]
+SomeEntitiesType = LaunchDescriptionEntity | collections.abc.Iterable[LaunchDescriptionEntity]
 SomeEntitiesType_types_tuple = (LaunchDescriptionEntity, collections.abc.Iterable)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import collections.abc
-from typing import Union
 
 from enclave_launch.description.launch.substitution import Substitution
 
-SomeSubstitutionsType = Union[str, Substitution, collections.abc.Iterable[Union[str, Substitution]]]
+SomeSubstitutionsType = str | Substitution | collections.abc.Iterable[str | Substitution]
 SomeSubstitutionsType_types_tuple = (str, Substitution, collections.abc.Iterable)

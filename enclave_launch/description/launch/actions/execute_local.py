@@ -219,7 +219,7 @@ class ExecuteLocal(Action):
             location=location_of(self, context),
             on_event=context.on_event,
             cwd=description.final_cwd,
-            shell=bool(self.__shell),
+            shell=self.__shell is True,  # other true values do not make one, as upstream
         )
 
     def enclave_request(self, context: LaunchContext) -> EnclaveRequest:

@@ -2,4 +2,4 @@
 
 from enclave_launch.description.lazy import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_names(__name__, {"Executable": "executable"})
+__getattr__, __dir__ = lazy_names(__name__, {"Executable": "executable"})

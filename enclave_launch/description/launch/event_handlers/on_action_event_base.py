@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from enclave_launch.description.launch.event import Event
 from enclave_launch.description.launch.event_handler import BaseEventHandler
@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
     from enclave_launch.description.launch.some_entities_type import SomeEntitiesType
 
-    OnEvent = SomeEntitiesType | Callable[..., SomeEntitiesType | None] | None
-    ActionMatcher = Callable[[Any], bool] | Action | None
+    OnEvent: TypeAlias = SomeEntitiesType | Callable[..., SomeEntitiesType | None] | None
+    ActionMatcher: TypeAlias = Callable[[Any], bool] | Action | None
 
 
 class OnActionEventBase(BaseEventHandler):

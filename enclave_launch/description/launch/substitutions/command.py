@@ -37,7 +37,7 @@ class Command(Substitution):
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
         if not 1 <= len(data) <= 2:
             raise ValueError("command substitution expects 1 or 2 arguments")
-        return cls, dict(zip(("command", "on_stderr"), data))
+        return cls, dict(zip(("command", "on_stderr"), data, strict=False))
 
     @property
     def command(self) -> list[Substitution]:

@@ -35,7 +35,7 @@ class ForEachVar(Substitution):
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
         if not 1 <= len(data) <= 2:
             raise ValueError(f"{cls.__name__} substitution expects 1 or 2 arguments")
-        return cls, dict(zip(("name", "default_value"), data))
+        return cls, dict(zip(("name", "default_value"), data, strict=False))
 
     @property
     def name(self) -> list[Substitution]:

@@ -39,7 +39,7 @@ class IfElseSubstitution(Substitution):
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
         if not 2 <= len(data) <= 3:
             raise TypeError("if substitution expects from 2 or 3 arguments")
-        return cls, dict(zip(("condition", "if_value", "else_value"), data))
+        return cls, dict(zip(("condition", "if_value", "else_value"), data, strict=False))
 
     @property
     def condition(self) -> list[Substitution]:

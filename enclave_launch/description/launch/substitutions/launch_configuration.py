@@ -31,7 +31,7 @@ class LaunchConfiguration(Substitution):
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
         if not 1 <= len(data) <= 2:
             raise TypeError("var substitution expects 1 or 2 arguments")
-        return cls, dict(zip(("variable_name", "default"), data))
+        return cls, dict(zip(("variable_name", "default"), data, strict=False))
 
     @property
     def variable_name(self) -> list[Substitution]:

@@ -11,7 +11,7 @@ from enclave_launch.description.launch.utilities.basics import (
 )
 from enclave_launch.description.lazy import lazy_names
 
-_get, _dir, __all__ = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {
         "AsyncSafeSignalManager": "signal_management",
@@ -20,7 +20,9 @@ _get, _dir, __all__ = lazy_names(
     },
     submodules=("type_utils", "typing_file_path"),
 )
-__all__ += [
+__all__ = [  # noqa: F822  (some come from __getattr__)
+    "AsyncSafeSignalManager",
+    "create_future",
     "ensure_argument_type",
     "is_a",
     "is_a_subclass",
@@ -28,5 +30,5 @@ __all__ += [
     "normalize_to_list_of_entities",
     "normalize_to_list_of_substitutions",
     "perform_substitutions",
+    "visit_all_entities_and_collect_futures",
 ]
-__getattr__, __dir__ = _get, _dir

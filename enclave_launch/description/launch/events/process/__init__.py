@@ -11,7 +11,7 @@ from enclave_launch.description.launch.events.process.running_process_event impo
 )
 from enclave_launch.description.lazy import lazy_names
 
-_get, _dir, _lazy = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {
         "ProcessTargetedEvent": "process_targeted_event",
@@ -22,14 +22,18 @@ _get, _dir, _lazy = lazy_names(
         "matches_pid": "process_matchers",
     },
 )
-__getattr__, __dir__ = _get, _dir
-__all__ = [
-    *_lazy,
+__all__ = [  # noqa: F822  (some come from __getattr__)
     "ProcessExited",
     "ProcessIO",
     "ProcessStarted",
     "ProcessStderr",
     "ProcessStdin",
     "ProcessStdout",
+    "ProcessTargetedEvent",
     "RunningProcessEvent",
+    "ShutdownProcess",
+    "SignalProcess",
+    "matches_executable",
+    "matches_name",
+    "matches_pid",
 ]
