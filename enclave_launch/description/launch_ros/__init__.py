@@ -6,7 +6,7 @@ API of upstream's package of this name, plus what the Security Enclaves article 
 
 from enclave_launch.description.lazy import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {},
     submodules=(

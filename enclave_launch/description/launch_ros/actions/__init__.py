@@ -3,7 +3,7 @@
 from enclave_launch.description.lazy import lazy_names
 from enclave_launch.evaluation.distro import Feature
 
-__getattr__, __dir__, __all__ = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {
         "ComposableNodeContainer": "composable_node_container",

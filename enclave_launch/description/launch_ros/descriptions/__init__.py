@@ -1,5 +1,7 @@
 """API of ``launch_ros.descriptions``."""
 
+from typing import Any
+
 from enclave_launch.description.lazy import lazy_names
 from enclave_launch.evaluation.distro import Feature
 
@@ -7,10 +9,15 @@ from ..parameter_descriptions import Parameter as Parameter
 from ..parameter_descriptions import ParameterFile as ParameterFile
 from ..parameter_descriptions import ParameterValue as ParameterValue
 
-__getattr__, __dir__, __all__ = lazy_names(
+_components, __dir__ = lazy_names(
     __name__,
     {"ComposableLifecycleNode": "composable_lifecycle_node", "ComposableNode": "composable_node"},
     submodules=("composable_lifecycle_node", "composable_node"),
     gates={"ComposableLifecycleNode": Feature.LIFECYCLE_TAGS},
 )
-__all__ += ["Parameter", "ParameterFile", "ParameterValue"]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__all__":
+        return [*_components("__all__"), "Parameter", "ParameterFile", "ParameterValue"]
+    return _components(name)

@@ -2,7 +2,7 @@
 
 from enclave_launch.description.lazy import lazy_names
 
-__getattr__, __dir__, __all__ = lazy_names(
+__getattr__, __dir__ = lazy_names(
     __name__,
     {
         "ExecutableInPackage": "executable_in_package",
