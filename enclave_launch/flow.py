@@ -11,6 +11,7 @@ running event loop await ``run_async``. Errors are ``EnclaveLaunchError``; ``str
 from __future__ import annotations
 
 import os
+import secrets
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -18,12 +19,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.enclave import EnclaveScope
-from enclave_launch.errors import ManifestError
-from enclave_launch.plan import LaunchPlan, PlanOptions
+from enclave_launch.errors import ManifestError, UsageError
+from enclave_launch.plan import LaunchPlan, LaunchSource, Planner, PlanOptions
+from enclave_launch.policy import PolicyOptions
 
 if TYPE_CHECKING:
-    from enclave_launch.runtime.service import RunOptions
     from enclave_launch.secured import ProvisionedLaunch
+    from keystore.policy_xml import PolicyDocument
     from keystore.provisioning import ProvisionOptions
 
 
@@ -42,6 +44,29 @@ class ResolveOptions:
     allow_missing_packages: bool = False
     no_python: bool = False
     launch_configurations: Mapping[str, str] = field(default_factory=dict)
+
+    def host_options(self) -> dict[str, object]:
+        """What the evaluation's host is told, in a dry run and live alike."""
+        return {
+            "distro": self.distro,
+            "allow_missing_packages": self.allow_missing_packages,
+            "no_python": self.no_python,
+        }
+
+    def plan_options(self) -> PlanOptions:
+        """Raises ``UsageError`` for a policy file that cannot be used."""
+        document = _read_policy(self.policy) if self.policy else None
+        return PlanOptions(self.enclave_scope, PolicyOptions(self.accept_patterns, document))
+
+
+def _read_policy(path: Path) -> PolicyDocument:
+    from keystore.errors import KeystoreError
+    from keystore.policy_xml import read_policy
+
+    try:
+        return read_policy(path)
+    except KeystoreError as error:
+        raise UsageError(str(error)) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,18 +89,26 @@ def resolve(
     refuse is in ``plan.problems``.
     """
     from enclave_launch.evaluation.evaluate import evaluate
+    from enclave_launch.evaluation.host import PlanHost
     from enclave_launch.interfaces import InterfaceFinder
-    from enclave_launch.plan import Planner
     from nodl.ament_index import search_prefixes
 
     chosen = options or ResolveOptions()
+    source = LaunchSource(
+        os.path.abspath(launch_file),
+        tuple(arguments),
+        {**chosen.launch_configurations},
+        {**chosen.host_options(), "anonymous_seed": secrets.randbits(64)},
+    )
     with ament_prefixes(chosen.prefixes):
-        evaluation = evaluate(launch_file, arguments, host=_plan_host(chosen))
-        finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
-        planner = Planner(
-            os.fspath(launch_file), tuple(arguments), finder, evaluation.distro, _plan_options(chosen)
+        evaluation = evaluate(
+            source.launch_file,
+            source.arguments,
+            host=PlanHost(**source.host_options),
+            launch_configurations=source.launch_configurations,
         )
-        return planner.plan(evaluation)
+        finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
+        return Planner(source, finder, chosen.plan_options()).plan(evaluation)
 
 
 def provision(

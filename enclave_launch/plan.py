@@ -107,11 +107,11 @@ class LaunchPlan:
 
     @property
     def launch_file(self) -> str:
-        return self.planner.launch_file
+        return self.planner.source.launch_file
 
     @property
     def distro(self) -> str:
-        return self.planner.distro
+        return self.evaluation.distro
 
     @property
     def nodes(self) -> tuple[RunningNode, ...]:
@@ -128,13 +128,25 @@ class PlanOptions:
 
 
 @dataclass(frozen=True, slots=True)
+class LaunchSource:
+    """What was asked for: enough to evaluate it once more, live, with the same results.
+
+    ``launch_file`` is absolute; ``launch_configurations`` are set before it is included; ``host_options`` are those
+    of the evaluation's host (distribution, seed of anonymous names).
+    """
+
+    launch_file: str
+    arguments: tuple[tuple[str, str], ...] = ()
+    launch_configurations: Mapping[str, str] = field(default_factory=dict)
+    host_options: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
 class Planner:
     """Makes the plan of one launch: assign enclaves, join interfaces with final names, derive the policy."""
 
-    launch_file: str
-    arguments: tuple[tuple[str, str], ...]
+    source: LaunchSource
     lookup: InterfaceLookup
-    distro: str
     options: PlanOptions
 
     def plan(self, evaluation: Evaluation) -> LaunchPlan:
@@ -146,7 +158,7 @@ class Planner:
         launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
         derived = derive_policy(
             _nodes(processes, components, launcher),
-            distro=self.distro,
+            distro=evaluation.distro,
             options=self.options.policy,
             also=_bare_enclaves(processes),
         )

@@ -14,7 +14,7 @@ from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError
 from keystore.provisioning import ProvisionOptions
 from keystore.signer import CaAccess, Secret
-from keystore.status import expires_soon
+from keystore.expiry import expires_soon
 from keystore.subject import SubjectScheme
 from keystore.validity import parse_duration, parse_end, utc_now
 

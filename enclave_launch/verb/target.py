@@ -49,10 +49,9 @@ def _in_package(package: str, file_name: str, prefixes: Sequence[str]) -> str:
 
 def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """``name:=value`` words. Raises ``UsageError`` with upstream's message for anything else."""
-    arguments: dict[str, str] = {}
-    for word in words:
-        name, separator, value = word.partition(":=")
-        if not (name and separator and value):
-            raise UsageError(f"malformed launch argument {word!r}, expected format '<name>:=<value>'")
-        arguments[name] = value
-    return tuple(arguments.items())
+    from enclave_launch.evaluation import evaluate
+
+    try:
+        return tuple(evaluate.parse_arguments(words))
+    except RuntimeError as error:
+        raise UsageError(str(error)) from error
