@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MAX_DEPTH = 16
 MAX_FILES = 256
-MAX_INCLUDES = 5_000  # followed in all: files that include each other twice multiply
+MAX_INCLUDES = 2_000  # followed in all: files that include each other twice multiply
 MAX_TOTAL_BYTES = 4_000_000
 _NAMESPACES = ("http://www.w3.org/2001/XInclude", "http://www.w3.org/2003/XInclude")
 _INCLUDE_TAGS = frozenset(f"{{{namespace}}}include" for namespace in _NAMESPACES)

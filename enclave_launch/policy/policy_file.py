@@ -15,6 +15,7 @@ from keystore.permissions_patterns import can_meet
 from keystore.policy import EnclavePolicy, Policy, Profile, Qualifier, Rule
 from keystore.policy_xml import PolicyDocument
 
+Added = Mapping[tuple[str, str], Mapping[Rule, Reason]]  # (namespace, node) -> rule with its full name ->
 ReasonsByEnclave = Mapping[str, Mapping[Rule, tuple[Reason, ...]]]
 
 
@@ -45,30 +46,29 @@ def merge_policy_file(derived: Policy, reasons: ReasonsByEnclave, document: Poli
         added = _absolute(other, document)
         enclaves.append(EnclavePolicy(enclave.path, _union(enclave, added)))
         known = merged_reasons.setdefault(enclave.path, {})
-        for (ns, node), rules in added.items():
-            for rule, place in rules.items():
-                reason = Reason(f"{ns.rstrip('/')}/{node}", "policy file", place, rule.expression)
+        for rules in added.values():
+            for rule, reason in rules.items():
                 known[rule] = (*known.get(rule, ()), reason)
         warnings.extend(_denials(enclave.path, known))
     return MergedPolicy(Policy(tuple(enclaves)), merged_reasons, tuple(warnings))
 
 
-def _absolute(enclave: EnclavePolicy, document: PolicyDocument) -> dict[tuple[str, str], dict[Rule, str]]:
-    """(namespace, node) -> rule with its full name -> file:line."""
+def _absolute(enclave: EnclavePolicy, document: PolicyDocument) -> Added:
     return {
         (profile.ns, profile.node): {
-            Rule(rule.operation, rule.qualifier, full_name(rule.expression, profile)): document.places[
-                enclave.path, profile.ns, profile.node, rule
-            ]
+            Rule(rule.operation, rule.qualifier, full_name(rule.expression, profile)): Reason(
+                node=f"{profile.ns.rstrip('/')}/{profile.node}",
+                origin="policy file",
+                place=document.places[enclave.path, profile.ns, profile.node, rule],
+                written=rule.expression,
+            )
             for rule in profile.rules
         }
         for profile in enclave.profiles
     }
 
 
-def _union(
-    enclave: EnclavePolicy, added: Mapping[tuple[str, str], Mapping[Rule, str]]
-) -> tuple[Profile, ...]:
+def _union(enclave: EnclavePolicy, added: Mapping[tuple[str, str], Mapping[Rule, str]]) -> tuple[Profile, ...]:
     profiles = {(profile.ns, profile.node): set(profile.rules) for profile in enclave.profiles}
     for key, rules in added.items():
         profiles.setdefault(key, set()).update(rules)

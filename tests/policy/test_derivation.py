@@ -1,0 +1,364 @@
+"""From running nodes to the smallest policy: final names, built-in interfaces, union, what is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+from datetime import datetime, timedelta, timezone
+from typing import Any
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
+from enclave_launch.policy.builtin_interfaces import (
+    DISTROS,
+    TABLE,
+    built_in_interfaces,
+    standard_interface,
+)
+from keystore.domains import Domains
+from keystore.permissions import permissions_document
+from keystore.policy_xml import parse_policy, policy_xml
+from keystore.validity import Validity
+from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap
+from nodl.source_ref import SourceRef
+
+NodeMaker = Callable[..., RunningNode]
+START = datetime(2026, 1, 1, tzinfo=timezone.utc)
+VALIDITY = Validity(START, START + timedelta(days=1))
+
+
+def derive(*nodes: RunningNode, distro: str = "jazzy", options: PolicyOptions | None = None) -> DerivedPolicy:
+    return derive_policy(nodes, distro=distro, options=options)
+
+
+def declared(derived: DerivedPolicy, enclave: str = "/") -> set[str]:
+    """``publish /chatter`` and so on: all that some manifest or policy file asks for."""
+    return {
+        f"{rule.operation.value} {rule.expression}"
+        for rule, reasons in derived.reasons[enclave].items()
+        if any(reason.origin != "built-in" for reason in reasons)
+    }
+
+
+def everything(derived: DerivedPolicy, enclave: str = "/") -> set[str]:
+    return {f"{rule.operation.value} {rule.expression}" for rule in derived.reasons[enclave]}
+
+
+def test_every_kind_of_interface(node: NodeMaker) -> None:
+    found = derive(node("pub a", "sub b", "serve c", "call d", "action e", "goal f"))
+    assert declared(found) == {"publish /a", "subscribe /b", "reply /c", "request /d", "execute /e", "call /f"}
+
+
+NAMES = [
+    # written, final name with node name mouth in /tester
+    ("chatter", "/tester/chatter"),
+    ("/chatter", "/chatter"),
+    ("~/chatter", "/tester/mouth/chatter"),
+    ("{node}/chatter", "/tester/mouth/chatter"),
+    ("sensors/front", "/tester/sensors/front"),
+]
+
+
+@pytest.mark.parametrize(("written", "final"), NAMES)
+def test_names_follow_the_final_node_name_and_namespace(node: NodeMaker, written: str, final: str) -> None:
+    found = derive(node(f"pub {written}", name="mouth", namespace="/tester"))
+    assert declared(found) == {f"publish {final}"}
+
+
+def test_remap_rules_apply_after_expansion(node: NodeMaker) -> None:
+    found = derive(
+        node(
+            *("pub chatter", "sub /tf", "serve ~/reset", "call chatter"),
+            name="mouth",
+            namespace="/tester",
+            remap=("chatter:=blather", "/tf:=tf", "rosservice://chatter:=ask", "~/reset:=/reset"),
+        )
+    )
+    assert declared(found) == {
+        *("publish /tester/blather", "subscribe /tester/tf"),
+        *("reply /reset", "request /tester/blather"),  # the first matching rule wins, also for services
+    }
+
+
+def test_built_in_interfaces_are_remapped_too(node: NodeMaker) -> None:
+    found = derive(node(remap=("/rosout:=/logs", "~/get_parameters:=ask")))
+    assert {"publish /logs", "reply /ask"} <= everything(found)
+    assert not {"publish /rosout", "reply /talker/get_parameters"} & everything(found)
+
+
+def test_rules_of_a_component_come_before_those_of_its_process(node: NodeMaker) -> None:
+    found = derive(node("pub a", "pub b", local=("a:=own",), remap=("a:=global", "b:=global")))
+    assert declared(found) == {"publish /own", "publish /global"}
+
+
+def test_actions_in_humble_and_jazzy_are_remapped_part_by_part(node: NodeMaker) -> None:
+    rules = ("fib:=whole", "fib/_action/feedback:=news")
+    server = derive(node("action fib", remap=rules))
+    assert declared(server) == {
+        *("reply /fib/_action/send_goal", "reply /fib/_action/cancel_goal", "reply /fib/_action/get_result"),
+        *("publish /news", "publish /fib/_action/status"),
+    }
+    client = derive(node("goal fib", remap=rules))
+    assert {"request /fib/_action/send_goal", "subscribe /news"} <= declared(client)
+    (warning,) = client.warnings
+    assert warning.startswith("demo.launch.xml:7: remap rule fib:=whole has no effect on action /fib")
+
+
+@pytest.mark.parametrize("distro", ["kilted", "lyrical", "rolling"])
+def test_actions_from_kilted_on_are_remapped_as_a_whole(node: NodeMaker, distro: str) -> None:
+    found = derive(node("action fib", remap=("fib:=whole",)), distro=distro)
+    assert declared(found) == {"execute /whole"}
+    assert found.warnings == ()
+
+
+def test_whether_actions_are_remapped_can_be_told(node: NodeMaker) -> None:
+    options = PolicyOptions(actions_as_a_whole=True)
+    found = derive(node("action fib", remap=("fib:=whole",)), distro="humble", options=options)
+    assert declared(found) == {"execute /whole"}
+
+
+# -- built-in interfaces ---------------------------------------------------------------------------
+
+SIX = (
+    *("describe_parameters", "get_parameter_types", "get_parameters"),
+    *("list_parameters", "set_parameters", "set_parameters_atomically"),
+)
+PLAIN = {"publish /rosout", "publish /parameter_events", *(f"reply /talker/{name}" for name in SIX)}
+TYPE_DESCRIPTION = {"reply /talker/get_type_description"}
+LIFECYCLE = {
+    "publish /talker/transition_event",
+    *(
+        f"reply /talker/{name}"
+        for name in (
+            *("change_state", "get_state", "get_available_states"),
+            *("get_available_transitions", "get_transition_graph"),
+        )
+    ),
+}
+CONTAINER = {f"reply /talker/_container/{name}" for name in ("load_node", "unload_node", "list_nodes")}
+PY, CPP, ANY = ClientLibrary.RCLPY, ClientLibrary.RCLCPP, ClientLibrary.UNKNOWN
+EVENTS = {"subscribe /parameter_events"}
+
+BUILT_IN: dict[str, tuple[dict[str, Any], str, set[str]]] = {
+    "rclpy, humble": ({"library": PY}, "humble", PLAIN),
+    "rclpy, iron": ({"library": PY}, "iron", PLAIN | TYPE_DESCRIPTION),
+    "rclcpp, humble": ({"library": CPP}, "humble", PLAIN | EVENTS),
+    "rclcpp, rolling": ({"library": CPP}, "rolling", PLAIN | EVENTS | TYPE_DESCRIPTION),
+    "unknown library: the union": ({"library": ANY}, "jazzy", PLAIN | EVENTS | TYPE_DESCRIPTION),
+    "simulated time": (
+        {"parameters": {"use_sim_time": True}},
+        "humble",
+        PLAIN | {"subscribe /clock"},
+    ),
+    "real time": ({"parameters": {"use_sim_time": False}}, "humble", PLAIN),
+    "type description switched off": (
+        {"parameters": {"start_type_description_service": False}},
+        "jazzy",
+        PLAIN,
+    ),
+    "lifecycle by launch": ({"role": "lifecycle_node"}, "humble", PLAIN | LIFECYCLE),
+    "lifecycle by manifest": ({"lifecycle": True}, "humble", PLAIN | LIFECYCLE),
+    "container": ({"role": "container", "library": CPP}, "humble", PLAIN | EVENTS | CONTAINER),
+    "component": ({"role": "component", "library": CPP}, "humble", PLAIN | EVENTS),
+}
+
+
+@pytest.mark.parametrize("case", BUILT_IN)
+def test_what_every_node_has(node: NodeMaker, case: str) -> None:
+    changes, distro, expected = BUILT_IN[case]
+    assert everything(derive(node(**changes), distro=distro)) == expected
+
+
+def test_tf_where_declared(node: NodeMaker) -> None:
+    assert "subscribe /tf_static" in everything(derive(node("sub /tf")))
+    assert "subscribe /tf_static" not in everything(derive(node("pub /tf")))
+
+
+def test_every_row_of_the_table_has_its_source() -> None:
+    assert all(row.source and row.since in DISTROS for row in TABLE)
+
+
+def test_an_unknown_distribution_is_an_error(node: NodeMaker) -> None:
+    with pytest.raises(ValueError, match="unknown ROS distribution 'dashing'"):
+        built_in_interfaces(node(), "dashing")
+
+
+def test_interfaces_that_a_manifest_repeats_are_not_doubled(node: NodeMaker) -> None:
+    found = derive(node("pub /rosout", "pub /rosout", "serve ~/get_parameters"))
+    (profile,) = found.policy.enclaves[0].profiles
+    assert len(profile.rules) == len(set(profile.rules)) == len(PLAIN | TYPE_DESCRIPTION)
+    assert ("publish", "/rosout") not in found.built_in_names("/")  # a manifest asks for it as well
+    assert ("publish", "/parameter_events") in found.built_in_names("/")
+
+
+def test_containers_of_ros_itself_need_no_manifest() -> None:
+    found = standard_interface("rclcpp_components", "component_container_mt")
+    assert found is not None and (found.name, found.library) == ("ComponentManager", CPP)
+    assert standard_interface("rclcpp_components", "other") is None
+    assert standard_interface("demo", "component_container") is None
+
+
+# -- what is not known, and what must not be ---------------------------------------------------------
+
+
+def endpoint(*parts: str | ParameterPart | UnknownPart, certainty: Certainty = Certainty.EXACT) -> Endpoint:
+    return Endpoint(EndpointKind.PUBLISHER, NameTemplate(parts), "x/msg/Y", SourceRef("talker.py", 12), certainty)
+
+
+def test_names_from_parameters_follow_what_launch_sets(node: NodeMaker) -> None:
+    topic = endpoint("cam/", ParameterPart("topic", "image"))
+    given_value = derive(node(topic, parameters={"topic": "raw"}))
+    assert declared(given_value) == {"publish /cam/raw"}
+    assert declared(derive(node(topic))) == {"publish /cam/image"}
+    (reasons,) = (r for rule, r in given_value.reasons["/"].items() if rule.expression == "/cam/raw")
+    assert (reasons[0].written, reasons[0].note) == ("cam/param:topic", "parameter topic, set by launch")
+
+
+def test_a_name_that_is_not_known_is_a_problem_with_its_place_and_remedy(node: NodeMaker) -> None:
+    found = derive(node(endpoint(UnknownPart("read from a file"))))
+    assert declared(found) == set()
+    (problem,) = found.problems
+    assert problem.startswith("talker.py:12: node /talker: the name of what it would publish is not known")
+    assert "read from a file" in problem and "--nodl" in problem and "--policy" in problem
+
+
+def test_a_parameter_without_value_is_a_problem(node: NodeMaker) -> None:
+    (problem,) = derive(node(endpoint(ParameterPart("topic")))).problems
+    assert "parameter 'topic' has no value" in problem
+
+
+def test_partly_known_names_are_problems_unless_accepted_as_patterns(node: NodeMaker) -> None:
+    partly = node(endpoint("~/cam_", UnknownPart("loop variable"), "/image"), namespace="/ns")
+    assert len(derive(partly).problems) == 1
+    accepted = derive(partly, options=PolicyOptions(accept_patterns=True))
+    assert declared(accepted) == {"publish /ns/talker/cam_*/image"}
+    assert accepted.problems == ()
+    assert "may publish /ns/talker/cam_*/image: a pattern, because loop variable" in accepted.warnings[0]
+
+
+def test_a_wholly_unknown_name_is_never_accepted(node: NodeMaker) -> None:
+    found = derive(node(endpoint(UnknownPart())), options=PolicyOptions(accept_patterns=True))
+    assert len(found.problems) == 1 and declared(found) == set()
+
+
+@pytest.mark.parametrize("name", ["/*", "a?", "[ab]", "a b", "a//b", "1a", "", "a\n", "x" * 250])
+def test_bad_names_are_problems_and_grant_nothing(node: NodeMaker, name: str) -> None:
+    found = derive(node(f"pub {name}"))
+    assert declared(found) == set()
+    assert len(found.problems) == 1 and found.problems[0].startswith("demo.nodl.xml:1: node /talker: ")
+
+
+def test_a_wildcard_in_a_parameter_value_is_no_way_around(node: NodeMaker) -> None:
+    found = derive(node(endpoint(ParameterPart("topic")), parameters={"topic": "/*"}))
+    assert declared(found) == set() and len(found.problems) == 1
+
+
+def test_gaps_of_inference_are_problems(node: NodeMaker) -> None:
+    gap = Gap(SourceRef("talker.py", 30), "eval() cannot be followed")
+    (problem,) = derive(node(gaps=(gap,))).problems
+    assert problem.startswith("talker.py:30: node /talker: eval() cannot be followed; describe demo/talker")
+
+
+@pytest.mark.parametrize(("name", "namespace"), [("a b", "/"), ("n", "/a/"), ("<node_name_unspecified>", "/")])
+def test_a_node_with_an_impossible_name_gets_nothing(node: NodeMaker, name: str, namespace: str) -> None:
+    found = derive(node("pub a", name=name, namespace=namespace))
+    assert found.reasons["/"] == {} and len(found.problems) == 1
+
+
+# -- union, order, and taking nodes away --------------------------------------------------------------
+
+
+def permissions(derived: DerivedPolicy) -> dict[str, bytes]:
+    return {
+        enclave.path: permissions_document("CN=x", enclave, validity=VALIDITY, domains=Domains.single(0))
+        for enclave in derived.policy.enclaves
+    }
+
+
+def topics_of(document: bytes) -> set[str]:
+    return {line for line in document.decode().splitlines() if line.startswith("<topic>")}
+
+
+def test_two_nodes_sharing_an_enclave_get_the_union(node: NodeMaker) -> None:
+    talker, listener = node("pub chatter"), node("sub chatter", name="listener")
+    both = derive(talker, listener)
+    assert declared(both) == {"publish /chatter", "subscribe /chatter"}
+    assert [profile.node for profile in both.policy.enclaves[0].profiles] == ["listener", "talker"]
+    (document,) = permissions(both).values()
+    assert topics_of(document) == topics_of(permissions(derive(talker))["/"]) | topics_of(
+        permissions(derive(listener))["/"]
+    )
+
+
+def test_enclaves_without_a_known_node_exist_and_allow_nothing() -> None:
+    found = derive_policy((), distro="jazzy", also=["/tool"])
+    assert [(enclave.path, enclave.profiles) for enclave in found.policy.enclaves] == [("/tool", ())]
+    assert topics_of(permissions(found)["/tool"]) == {"<topic>ros_discovery_info</topic>"}
+
+
+words = st.sampled_from(["a", "b", "/a", "~/a", "c/d"])
+kinds = st.sampled_from(["pub", "sub", "serve", "call", "action", "goal"])
+interfaces = st.lists(st.builds(lambda k, n: f"{k} {n}", kinds, words), max_size=4)
+specs = st.lists(st.tuples(interfaces, st.sampled_from(["n1", "n2", "n3"]), st.sampled_from(["/", "/e"])), max_size=4)
+FIXTURE_IS_PURE = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+
+
+def build(make: NodeMaker, found: Iterable[tuple[list[str], str, str]]) -> list[RunningNode]:
+    return [make(*endpoints, name=name, enclave=enclave) for endpoints, name, enclave in found]
+
+
+@FIXTURE_IS_PURE
+@given(specs)
+def test_law_the_policy_of_many_is_the_union_of_each(node: NodeMaker, found: list[tuple[list[str], str, str]]) -> None:
+    nodes = build(node, found)
+    together = derive(*nodes)
+    for enclave in {each.enclave for each in nodes}:
+        alone = [everything(derive(each), enclave) for each in nodes if each.enclave == enclave]
+        assert everything(together, enclave) == set().union(*alone)
+
+
+@FIXTURE_IS_PURE
+@given(specs.filter(bool))
+def test_law_taking_a_node_away_takes_exactly_what_only_it_needed(
+    node: NodeMaker, found: list[tuple[list[str], str, str]]
+) -> None:
+    nodes = build(node, found)
+    gone, rest = nodes[0], nodes[1:]
+    before, after = permissions(derive(*nodes)), permissions(derive(*rest))
+    remaining = after.get(gone.enclave)
+    lost = topics_of(before[gone.enclave]) - (topics_of(remaining) if remaining else set())
+    needed_by_others = set().union(
+        *(topics_of(permissions(derive(each))[each.enclave]) for each in rest if each.enclave == gone.enclave)
+    )
+    assert lost == topics_of(permissions(derive(gone))[gone.enclave]) - needed_by_others
+    assert {path: text for path, text in before.items() if path != gone.enclave} == {
+        path: text for path, text in after.items() if path != gone.enclave
+    }
+
+
+@FIXTURE_IS_PURE
+@given(specs)
+def test_law_the_order_of_nodes_does_not_matter_and_every_rule_has_a_reason(
+    node: NodeMaker, found: list[tuple[list[str], str, str]]
+) -> None:
+    nodes = build(node, found)
+    derived = derive(*nodes)
+    reverse = derive(*reversed(nodes))
+    assert derived.policy == reverse.policy and derived.reasons == reverse.reasons
+    for enclave in derived.policy.enclaves:
+        rules = {rule for profile in enclave.profiles for rule in profile.rules}
+        assert rules == set(derived.reasons[enclave.path])
+        assert all(derived.reasons[enclave.path].values())
+    if derived.policy.enclaves:
+        assert parse_policy(policy_xml(derived.policy)).policy == derived.policy
+
+
+def test_renaming_a_node_renames_its_private_names_only(node: NodeMaker) -> None:
+    one = node("pub ~/state", "pub state")
+    two = replace(one, name="other")
+    assert declared(derive(one)) == {"publish /talker/state", "publish /state"}
+    assert declared(derive(two)) == {"publish /other/state", "publish /state"}
