@@ -16,19 +16,18 @@ from collections.abc import Callable
 from typing import Any
 
 import launch_ros.actions
-from launch import Action
+from launch import Action, Substitution
 from launch.actions import ExecuteProcess
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
 from enclave_launch.evaluation.namespaces import enclave_scope, push_enclave_scope
+from enclave_launch.security_environment import OVERRIDE
 
 ATTRIBUTE = "_enclave_launch_enclave"
 WRAPPED = "_enclave_launch_wrapped"
 # Renamed after humble; the old name stays as an alias.
-PushNamespace: Any = (
-    getattr(launch_ros.actions, "PushROSNamespace", None) or launch_ros.actions.PushRosNamespace
-)
+PushNamespace: Any = getattr(launch_ros.actions, "PushROSNamespace", None) or launch_ros.actions.PushRosNamespace
 
 
 class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
@@ -63,12 +62,13 @@ def install() -> None:
     if getattr(ExecuteProcess, WRAPPED, False):
         return
     setattr(ExecuteProcess, WRAPPED, True)
-    ExecuteProcess.__init__ = _accepting_enclave(ExecuteProcess.__init__)
+    ExecuteProcess.__init__ = _accepting_enclave(_overriding_enclave(ExecuteProcess.__init__))
+    # Subclasses, nodes and those of other packages, come here through super().
+    ExecuteProcess.parse = classmethod(_reading_enclave_class(ExecuteProcess.parse.__func__))
     PushNamespace.__init__ = _accepting_enclave(PushNamespace.__init__)
     PushNamespace.execute = _pushing_enclave_scope(PushNamespace.execute)
     for tag, method in list(expose.action_parse_methods.items()):
-        owner = getattr(getattr(method, "__wrapped__", None), "__self__", None)
-        if isinstance(owner, type) and issubclass(owner, (ExecuteProcess, PushNamespace)):
+        if getattr(getattr(method, "__wrapped__", None), "__self__", None) in (ExecuteProcess, PushNamespace):
             expose.action_parse_methods[tag] = _reading_enclave(method)
     for tag in ("push_ros_enclave", "push-ros-enclave"):
         expose.expose_action(tag)(PushRosEnclave)
@@ -78,25 +78,69 @@ def install() -> None:
 def _accepting_enclave(init: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(init)
     def wrapped(self: Any, *args: Any, enclave: Any = None, **kwargs: Any) -> None:
-        init(self, *args, **kwargs)
         if enclave is not None:
             setattr(self, ATTRIBUTE, normalize_to_list_of_substitutions(enclave))
+        init(self, *args, **kwargs)
 
     return wrapped
 
 
-def _reading_enclave(
-    parse: Callable[..., tuple[type, dict[str, Any]]],
-) -> Callable[..., tuple[type, dict[str, Any]]]:
+def _overriding_enclave(init: Callable[..., None]) -> Callable[..., None]:
+    """An ``executable``'s command line is not ours to extend: rcl also takes the enclave from a variable."""
+
+    @functools.wraps(init)
+    def wrapped(self: Any, *args: Any, **kwargs: Any) -> None:
+        if hasattr(self, ATTRIBUTE) and not isinstance(self, launch_ros.actions.Node):
+            given = kwargs.get("additional_env") or {}
+            kwargs["additional_env"] = {**given, OVERRIDE: EnclaveOverride(self)}
+        init(self, *args, **kwargs)
+
+    return wrapped
+
+
+class EnclaveOverride(Substitution):  # type: ignore[misc]  # untyped without ROS
+    """The enclave of an ``executable``, complete by the time it is performed; empty in a launch not
+    secured.
+    """
+
+    def __init__(self, action: Any) -> None:
+        super().__init__()
+        self._action = action
+
+    def describe(self) -> str:
+        return "EnclaveOverride()"
+
+    def perform(self, context: Any) -> str:
+        from enclave_launch.ros2.observation import observe_executable
+        from enclave_launch.ros2.session import session_of
+
+        session = session_of(context)
+        if session is None:
+            return ""
+        return session.enter(observe_executable(self._action, context)).environment.get(OVERRIDE, "")
+
+
+Parse = Callable[..., tuple[type, dict[str, Any]]]
+
+
+def _reading_enclave(parse: Parse) -> Parse:
     """Read before upstream's parser, which refuses attributes that nobody has read."""
 
     @functools.wraps(parse)
-    def wrapped(entity: Any, parser: Any) -> tuple[type, dict[str, Any]]:
+    def wrapped(entity: Any, parser: Any, *args: Any, **kwargs: Any) -> tuple[type, dict[str, Any]]:
         enclave = entity.get_attr("enclave", optional=True)
-        cls, kwargs = parse(entity, parser)
+        cls, options = parse(entity, parser, *args, **kwargs)
         if enclave is not None:
-            kwargs["enclave"] = parser.parse_substitution(enclave)
-        return cls, kwargs
+            options["enclave"] = parser.parse_substitution(enclave)
+        return cls, options
+
+    return wrapped
+
+
+def _reading_enclave_class(parse: Parse) -> Parse:
+    @functools.wraps(parse)
+    def wrapped(cls: type, *args: Any, **kwargs: Any) -> tuple[type, dict[str, Any]]:
+        return _reading_enclave(functools.partial(parse, cls))(*args, **kwargs)
 
     return wrapped
 
@@ -105,9 +149,7 @@ def _pushing_enclave_scope(execute: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(execute)
     def wrapped(self: Any, context: Any) -> Any:
         enclave = enclave_attribute(self, context)
-        push_enclave_scope(
-            context.launch_configurations, enclave, perform_substitutions(context, self.namespace)
-        )
+        push_enclave_scope(context.launch_configurations, enclave, perform_substitutions(context, self.namespace))
         return execute(self, context)
 
     return wrapped

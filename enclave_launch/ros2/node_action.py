@@ -1,4 +1,6 @@
-"""The extension point ``launch_ros.node_action``: each node of upstream's engine gets its enclave before it starts."""
+"""The extension point ``launch_ros.node_action``: each node of upstream's engine gets its enclave before
+it starts.
+"""
 
 from __future__ import annotations
 

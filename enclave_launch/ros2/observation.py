@@ -6,6 +6,9 @@ are final then. Next: ``session``. Touches nothing.
 
 from __future__ import annotations
 
+import os
+import re
+import shlex
 from collections.abc import Iterable
 from typing import Any
 
@@ -13,6 +16,7 @@ import launch_ros.actions
 from launch.descriptions import executable as executable_description
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
+from enclave_launch.description.launch.actions.execute_local import first_word
 from enclave_launch.evaluation.rcl_parameters import resolve_parameters
 from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import (
@@ -49,11 +53,39 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
         remaps=tuple(RemapRule(source, target) for source, target in action.expanded_remapping_rules or ()),
         parameters=resolve_parameters(_fqn_tokens(fqn), arguments.parameters),
         environment={},
-        enclave=EnclaveRequest(
-            enclave_attribute(action, context), scope_in_force(context), arguments.enclave
-        ),
+        enclave=EnclaveRequest(enclave_attribute(action, context), scope_in_force(context), arguments.enclave),
         location=location_in(context, type(action).__name__),
     )
+
+
+def observe_executable(action: Any, context: Any) -> ResolvedProcess:
+    """``action``: an ``ExecuteProcess`` that is no node, with an ``enclave`` of its own."""
+    cmd = (*_prefix(action, context), *(perform_substitutions(context, part) for part in action.cmd))
+    number, label = next_process_name(action, context, cmd)
+    return ResolvedProcess(
+        index=number,
+        kind="executable",
+        package=None,
+        executable=first_word(cmd),
+        process_name=f"{label}-{number}",
+        name=None,
+        namespace=None,
+        fqn=None,
+        cmd=cmd,
+        remaps=(),
+        parameters={},
+        environment={},
+        enclave=EnclaveRequest(enclave_attribute(action, context), scope_in_force(context)),
+        location=location_in(context, type(action).__name__),
+    )
+
+
+def _prefix(action: Any, context: Any) -> list[str]:
+    """``launch-prefix``, unless its filter leaves this program out (launch/descriptions/executable.py)."""
+    pattern = context.launch_configurations.get("launch-prefix-filter", "")
+    program = os.path.basename(perform_substitutions(context, action.cmd[0]))
+    prefix = perform_substitutions(context, action.process_description.prefix)
+    return shlex.split(prefix) if re.match(pattern, program) else []
 
 
 def observe_components(action: Any, context: Any) -> tuple[ResolvedComponent, ...]:
@@ -93,9 +125,7 @@ def next_process_name(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[
 
 def location_in(context: Any, element: str) -> SourceLocation:
     """Real launch keeps the file, no lines."""
-    return SourceLocation(
-        context.get_locals_as_dict().get("current_launch_file_path", "<program>"), 0, element
-    )
+    return SourceLocation(context.get_locals_as_dict().get("current_launch_file_path", "<program>"), 0, element)
 
 
 def _kind(action: Any) -> ProcessKind:
@@ -105,9 +135,7 @@ def _kind(action: Any) -> ProcessKind:
 
 
 def _text(context: Any, value: Any) -> str | None:
-    return (
-        None if value is None else perform_substitutions(context, normalize_to_list_of_substitutions(value))
-    )
+    return None if value is None else perform_substitutions(context, normalize_to_list_of_substitutions(value))
 
 
 def _fqn_tokens(fqn: str) -> list[str | None]:

@@ -1,34 +1,134 @@
 """The enclaves of one secured launch under upstream's engine.
 
-Kept in the launch context, so that several launches in one program stay apart. ``enter`` is called for every process
-just before it starts and returns when its enclave is complete on disk.
+Kept in the launch context, so that several launches in one program stay apart. ``enter`` is called for
+every process just before it starts and returns when its enclave is complete on disk.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NoReturn, Protocol
 
+from launch.event_handlers import OnShutdown
+
+from enclave_launch.errors import ProvisionError
+from enclave_launch.policy.launcher import LAUNCHER_NODE
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from enclave_launch.runtime.gate import EnclaveGate, Grant
+from enclave_launch.runtime.gate import Grant, PlannedGate
+from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 
 KEY = "enclave_launch_session"
 
 
-class EnclaveSession:
-    """``gate`` decides; ``environment`` is for every process of the launch."""
+class Doorkeeper(Protocol):
+    """Decides about one process with the components it is to hold."""
 
-    def __init__(self, gate: EnclaveGate) -> None:
-        self._gate = gate
+    def admit(self, process: ResolvedProcess, components: Sequence[ResolvedComponent]) -> Grant: ...
+
+    def launcher(self) -> Grant | None: ...
+
+
+@dataclass(frozen=True)
+class PlannedDoor:
+    """A plan of the whole launch file was signed beforehand; it knows all components, too."""
+
+    gate: PlannedGate
+
+    def admit(self, process: ResolvedProcess, components: Sequence[ResolvedComponent]) -> Grant:
+        return self.gate.ensure(process)
+
+    def launcher(self) -> Grant | None:
+        return self.gate.launcher()
+
+
+class OpenDoor:
+    """No launch file to plan from, only actions as they come: each one is planned and provisioned as it
+    appears.
+    """
+
+    def __init__(self, launch: ProvisionedLaunch) -> None:
+        self._launch = launch
+
+    def admit(self, process: ResolvedProcess, components: Sequence[ResolvedComponent]) -> Grant:
+        """:raises ProvisionError: no manifest, or something to load that only a plan could have permitted."""
+        if components:
+            raise ProvisionError(f"{process.location}: {process.fqn} loads components; {_NEEDS_PLAN}")
+        known = self._launch.plan.evaluation
+        plan = self._launch.plan.planner.plan(replace(known, processes=(*known.processes, process)))
+        new = [problem for problem in plan.problems if problem not in self._launch.plan.problems]
+        if new:
+            raise ProvisionError("\n".join(new))
+        self._launch = replace(self._launch, plan=plan)
+        return PlanProvider(self._launch).ensure(process)
+
+    def launcher(self) -> Grant | None:
+        return None
+
+
+class EnclaveSession:
+    def __init__(self, door: Doorkeeper) -> None:
+        self._door = door
 
     def install(self, context: Any) -> None:
-        context.extend_globals({KEY: self})
+        """Make it known to our extensions, and give launch's own ROS node its enclave before it is
+        created.
+        """
+        context.extend_globals({KEY: self, "ros_adapter": _adapter(self._door.launcher())})
+        context.register_event_handler(
+            OnShutdown(on_shutdown=lambda *_: context.locals.ros_adapter.shutdown_if_running())
+        )
 
     def enter(self, process: ResolvedProcess, components: Sequence[ResolvedComponent] = ()) -> Grant:
         """:raises EnclaveLaunchError: not foreseen in the plan, or its enclave cannot be completed."""
-        return self._gate.ensure(process)
+        return self._door.admit(process, components)
 
 
 def session_of(context: Any) -> EnclaveSession | None:
     session = context.get_locals_as_dict().get(KEY)
     return session if isinstance(session, EnclaveSession) else None
+
+
+_NEEDS_PLAN = (
+    "the permissions that launch itself needs for that come from a plan of the launch file: "
+    "use ros2 launch --secure, or enclave_launch.resolve on the file"
+)
+
+
+class _NoAdapter:
+    """In place of launch's ROS node where it has no enclave: asking for it is an error, not an unsecured
+    node.
+    """
+
+    @property
+    def ros_node(self) -> NoReturn:
+        raise ProvisionError(f"launch must call ROS services; {_NEEDS_PLAN}")
+
+    def shutdown_if_running(self) -> None:
+        """Nothing ever runs."""
+
+
+def _adapter(grant: Grant | None) -> Any:
+    """What launch_ros keeps as ``ros_adapter`` (launch_ros/ros_adapters.py); started when it is first
+    asked for.
+    """
+    if grant is None:
+        return _NoAdapter()
+    from launch_ros.ros_adapters import ROSAdapter
+
+    class LazyAdapter(ROSAdapter):  # type: ignore[misc]  # untyped without ROS
+        started = False
+
+        @property
+        def ros_node(self) -> Any:
+            if not self.started:
+                self.started = True
+                self.start()
+            return super().ros_node
+
+        def shutdown_if_running(self) -> None:
+            if self.started:
+                self.shutdown()
+
+    arguments = ["--ros-args", "-r", f"__node:={LAUNCHER_NODE}", *grant.arguments]
+    return LazyAdapter(argv=arguments, autostart=False)

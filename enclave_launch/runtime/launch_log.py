@@ -8,14 +8,15 @@ included. Launch colours nothing by itself; escape codes in those two formats ar
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
-LEVELS: dict[str, int] = {"DEBUG": 10, "INFO": 20, "WARNING": 30, "ERROR": 40, "CRITICAL": 50}
+LEVELS: dict[Level, int] = {"DEBUG": 10, "INFO": 20, "WARNING": 30, "ERROR": 40, "CRITICAL": 50}
 Format = Callable[[Level, str, str], str]
 
 
@@ -53,6 +54,28 @@ class LaunchLog:
         self.writer.close()
         for sink in self._files.values():
             sink.close()
+
+
+@contextmanager
+def captured_logging(log: LaunchLog) -> Iterator[None]:
+    """Within the block, what launch files and launch's own actions log (``launch.logging.get_logger``, and Python's
+    ``logging``) goes where the launch's own lines go."""
+    import logging
+
+    class Forward(logging.Handler):
+        def emit(self, record: logging.LogRecord) -> None:
+            level: Level = next((name for name in reversed(LEVELS) if record.levelno >= LEVELS[name]), "DEBUG")
+            log.log(level, record.name, record.getMessage())
+
+    root, handler = logging.getLogger(), Forward()
+    before = root.level
+    root.addHandler(handler)
+    root.setLevel(logging.DEBUG if log.debug else logging.INFO)
+    try:
+        yield
+    finally:
+        root.removeHandler(handler)
+        root.setLevel(before)
 
 
 def _plain(level: Level, name: str, message: str) -> str:

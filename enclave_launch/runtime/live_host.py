@@ -20,11 +20,12 @@ from enclave_launch.runtime.gate import EnclaveGate, Grant
 from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.live_process import LiveProcess
 from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
+from enclave_launch.runtime.ros_services import ALTERNATIVE, RosServices
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
     from enclave_launch.description.launch.launch_context import LaunchContext
-    from enclave_launch.runtime.ros_services import RosServices
+    from enclave_launch.description.launch_ros.actions.lifecycle_node import LifecycleNode
 
 
 class LiveHost(BaseHost):
@@ -79,6 +80,7 @@ class LiveHost(BaseHost):
         live = LiveProcess(
             action, process, context, self._tree, self._log, lambda tty: self._prepare(process, base, tty)
         )
+        self._watch_state(action, process, context)
         self.processes.append(live)
         completed: asyncio.Future[None] = self._loop.create_future()
         task = self._loop.create_task(self._run(live, completed), name=process.process_name)
@@ -91,13 +93,27 @@ class LiveHost(BaseHost):
             return
         if self._gate is not None:
             self._gate.ensure_components(components)
-        assert (
-            self._services is not None
-        )  # the service refuses to start without, where the plan has components
+        assert self._services is not None  # the service refuses to start without, where the plan has components
         context.add_completion_future(self._services.load(components))
 
     def launcher_call(self, call: LauncherCall) -> None:
         """Noted in the plan; made by ``ros_services``."""
+
+    def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
+        if self._services is None:
+            self._log.log("ERROR", "launch", f"no state change of '{node.node_name}': {ALTERNATIVE}")
+            return
+        context.add_completion_future(self._services.change_state(node.node_name, transition_id))
+
+    def _watch_state(self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext) -> None:
+        if process.kind != "lifecycle_node" or self._services is None or process.fqn is None:
+            return
+        from enclave_launch.description.launch_ros.events.lifecycle.state_transition import StateTransition
+
+        node: Any = action
+        self._services.watch_state(
+            process.fqn, lambda message: context.emit_event_sync(StateTransition(action=node, msg=message))
+        )
 
     def unforeseeable(self, item: Unforeseeable) -> None:
         """Only a plan has to say so; here it simply happens."""
@@ -129,9 +145,7 @@ class LiveHost(BaseHost):
             if not completed.done():
                 completed.set_result(None)
 
-    async def _prepare(
-        self, process: ResolvedProcess, base: Mapping[str, str], emulate_tty: bool
-    ) -> ProcessSpec:
+    async def _prepare(self, process: ResolvedProcess, base: Mapping[str, str], emulate_tty: bool) -> ProcessSpec:
         grant = await self._granted(process)
         environment = {name: value for name, value in base.items() if name not in self._secrets}
         return ProcessSpec(

@@ -20,6 +20,7 @@ from enclave_launch.description.launch.events.process import (
     ProcessStderr,
     ProcessStdin,
     ProcessStdout,
+    ProcessTargetedEvent,
     ShutdownProcess,
     SignalProcess,
 )
@@ -104,7 +105,7 @@ class LiveProcess:
     # Events to it
 
     def _handlers(self) -> list[Any]:
-        def addressed(cls: type) -> Callable[[Any], bool]:
+        def addressed(cls: type[ProcessTargetedEvent]) -> Callable[[Any], bool]:
             return lambda event: isinstance(event, cls) and event.process_matcher(self._action)
 
         return [
@@ -126,9 +127,7 @@ class LiveProcess:
         self._end(quiet=event.due_to_sigint and not context.noninteractive)
 
     def _end(self, *, quiet: bool) -> None:
-        patience = Patience(
-            self._seconds(self._action.sigterm_timeout), self._seconds(self._action.sigkill_timeout)
-        )
+        patience = Patience(self._seconds(self._action.sigterm_timeout), self._seconds(self._action.sigkill_timeout))
         self._supervised.end(patience, quiet=quiet)
 
     def _seconds(self, substitutions: Any) -> float:

@@ -6,15 +6,12 @@ status. Next: ``supervision`` decides when to start, escalate and start again.
 
 from __future__ import annotations
 
-import array
 import asyncio
 import contextlib
 import errno
-import marshal
 import os
 import signal
 import socket
-import struct
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -23,12 +20,11 @@ from pathlib import Path
 from typing import Literal
 
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.runtime.warden_channel import Message, WardenChannel
 
 Stream = Literal["stdout", "stderr"]
 OnOutput = Callable[[Stream, bytes], None]
-Message = str | int | bytes | list[bytes] | dict[bytes, bytes]
 
-HEADER = struct.Struct("!I")
 CHUNK = 1 << 16  # bytes; what a Linux pipe holds by default
 
 
@@ -52,9 +48,7 @@ class ProcessSpec:
 class OutputPump:
     """Reads one stream of a child whenever there is something, unless paused; ``closed`` at its end."""
 
-    def __init__(
-        self, descriptor: int, receive: Callable[[bytes], None], loop: asyncio.AbstractEventLoop
-    ) -> None:
+    def __init__(self, descriptor: int, receive: Callable[[bytes], None], loop: asyncio.AbstractEventLoop) -> None:
         os.set_blocking(descriptor, False)
         self._descriptor = descriptor
         self._receive = receive
@@ -180,21 +174,16 @@ class ProcessTree:
                 )
             except OSError as error:
                 ours.close()
-                raise RuntimeFailure(
-                    f"cannot start the warden with {sys.executable!r}: {error.strerror}"
-                ) from error
-        self._socket = ours
-        self._buffer = b""
+                raise RuntimeFailure(f"cannot start the warden with {sys.executable!r}: {error.strerror}") from error
+        self._channel = WardenChannel(ours, self._on_message, self._on_lost)
         self._children: dict[int, Child] = {}
         self._count = 0
         self._paused = False
-        self._loop: asyncio.AbstractEventLoop | None = None
         self.lost: asyncio.Future[None] | None = None
 
     async def __aenter__(self) -> ProcessTree:
-        self._loop = asyncio.get_running_loop()
-        self.lost = self._loop.create_future()
-        self._loop.add_reader(self._socket, self._receive)
+        self.lost = asyncio.get_running_loop().create_future()
+        self._channel.open()
         return self
 
     async def __aexit__(self, *_: object) -> None:
@@ -223,18 +212,8 @@ class ProcessTree:
         self._children[self._count] = child
         theirs = [stdin, *(descriptor for _, descriptor in opened)]
         environment = {os.fsencode(name): os.fsencode(value) for name, value in spec.environment.items()}
-        try:
-            self.send(
-                "spawn",
-                self._count,
-                [os.fsencode(word) for word in spec.argv],
-                environment,
-                os.fsencode(spec.cwd or os.getcwd()),
-                descriptors=theirs,
-            )
-        finally:
-            for descriptor in theirs:
-                os.close(descriptor)
+        argv = [os.fsencode(word) for word in spec.argv]
+        self.send("spawn", self._count, argv, environment, os.fsencode(spec.cwd or os.getcwd()), descriptors=theirs)
         try:
             await asyncio.shield(child.started)
         except BaseException:  # cancelled: whatever may have started has no owner
@@ -245,6 +224,9 @@ class ProcessTree:
             for pump in pumps:
                 pump.resume()
         return child
+
+    def send(self, *message: Message, descriptors: Sequence[int] = ()) -> None:
+        self._channel.send(*message, descriptors=descriptors)
 
     def pause_output(self) -> None:
         """Read nothing more from any child, present or coming, until ``resume_output``."""
@@ -263,20 +245,9 @@ class ProcessTree:
     def forget(self, identifier: int) -> None:
         self._children.pop(identifier, None)
 
-    def send(self, *message: Message, descriptors: Sequence[int] = ()) -> None:
-        data = marshal.dumps(message)
-        rights = (socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))
-        try:
-            self._socket.sendmsg([HEADER.pack(len(data))], [rights] if descriptors else [])
-            self._socket.sendall(data)
-        except OSError:
-            self._on_lost()
-
     async def close(self) -> None:
         """Ends the whole tree; returns when nothing of it is left."""
-        if self._loop is not None:
-            self._loop.remove_reader(self._socket)
-        self._socket.close()
+        self._channel.close()
         loop = asyncio.get_running_loop()
         await asyncio.shield(loop.run_in_executor(None, self._process.wait))
         for child in list(self._children.values()):
@@ -284,27 +255,10 @@ class ProcessTree:
             if not child.exited.done():
                 child.exited.cancel()
 
-    def _receive(self) -> None:
-        try:
-            data = self._socket.recv(CHUNK, socket.MSG_DONTWAIT)
-        except BlockingIOError:
-            return
-        except ConnectionError:
-            data = b""
-        if not data:
-            self._on_lost()
-            return
-        self._buffer += data
-        while len(self._buffer) >= HEADER.size:
-            end = HEADER.size + HEADER.unpack_from(self._buffer)[0]
-            if len(self._buffer) < end:
-                break
-            kind, identifier, *rest = marshal.loads(self._buffer[HEADER.size : end])
-            self._buffer = self._buffer[end:]
-            if identifier in self._children:
-                self._on_message(kind, self._children[identifier], rest)
-
-    def _on_message(self, kind: str, child: Child, rest: list[object]) -> None:
+    def _on_message(self, kind: str, identifier: int, rest: list[object]) -> None:
+        child = self._children.get(identifier)
+        if child is None:
+            return  # given up in the meantime
         if kind == "started":
             child.started.set_result(int(str(rest[0])))
         elif kind == "failed":
@@ -316,8 +270,6 @@ class ProcessTree:
 
     def _on_lost(self) -> None:
         """The warden was killed. Its children died with it; end what they had started in their groups."""
-        if self._loop is not None:
-            self._loop.remove_reader(self._socket)
         for child in list(self._children.values()):
             if child.running:
                 with contextlib.suppress(ProcessLookupError, PermissionError):

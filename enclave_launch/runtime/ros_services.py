@@ -17,6 +17,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.policy.launcher import LAUNCHER_NODE
 from enclave_launch.process import ParameterValue, ResolvedComponent
 from enclave_launch.runtime.gate import Grant
 from enclave_launch.runtime.launch_log import Level
@@ -50,7 +51,7 @@ class RosServices:
         with _environment(grant.environment):
             self._ros = rclpy.Context()
             rclpy.init(args=["--ros-args", *_without_marker(grant.arguments)], context=self._ros)
-            self._node = rclpy.create_node(f"launch_ros_{os.getpid()}", context=self._ros)
+            self._node = rclpy.create_node(LAUNCHER_NODE, context=self._ros)  # the name its permissions are for
         self._executor = rclpy.executors.SingleThreadedExecutor(context=self._ros)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="ros-services", daemon=True)
@@ -96,9 +97,7 @@ class RosServices:
         from composition_interfaces.srv import LoadNode
 
         for component in components:
-            response = self._call(
-                LoadNode, f"{component.container}/_container/load_node", _load_request(component)
-            )
+            response = self._call(LoadNode, f"{component.container}/_container/load_node", _load_request(component))
             if response is None:
                 return
             self._report_load(component, response)
@@ -137,9 +136,7 @@ class RosServices:
             future.add_done_callback(lambda _: answered.set())
             while not answered.wait(0.5):
                 if self._closing.is_set():
-                    self._tell(
-                        "WARNING", f"Abandoning wait for the '{service}' service response, due to shutdown."
-                    )
+                    self._tell("WARNING", f"Abandoning wait for the '{service}' service response, due to shutdown.")
                     return None
             return future.result()
         finally:

@@ -36,9 +36,7 @@ def output_routes(setting: OutputSetting) -> Routes:
     """:raises ValueError: an alias, source or destination that launch does not know."""
     if isinstance(setting, str):
         if setting not in ALIASES:
-            raise ValueError(
-                f'{setting} is not a valid standard output config i.e. "screen", "log" or "both"'
-            )
+            raise ValueError(f'{setting} is not a valid standard output config i.e. "screen", "log" or "both"')
         named: Mapping[str, Iterable[str]] = dict(ALIASES[setting].items())
     else:
         named = {source: {to} if isinstance(to, str) else set(to) for source, to in setting.items()}
@@ -47,9 +45,7 @@ def output_routes(setting: OutputSetting) -> Routes:
             raise ValueError(f'{source} is not a valid output source i.e. "stdout", "stderr" or "both"')
         for destination in destinations:
             if destination not in DESTINATIONS:
-                raise ValueError(
-                    f'{destination} is not a valid output destination i.e. "screen", "log" or "own_log"'
-                )
+                raise ValueError(f'{destination} is not a valid output destination i.e. "screen", "log" or "own_log"')
     return {source: frozenset(named.get(source, ())) for source in SOURCES}
 
 

@@ -1,7 +1,7 @@
 """The live launch: one event loop that drives evaluation, processes, timers and signals until all is over.
 
-    run_launch(description, ...)         blocks, takes the signals, returns the exit status
-    run_launch_async(description, ...)   the same inside a running loop, cancel-safe
+    run_launch(file, arguments, ...)         blocks, takes the signals, returns the exit status
+    run_launch_async(file, arguments, ...)   the same inside a running loop, cancel-safe
 
 Semantics of launch/launch_service.py: the description is visited while one event is handled; then events,
 newest handler first, until nothing is left to wait for. Stricter than there: SIGTERM, SIGQUIT and SIGHUP
@@ -14,7 +14,8 @@ import asyncio
 import os
 import socket
 import sys
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AsyncExitStack, contextmanager
 from dataclasses import dataclass, field
 from datetime import datetime
@@ -24,14 +25,12 @@ from typing import Any, TextIO
 from enclave_launch.description.launch.event_handlers import OnIncludeLaunchDescription, OnShutdown
 from enclave_launch.description.launch.events import IncludeLaunchDescription, Shutdown
 from enclave_launch.description.launch.launch_context import LaunchContext
-from enclave_launch.description.launch.launch_description import LaunchDescription
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
-from enclave_launch.evaluation.environment import environment_untouched
+from enclave_launch.evaluation.evaluate import Arguments, evaluation_surroundings, top_description
 from enclave_launch.evaluation.events import handle_next
-from enclave_launch.evaluation.host import active_host
 from enclave_launch.evaluation.location import place_of
 from enclave_launch.runtime.gate import EnclaveGate
-from enclave_launch.runtime.launch_log import LaunchLog, Level
+from enclave_launch.runtime.launch_log import LaunchLog, Level, captured_logging
 from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
 from enclave_launch.runtime.process_tree import ProcessTree
@@ -50,24 +49,28 @@ class RunOptions:
     noninteractive: bool = False
     debug: bool = False
     shutdown_when_idle: bool = True
-    arguments: tuple[str, ...] = ()
+    launch_configurations: Mapping[str, str] = field(default_factory=dict)
     screen: TextIO | None = None
     secrets: frozenset[str] = frozenset()
     notices: tuple[str, ...] = ()
     needs_ros_services: bool = False
-    host_options: dict[str, Any] = field(default_factory=dict)
+    host_options: Mapping[str, Any] = field(default_factory=dict)
 
 
 def run_launch(
-    description: LaunchDescription, *, gate: EnclaveGate | None = None, options: RunOptions | None = None
+    launch_file: str | os.PathLike[str],
+    arguments: Arguments = (),
+    *,
+    gate: EnclaveGate | None = None,
+    options: RunOptions | None = None,
 ) -> int:
-    """Run to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
+    """Run a launch file to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
 
     :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed.
     """
 
     async def main() -> int:
-        service = LaunchService(description, gate=gate, options=options or RunOptions())
+        service = LaunchService(launch_file, arguments, gate=gate, options=options or RunOptions())
         with _signals_to(service):
             return await service.run()
 
@@ -75,19 +78,32 @@ def run_launch(
 
 
 async def run_launch_async(
-    description: LaunchDescription, *, gate: EnclaveGate | None = None, options: RunOptions | None = None
+    launch_file: str | os.PathLike[str],
+    arguments: Arguments = (),
+    *,
+    gate: EnclaveGate | None = None,
+    options: RunOptions | None = None,
 ) -> int:
     """As ``run_launch``; signals stay the caller's. Cancelling it shuts down, in order, before it returns."""
-    return await LaunchService(description, gate=gate, options=options or RunOptions()).run()
+    return await LaunchService(launch_file, arguments, gate=gate, options=options or RunOptions()).run()
+
+
+_running = threading.Lock()  # one at a time: launch files change the environment, which belongs to the process
 
 
 class LaunchService:
     """One run. ``shut_down`` may be called from the loop at any time."""
 
     def __init__(
-        self, description: LaunchDescription, *, gate: EnclaveGate | None, options: RunOptions
+        self,
+        launch_file: str | os.PathLike[str],
+        arguments: Arguments,
+        *,
+        gate: EnclaveGate | None,
+        options: RunOptions,
     ) -> None:
-        self._description = description
+        self._launch_file = os.path.abspath(launch_file)
+        self._arguments = arguments
         self._gate = gate
         self._options = options
         self._wake = asyncio.Event()
@@ -100,7 +116,11 @@ class LaunchService:
         self._context: LaunchContext
 
     async def run(self) -> int:
+        """:raises RuntimeFailure: before anything was started."""
+        if not _running.acquire(blocking=False):
+            raise RuntimeFailure("another launch is running in this process; run each in a process of its own")
         async with AsyncExitStack() as stack:
+            stack.callback(_running.release)
             tree = ProcessTree()  # first: the warden starts up while we go on
             await stack.enter_async_context(tree)
             services = self._ros_services()
@@ -108,7 +128,7 @@ class LaunchService:
                 stack.callback(services.close)
             self._log = self._open_log(tree)
             stack.callback(self._log.close)
-            stack.enter_context(environment_untouched())
+            stack.enter_context(captured_logging(self._log))
             self._host = LiveHost(
                 tree,
                 self._log,
@@ -119,7 +139,7 @@ class LaunchService:
                 **self._options.host_options,
             )
             stack.push_async_callback(self._host.close)
-            stack.enter_context(active_host(self._host))
+            stack.enter_context(evaluation_surroundings(self._host))
             return await self._run_until_over(tree)
 
     def shut_down(self, reason: str, *, due_to_sigint: bool = False) -> None:
@@ -167,13 +187,14 @@ class LaunchService:
         return self._exit_status()
 
     def _begin(self) -> None:
-        self._context = LaunchContext(
-            argv=self._options.arguments, noninteractive=self._options.noninteractive, host=self._host
-        )
+        argv = [f"{name}:={value}" for name, value in self._arguments]
+        self._context = LaunchContext(argv=argv, noninteractive=self._options.noninteractive, host=self._host)
+        self._context.launch_configurations.update(self._options.launch_configurations)
         self._context._event_queue.wake = self._wake.set
         self._context.register_event_handler(OnIncludeLaunchDescription())
         self._context.register_event_handler(OnShutdown(on_shutdown=self._on_shutdown_event))
-        self._context.emit_event_sync(IncludeLaunchDescription(self._description))
+        description = top_description(self._launch_file, self._arguments)
+        self._context.emit_event_sync(IncludeLaunchDescription(description))
 
     async def _turn(self) -> None:
         """Handle one event, or wait for something to happen. Raises ``_Over`` when there is nothing more."""
@@ -254,7 +275,11 @@ class LaunchService:
         directory = make_log_directory(
             log_base_directory(os.environ), datetime.now(), socket.gethostname(), os.getpid()
         )
-        writer = SinkWriter(tree.pause_output, lambda: loop.call_soon_threadsafe(tree.resume_output))
+
+        def resume() -> None:
+            loop.call_soon_threadsafe(tree.resume_output)
+
+        writer = SinkWriter(tree.pause_output, resume)
         return LaunchLog(
             directory, ScreenSink(self._options.screen or sys.stdout), writer, os.environ, self._options.debug
         )

@@ -25,6 +25,7 @@ from __future__ import annotations
 import array
 import contextlib
 import errno
+import fcntl
 import marshal
 import os
 import select
@@ -240,11 +241,8 @@ def become(
 
 def move_above(streams: list[int]) -> list[int]:
     """Descriptors 0 to 2 are about to be overwritten: copy any that sit there."""
-    import fcntl
-
     return [
-        fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3) if descriptor < 3 else descriptor
-        for descriptor in streams
+        fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3) if descriptor < 3 else descriptor for descriptor in streams
     ]
 
 

@@ -73,7 +73,12 @@ class Workspace:
         return path
 
     def environment(self, *prefixes: Path) -> dict[str, str]:
-        path = [self.site, Path(__file__).parent, ROOT, *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep))]
+        path = [
+            self.site,
+            Path(__file__).parent,
+            ROOT,
+            *filter(None, os.environ.get("PYTHONPATH", "").split(os.pathsep)),
+        ]
         return {
             **os.environ,
             "PYTHONPATH": os.pathsep.join(map(str, path)),

@@ -1,4 +1,5 @@
-"""``ros2 launch`` on the public sources of launch, launch_ros and ros2launch: ``python ros2_launch.py [options] ...``.
+"""``ros2 launch`` on the public sources of launch, launch_ros and ros2launch: ``python ros2_launch.py
+[options] ...``.
 
 The command's own class parses the command line and runs the launch; only ROS itself is stood in for.
 """

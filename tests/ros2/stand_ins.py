@@ -1,8 +1,9 @@
 """What real launch_ros imports of a ROS installation, where there is only its Python source.
 
-``install()`` puts modules in place of rclpy, of the message packages and of ros2cli, as far as launching needs them.
-All of launch's and launch_ros's own code stays real; nothing of it is patched. Names are checked by our own rules,
-which the tests of ``nodl`` hold against rcl's. Where the real module is importable it is used.
+``install()`` puts modules in place of rclpy, of the message packages and of ros2cli, as far as launching
+needs them. All of launch's and launch_ros's own code stays real; nothing of it is patched. Names are
+checked by our own rules, which the tests of ``nodl`` hold against rcl's. Where the real module is
+importable it is used.
 """
 
 from __future__ import annotations

@@ -11,7 +11,8 @@ from tests.ros2.conftest import Workspace
 
 pytestmark = pytest.mark.real_launch
 
-# Visits a launch file with upstream's engine up to the start of each process, and prints what our extension sees.
+# Visits a launch file with upstream's engine up to the start of each process, and prints what our extension
+# sees.
 VISIT = """
 import json, os, sys
 import stand_ins
@@ -114,7 +115,8 @@ def generate_launch_description():
             ComposableNodeContainer(executable="/bin/true", name="d", namespace="", enclave="/box"),
             ExecuteProcess(cmd=["/bin/true"], enclave="/tool"),
             GroupAction([PushRosEnclave("arm"), node("e")]),
-            GroupAction([PushRosNamespace("left", enclave="sinister"), node("f", ros_arguments=["--enclave", "/mine"])]),
+            GroupAction([PushRosNamespace("left", enclave="sinister"), node("f", ros_arguments=["--enclave",
+            "/mine"])]),
         ]),
         node("g"),
     ])
@@ -132,7 +134,9 @@ EXPECTED = [
 
 
 @pytest.mark.parametrize(
-    ("name", "text"), [("t.launch.xml", XML), ("t.launch.yaml", YAML), ("t.launch.py", PYTHON)], ids=["XML", "YAML", "Python"]
+    ("name", "text"),
+    [("t.launch.xml", XML), ("t.launch.yaml", YAML), ("t.launch.py", PYTHON)],
+    ids=["XML", "YAML", "Python"],
 )
 def test_attribute_and_scope(name: str, text: str, workspace: Workspace) -> None:
     seen = visited(workspace, name, text)

@@ -41,9 +41,7 @@ class Story:
         self.exits.append(returncode)
 
     def say(self, level: Level, message: str) -> None:
-        self.lines.append(
-            (level, re.sub(r"pid \[?\d+", lambda found: found[0].rstrip("0123456789") + "PID", message))
-        )
+        self.lines.append((level, re.sub(r"pid \[?\d+", lambda found: found[0].rstrip("0123456789") + "PID", message)))
 
     async def until(self, condition: Callable[[], bool]) -> None:
         deadline = time.monotonic() + 10
@@ -95,9 +93,7 @@ def test_a_program_that_cannot_be_started() -> None:
 
     async def main() -> Outcome:
         async with ProcessTree() as tree:
-            return await SupervisedProcess(
-                "a-1", prepare, tree, LifeRules(respawn=True), story, story.say
-            ).run()
+            return await SupervisedProcess("a-1", prepare, tree, LifeRules(respawn=True), story, story.say).run()
 
     assert asyncio.run(main()) == Outcome(None, asked_to_end=False)
     assert story.lines == [("ERROR", "cannot start process: No such file or directory: '/no/such/program'")]
@@ -173,14 +169,12 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed() -> None:
     assert story.lines[1:-1] == [
         (
             "ERROR",
-            "process[a-1] failed to terminate '0.2' seconds after receiving 'SIGINT', "
-            "escalating to 'SIGTERM'",
+            "process[a-1] failed to terminate '0.2' seconds after receiving 'SIGINT', escalating to 'SIGTERM'",
         ),
         ("INFO", "sending signal 'SIGTERM' to process[a-1]"),
         (
             "ERROR",
-            "process[a-1] failed to terminate '0.4' seconds after receiving 'SIGTERM', "
-            "escalating to 'SIGKILL'",
+            "process[a-1] failed to terminate '0.4' seconds after receiving 'SIGTERM', escalating to 'SIGKILL'",
         ),
         ("INFO", "sending signal 'SIGKILL' to process[a-1]"),
     ]

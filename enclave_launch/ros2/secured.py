@@ -1,0 +1,84 @@
+"""A launch description of real launch, secured: for programs that build and run their own.
+
+    description = secured(LaunchDescription([Node(...), ...]), "keystore")
+    service = LaunchService()
+    service.include_launch_description(description)
+    service.run()
+
+Every node gets its enclave and least permissions when its turn comes; what cannot be secured ends the launch.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+from launch import LaunchDescription
+from launch.actions import OpaqueFunction, SetEnvironmentVariable, UnsetEnvironmentVariable
+
+from enclave_launch import flow
+from enclave_launch.errors import UsageError
+from enclave_launch.evaluation.distro import choose_release
+from enclave_launch.interfaces import InterfaceFinder
+from enclave_launch.plan import Planner
+from enclave_launch.process import Evaluation
+from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
+from enclave_launch.ros2.session import EnclaveSession, OpenDoor
+from enclave_launch.secured import ProvisionedLaunch
+from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY, SecuritySettings
+from nodl.ament_index import search_prefixes
+
+EXTENSION = "enclave_launch.ros2.node_action"
+
+
+def secured(
+    description: LaunchDescription,
+    keystore: str | os.PathLike[str],
+    *,
+    resolve_options: flow.ResolveOptions | None = None,
+    security_options: flow.SecurityOptions | None = None,
+) -> LaunchDescription:
+    """``description`` in a new one that secures it. The keystore is created if it does not exist.
+
+    :raises ProvisionError: the keystore cannot be used.
+    :raises UsageError: this package is not installed, so that launch does not find its extension.
+    """
+    options = resolve_options or flow.ResolveOptions()
+    check_installed()
+    planner = Planner(
+        "<program>",
+        (),
+        InterfaceFinder(search_prefixes(), options.manifests, options.infer),
+        choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes()).name,
+        flow._plan_options(options),
+    )
+    launch = flow.provision(planner.plan(Evaluation((), ())), keystore, options=security_options)
+    return enclosed(description, EnclaveSession(OpenDoor(launch)), launch)
+
+
+def enclosed(description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch) -> LaunchDescription:
+    """``description`` behind the actions that begin ``session`` and point every process at the keystore."""
+    actions: list[Any] = [
+        SetEnvironmentVariable(name, value) for name, value in security_variables(launch.settings).items()
+    ]
+    # rcl lets this variable of the user's shell win over --enclave.
+    actions.append(UnsetEnvironmentVariable(OVERRIDE))
+    actions.append(OpaqueFunction(function=session.install))
+    return LaunchDescription([*actions, *description.entities])
+
+
+def security_variables(settings: SecuritySettings) -> Mapping[str, str]:
+    return {ENABLE: "true", KEYSTORE: settings.keystore, STRATEGY: settings.strategy}
+
+
+def check_installed() -> None:
+    """launch_ros finds node extensions by entry point alone; without ours nodes would start unsecured."""
+    from importlib.metadata import entry_points
+
+    found = [entry.value for entry in entry_points(group="launch_ros.node_action")]
+    if not any(value.startswith(EXTENSION) for value in found):
+        raise UsageError(
+            "enclave-launch is importable but not installed: launch_ros finds its node extension through entry "
+            "points; install it with pip or colcon"
+        )
