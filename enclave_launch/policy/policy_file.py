@@ -68,7 +68,7 @@ def _absolute(enclave: EnclavePolicy, document: PolicyDocument) -> Added:
     }
 
 
-def _union(enclave: EnclavePolicy, added: Mapping[tuple[str, str], Mapping[Rule, str]]) -> tuple[Profile, ...]:
+def _union(enclave: EnclavePolicy, added: Added) -> tuple[Profile, ...]:
     profiles = {(profile.ns, profile.node): set(profile.rules) for profile in enclave.profiles}
     for key, rules in added.items():
         profiles.setdefault(key, set()).update(rules)
