@@ -39,15 +39,16 @@ def build_parser() -> argparse.ArgumentParser:
     )
     parser.add_argument("words", nargs="*", metavar="PACKAGE LAUNCH_FILE | PATH [name:=value ...]", help=argparse.SUPPRESS)
     parser.add_argument("--version", action="version", version=f"secure-launch {__version__}")
-    _add_security(parser.add_argument_group("security"))
-    _add_policy(parser.add_argument_group("what each node may do"))
+    add_security_options(parser.add_argument_group("security"))
+    add_policy_options(parser.add_argument_group("what each node may do"))
     _add_inspection(parser.add_argument_group("looking without starting"))
     _add_evaluation(parser.add_argument_group("evaluating the launch file"))
     _add_running(parser.add_argument_group("running"))
     return parser
 
 
-def _add_security(group: argparse._ArgumentGroup) -> None:
+def add_security_options(group: argparse._ArgumentGroup) -> None:
+    """Also those of ``ros2 launch``, see ``ros2.option``."""
     group.add_argument("--secure", action="store_true", help="give every process its enclave; refuse to start otherwise")
     group.add_argument(
         "--keystore",
@@ -78,7 +79,8 @@ def _add_security(group: argparse._ArgumentGroup) -> None:
                        help="provision actions that only exist at run time instead of refusing them")
 
 
-def _add_policy(group: argparse._ArgumentGroup) -> None:
+def add_policy_options(group: argparse._ArgumentGroup) -> None:
+    """Also those of ``ros2 launch``."""
     group.add_argument("--nodl", metavar="FILE", action="append", type=Path, default=[],
                        help="use this NoDL manifest where definitions conflict (repeatable)")
     group.add_argument("--missing-nodl", choices=("infer", "error"), default="infer",
