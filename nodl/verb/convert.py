@@ -12,13 +12,11 @@ from nodl.ament_index import search_prefixes
 from nodl.document import ManifestNode, read_document
 from nodl.document.write import Written, v1_xml, v2_yaml
 from nodl.errors import NoDLError
+from nodl.verb.options import add_prefix_argument
 
-HELP = "v1 to v2 or v2 to v1; what gets lost is told"
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    from nodl.verb import add_prefix_argument
-
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser("convert", help="v1 to v2 or v2 to v1; what gets lost is told", description=__doc__)
     parser.add_argument("files", nargs="+", metavar="FILE", help="documents of one version")
     parser.add_argument(
         "-o",
@@ -28,6 +26,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="file to write (default: standard output); a folder when v1 becomes several v2 files",
     )
     add_prefix_argument(parser)
+    parser.set_defaults(run=run)
+    return parser
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -12,8 +12,7 @@ from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import EndpointKind, NodeInterface
-
-HELP = "print the interfaces of a document, package or executable"
+from nodl.verb.options import add_prefix_argument
 
 _LABELS = {
     EndpointKind.PUBLISHER: "publishes",
@@ -25,13 +24,16 @@ _LABELS = {
 }
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    from nodl.verb import add_prefix_argument
-
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "show", help="print the interfaces of a document, package or executable", description=__doc__
+    )
     parser.add_argument("subject", metavar="PACKAGE|FILE")
     parser.add_argument("names", nargs="*", metavar="EXECUTABLE|PLUGIN", help="only these of the package")
     parser.add_argument("--format", choices=("text", "json"), default="text")
     add_prefix_argument(parser)
+    parser.set_defaults(run=run)
+    return parser
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -50,15 +52,11 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if missing or not nodes else 0
 
 
-def _of_package(
-    lookup: ManifestLookup, package: str, names: Iterable[str]
-) -> tuple[list[NodeInterface], list[str]]:
+def _of_package(lookup: ManifestLookup, package: str, names: Iterable[str]) -> tuple[list[NodeInterface], list[str]]:
     wanted = list(names)
     if not wanted:
         everything = lookup.all_of(package)
-        where = (
-            "" if everything else f"no NoDL of package {package}; looked at {_listing(everything.searched)}"
-        )
+        where = "" if everything else f"no NoDL of package {package}; looked at {_listing(everything.searched)}"
         return list(everything.found), [where] if where else []
     nodes: list[NodeInterface] = []
     missing: list[str] = []

@@ -9,17 +9,19 @@ from pathlib import Path
 from nodl.ament_index import search_prefixes
 from nodl.document import V1_SUFFIX, read_document
 from nodl.errors import NoDLError
+from nodl.verb.options import add_prefix_argument
 
-HELP = "check documents; errors come with file and line"
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    from nodl.verb import add_prefix_argument
-
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "validate", help="check documents; errors come with file and line", description=__doc__
+    )
     parser.add_argument(
         "files", nargs="*", metavar="FILE", help="documents (default: all *.nodl.* files of this folder)"
     )
     add_prefix_argument(parser)
+    parser.set_defaults(run=run)
+    return parser
 
 
 def run(arguments: argparse.Namespace) -> int:
