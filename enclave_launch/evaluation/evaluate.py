@@ -9,7 +9,7 @@ import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
 from enclave_launch.evaluation.environment import environment_untouched
@@ -17,6 +17,9 @@ from enclave_launch.evaluation.host import Host, PlanHost, active_host
 from enclave_launch.evaluation.location import place_of
 from enclave_launch.process import Evaluation
 from enclave_launch.source_location import SourceLocation
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.launch_description import LaunchDescription
 
 Arguments = Sequence[tuple[str, str]]
 
@@ -75,6 +78,26 @@ def top_description(path: str, arguments: Arguments) -> Any:
     include = IncludeLaunchDescription(AnyLaunchDescriptionSource(path), launch_arguments=arguments)
     include.source_location = None
     return LaunchDescription([include])
+
+
+@contextmanager
+def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Iterator[LaunchDescription]:
+    """The description in ``launch_file``, loaded but not visited; usable within the block.
+
+    Raises ``EvaluationError`` as ``evaluate``.
+    """
+    from enclave_launch.description.launch.launch_description_sources import (
+        get_launch_description_from_any_launch_file,
+    )
+
+    path = os.path.abspath(launch_file)
+    with evaluation_surroundings(host):
+        try:
+            yield get_launch_description_from_any_launch_file(path)
+        except EnclaveLaunchError:
+            raise
+        except Exception as error:  # Python launch files run code of their own: any exception is theirs
+            raise _as_launch_file_error(error, path, host) from error
 
 
 @contextmanager

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
-from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
+from enclave_launch.plan import LaunchPlan, PlannedProcess
+from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.plan_json import allowed_names
 from keystore.policy import EnclavePolicy
 
@@ -23,7 +24,8 @@ Branch = tuple[str, Sequence["Branch"]]
 def plan_tree(plan: LaunchPlan) -> str:
     """Text that ends with a newline. Interfaces that every node has are counted, not listed."""
     lines = [f"{plan.launch_file} (as {plan.distro})"]
-    lines += _draw([_enclave(plan, enclave) for enclave in plan.derived.policy.enclaves])
+    gains = gains_by_sharing(plan.derived, composed_only=True)
+    lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves])
     outside = _outside(plan)
     if outside:
         lines += ["without an enclave", *_draw(outside)]
@@ -32,26 +34,28 @@ def plan_tree(plan: LaunchPlan) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _enclave(plan: LaunchPlan, enclave: EnclavePolicy) -> Branch:
+def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) -> Branch:
     processes = [item for item in plan.processes if item.enclave and item.enclave.path == enclave.path]
-    branches: list[Branch] = [_process(item, plan.components) for item in processes]
+    branches: list[Branch] = [_process(item, plan) for item in processes]
     if plan.launcher and plan.launcher.enclave == enclave.path:
         branches.append((f"the launcher itself, node {plan.launcher.fqn}", ()))
     branches.extend(_permissions(plan, enclave))
+    branches.extend((str(gain), ()) for gain in gains if gain.enclave == enclave.path)
     merged = f"  (shared by {len(processes)} processes)" if len(processes) > 1 else ""
     return f"enclave {enclave.path}{merged}", branches
 
 
-def _process(item: PlannedProcess, components: Iterable[PlannedComponent]) -> Branch:
+def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     process = item.process
     what = f"{process.package}/{process.executable}" if process.package else process.executable
     names = " ".join(node.fqn for node in item.nodes) or item.fqn or ""
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
-    head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({process.location}{why}{event})"
+    place = f"line {process.location.line}" if process.location.file == plan.launch_file else str(process.location)
+    head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{event})"
     loaded: list[Branch] = [
         (f"component {component.component.package} {component.component.plugin} as {component.fqn}", ())
-        for component in components
+        for component in plan.components
         if component.container is item
     ]
     return head, loaded
@@ -70,7 +74,7 @@ def _permissions(plan: LaunchPlan, enclave: EnclavePolicy) -> Iterator[Branch]:
 
 
 def _outside(plan: LaunchPlan) -> list[Branch]:
-    without: list[Branch] = [_process(item, plan.components) for item in plan.processes if item.enclave is None]
+    without: list[Branch] = [_process(item, plan) for item in plan.processes if item.enclave is None]
     without += [
         (f"component {item.component.package} {item.component.plugin} as {item.fqn} in {item.component.container}", ())
         for item in plan.components

@@ -91,10 +91,14 @@ def _launch_prefix(options: argparse.Namespace) -> Mapping[str, str]:
 
 
 def _show_file(target: Target, options: argparse.Namespace) -> int:
+    from enclave_launch.evaluation.evaluate import read_description
+    from enclave_launch.evaluation.host import PlanHost
     from enclave_launch.report.launch_file import arguments_text, description_text
 
     text = arguments_text if options.show_args else description_text
-    sys.stdout.write(text(target.launch_file, resolve_options(options)))
+    host = PlanHost(**resolve_options(options).host_options())
+    with read_description(target.launch_file, host) as description:
+        sys.stdout.write(text(description))
     return 0
 
 
