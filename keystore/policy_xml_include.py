@@ -118,8 +118,7 @@ def _pointed(root: etree._Element, include: etree._Element, where: str) -> list[
     match = _XPOINTER.match(pointer)
     if match is None:
         raise PolicyError(
-            f"{where}: xpointer {printable(pointer)} is not supported; "
-            "write a plain path such as xpointer(/profile/*)"
+            f"{where}: xpointer {printable(pointer)} is not supported; write a plain path such as xpointer(/profile/*)"
         )
     first, *steps = match[1][1:].split("/")
     found = [root] if root.tag == first else []

@@ -12,9 +12,7 @@ from dataclasses import dataclass
 Edit = tuple[str, tuple[str, ...]]
 """A method of ``str`` with its arguments: ``("strip", ("/",))``."""
 
-EDITS = frozenset(
-    {"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"}
-)
+EDITS = frozenset({"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"})
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,7 +17,6 @@ from functools import lru_cache
 from enclave_launch.policy.running_node import RunningNode
 from keystore.policy import Operation
 from nodl.node_interface import ClientLibrary, EndpointKind, NodeInterface
-from nodl.source_ref import SourceRef
 
 DISTROS = ("foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
 
@@ -86,16 +85,6 @@ TABLE: tuple[BuiltIn, ...] = (
     BuiltIn(_S, "/tf_static", "tf2_ros transform_listener", Condition.TF_LISTENER),
 )
 
-# Programs of ROS itself that launch files start and whose packages bring no manifest.
-_CONTAINER_EXECUTABLES = frozenset(
-    {
-        "component_container",
-        "component_container_mt",
-        "component_container_isolated",
-        "component_container_event",
-    }
-)
-
 
 def built_in_interfaces(node: RunningNode, distro: str) -> tuple[BuiltIn, ...]:
     """The rows that hold for ``node``. Raises ``ValueError`` for a distribution we do not know."""
@@ -111,22 +100,6 @@ def built_in_interfaces(node: RunningNode, distro: str) -> tuple[BuiltIn, ...]:
     if _listens_to_tf(node.interface):
         conditions.add(Condition.TF_LISTENER)
     return _rows(distro, node.interface.library, frozenset(conditions))
-
-
-def standard_interface(package: str | None, executable: str) -> NodeInterface | None:
-    """The interface of a container program of ``rclcpp_components``: nothing but built-in ones."""
-    if package != "rclcpp_components" or executable not in _CONTAINER_EXECUTABLES:
-        return None
-    return NodeInterface(
-        package=package,
-        executable=executable,
-        plugin=None,
-        name="ComponentManager",
-        namespace=None,
-        endpoints=(),
-        source=SourceRef(_CONTAINER),
-        library=ClientLibrary.RCLCPP,
-    )
 
 
 @lru_cache(maxsize=256)
@@ -146,6 +119,5 @@ def _rows(distro: str, library: ClientLibrary, conditions: frozenset[Condition])
 
 def _listens_to_tf(interface: NodeInterface) -> bool:
     return any(
-        endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.text == "/tf"
-        for endpoint in interface.endpoints
+        endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.text == "/tf" for endpoint in interface.endpoints
     )

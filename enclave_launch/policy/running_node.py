@@ -86,9 +86,7 @@ def _named(
     return RunningNode(interface, original or name, name, namespace, rules, parameters, enclave, location, role)
 
 
-def _parse(
-    texts: Iterable[str], written: Iterable[RemapRule], location: SourceLocation
-) -> tuple[ParsedRule, ...]:
+def _parse(texts: Iterable[str], written: Iterable[RemapRule], location: SourceLocation) -> tuple[ParsedRule, ...]:
     places = {f"{rule.source}:={rule.target}": str(rule.location) for rule in written if rule.location is not None}
     try:
         return tuple(parse_rule(text, places.get(text, str(location))) for text in texts)

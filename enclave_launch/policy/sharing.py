@@ -20,7 +20,9 @@ class Gain:
     composed: bool
     gained: tuple[Rule, ...]
 
-    def __str__(self) -> str:
+    @property
+    def text(self) -> str:
+        """One sentence for a report."""
         how = "shares a container" if self.composed else f"shares enclave {self.enclave}"
         names = ", ".join(f"{rule.operation.value} {rule.expression}" for rule in self.gained)
         return f"node {self.node} {how} and may thereby also {names}"

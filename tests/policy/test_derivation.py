@@ -16,7 +16,6 @@ from enclave_launch.policy.builtin_interfaces import (
     DISTROS,
     TABLE,
     built_in_interfaces,
-    standard_interface,
 )
 from keystore.domains import Domains
 from keystore.permissions import permissions_document
@@ -193,13 +192,6 @@ def test_interfaces_that_a_manifest_repeats_are_not_doubled(node: NodeMaker) -> 
     assert len(profile.rules) == len(set(profile.rules)) == len(PLAIN | TYPE_DESCRIPTION)
     assert ("publish", "/rosout") not in found.built_in_names("/")  # a manifest asks for it as well
     assert ("publish", "/parameter_events") in found.built_in_names("/")
-
-
-def test_containers_of_ros_itself_need_no_manifest() -> None:
-    found = standard_interface("rclcpp_components", "component_container_mt")
-    assert found is not None and (found.name, found.library) == ("ComponentManager", CPP)
-    assert standard_interface("rclcpp_components", "other") is None
-    assert standard_interface("demo", "component_container") is None
 
 
 # -- what is not known, and what must not be ---------------------------------------------------------
