@@ -40,7 +40,11 @@ def provision(root: Path, domain: int, policies: Iterable[EnclavePolicy]) -> Non
 
 def create(root: Path, domain: int, grants: Mapping[str, Grant]) -> None:
     """The keystore that ``sros2_style.create`` would make of the same grants."""
-    provision(root, domain, [_policy(path, grant) for path, grant in grants.items()])
+    provision(root, domain, policies(grants))
+
+
+def policies(grants: Mapping[str, Grant]) -> list[EnclavePolicy]:
+    return [_policy(path, grant) for path, grant in grants.items()]
 
 
 def _policy(path: str, grant: Grant) -> EnclavePolicy:

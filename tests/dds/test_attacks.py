@@ -15,6 +15,8 @@ from pathlib import Path
 
 import pytest
 
+from keystore.provisioning import ProvisionOptions
+from keystore.renewal import RenewOptions, renew
 from keystore.revocation import remove
 from tests.dds import attacks, our_keystore, sros2_style
 from tests.dds.attacks import ENCLAVES, GRANTS, HONEST, REVOKED, VICTIM, Attempt, Workshop, borrowed_label
@@ -172,3 +174,19 @@ def test_nobody_without_credentials_is_heard(dds: Probe, ours: Workshop, domain_
     """A participant without any security may create what it likes, and reaches nobody."""
     outsider = Attempt("outsider", None, attacks.SECRET)
     assert outcome(dds, domain_id, ours, [outsider]) == Outcome({"outsider"}, set())
+
+
+def test_renewal_repairs_a_keystore_of_sros2(
+    dds: Probe, sros2: Workshop, domain_id: int, tmp_path: Path, patched_dds: Path
+) -> None:
+    """What was copied and forged before the renewal is worth nothing after it, and cannot be made anew."""
+    before = [*sros2.borrowed(), sros2.self_signed_permissions("/a"), sros2.self_signed_governance("/a")]
+    accepted = labels(before[-2:]) | (bag_matches() if dds.name == "Cyclone DDS" else set())
+    renew(sros2.keystore, options=RenewOptions(provisioning=ProvisionOptions(durable=False)))
+    assert outcome(dds, domain_id, sros2, before) == Outcome(accepted, set())
+
+    (tmp_path / "afterwards").mkdir()
+    renewed = Workshop(sros2.keystore, tmp_path / "afterwards")
+    after = [*renewed.borrowed(), renewed.self_signed_permissions("/a"), renewed.self_signed_governance("/a")]
+    assert outcome(dds, domain_id, renewed, after) == NOBODY
+    assert outcome(dds, domain_id, renewed, after[-2:], patched=patched_dds) == Outcome(labels(after[-2:]), set())

@@ -11,8 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch import ResolveOptions, SecurityOptions, resolve
+from enclave_launch import provision as provision_launch
 from keystore.domains import Domains
 from keystore.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore.provisioning import ProvisionOptions
 from tests.dds.demo import DEMO_WS, LAUNCH_FILES
 from tests.dds.our_keystore import PARAMETER_SERVICES, allow, node, provision
 from tests.dds.probe import Participant, Probe
@@ -164,16 +167,10 @@ LAUNCHES = {
 
 def test_launch_files_become_exactly_their_permissions(dds: Probe, domain_id: int, tmp_path: Path) -> None:
     """The whole flow, several launches into one keystore."""
-    import enclave_launch
-
-    for launch_file, expected in LAUNCHES.items():
-        plan = enclave_launch.resolve(
-            LAUNCH_FILES / f"{launch_file}.launch.xml",
-            options=enclave_launch.ResolveOptions(prefixes=(DEMO_WS,)),
-        )
-        launch = enclave_launch.provision(
-            plan, tmp_path / "ks", options=enclave_launch.SecurityOptions(domains=Domains.single(domain_id))
-        )
-        assert launch is not None and expected
+    security = SecurityOptions(keystore=ProvisionOptions(domains=Domains.single(domain_id), durable=False))
+    for name in LAUNCHES:
+        launch_file = LAUNCH_FILES / f"{name}.launch.xml"
+        plan = resolve(launch_file, options=ResolveOptions(prefixes=(DEMO_WS,), distro="humble"))
+        provision_launch(plan, tmp_path / "ks", options=security)
     together = {enclave: names for expected in LAUNCHES.values() for enclave, names in expected.items()}
     check(dds, domain_id, tmp_path / "ks", together)
