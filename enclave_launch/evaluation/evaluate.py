@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
 from enclave_launch.evaluation.environment import environment_untouched
 from enclave_launch.evaluation.host import Host, PlanHost, active_host
-from enclave_launch.evaluation.location import place_of
+from enclave_launch.evaluation.location import OUTSIDE, place_of
 from enclave_launch.process import Evaluation
 from enclave_launch.source_location import SourceLocation
 
@@ -156,9 +156,9 @@ def _location(error: Exception, path: str) -> SourceLocation:
     visited = place_of(error)
     exact = error_location.location_of(error) or _user_frame(error)
     if exact is None:
-        return visited or SourceLocation(path)
+        return visited if visited is not None and visited.file != OUTSIDE else SourceLocation(path)
     includes = visited.includes if visited is not None else ()
-    if visited is not None and visited.element == "include" and visited.file != exact.file:
+    if visited is not None and visited.element == "include" and visited.file not in (exact.file, OUTSIDE):
         includes = (*includes, str(visited))
     return SourceLocation(exact.file, exact.line, exact.element, includes)
 
@@ -168,12 +168,17 @@ def _user_frame(error: BaseException) -> SourceLocation | None:
     import sysconfig
     import traceback
 
-    ours = os.path.dirname(os.path.dirname(os.path.abspath(__file__)))
+    import enclave_launch
+    import keystore
+    import nodl
+
+    packages = (enclave_launch.__file__, nodl.__file__, keystore.__file__)
+    ours = tuple(os.path.dirname(os.path.abspath(file)) + os.sep for file in packages if file)
     library = sysconfig.get_paths()["stdlib"]
     found = None
     for frame, line in traceback.walk_tb(error.__traceback__):
         file = frame.f_code.co_filename
-        if not file.startswith((ours, library, "<")) or file.startswith(library + "/site-packages"):
+        if not file.startswith((*ours, library, "<")) or file.startswith(library + "/site-packages"):
             found = SourceLocation(file, line)
     return found
 

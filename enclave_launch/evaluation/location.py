@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
     from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
 
+OUTSIDE = "<launch>"
+"""The file of what no file contains: the description that stands for the command line."""
+
 _MARK = "_enclave_launch_place"
 
 
@@ -18,14 +21,16 @@ def location_of(entity: object, context: LaunchContext) -> SourceLocation:
     """The place of ``entity``; the file being evaluated when it is not known itself."""
     place: SourceLocation | None = getattr(entity, "source_location", None)
     if place is None:
-        file = context.open_files[-1][0] if context.open_files else "<launch>"
+        file = context.open_files[-1][0] if context.open_files else OUTSIDE
         return SourceLocation(file, 0, type(entity).__name__, context.includes)
     return SourceLocation(place.file, place.line, place.element, context.includes)
 
 
-def include_step(include: LaunchDescriptionEntity) -> str:
-    """The ``file:line`` of one include for the chain."""
-    return "command line" if include.source_location is None else str(include.source_location)
+def includes_below(include: LaunchDescriptionEntity, context: LaunchContext) -> tuple[str, ...]:
+    """The chain for what ``include`` brings in. The include that stands for the command line is no step of it."""
+    if include.source_location is None:
+        return context.includes
+    return (*context.includes, str(include.source_location))
 
 
 def annotate(error: BaseException, entity: object, context: LaunchContext) -> None:
@@ -38,7 +43,8 @@ def annotate(error: BaseException, entity: object, context: LaunchContext) -> No
     place = location_of(entity, context)
     inside = error_location.location_of(error)
     if inside is not None:
-        includes = (*context.includes, str(place)) if inside.file != place.file else context.includes
+        is_step = inside.file not in (place.file, OUTSIDE) and place.file != OUTSIDE
+        includes = (*context.includes, str(place)) if is_step else context.includes
         place = SourceLocation(inside.file, inside.line, inside.element, includes)
     setattr(error, _MARK, place)
 

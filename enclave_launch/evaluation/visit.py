@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.launch.actions.include_launch_description import IncludeLaunchDescription
 from enclave_launch.evaluation.include import OpenFile, opened
-from enclave_launch.evaluation.location import annotate, include_step
+from enclave_launch.evaluation.location import annotate, includes_below
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
@@ -52,5 +52,5 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
 
 def _surroundings_below(entity: LaunchDescriptionEntity, context: LaunchContext) -> Surroundings:
     if isinstance(entity, IncludeLaunchDescription):
-        return (*context.includes, include_step(entity)), opened(entity, context)
+        return includes_below(entity, context), opened(entity, context)
     return context.includes, context.open_files
