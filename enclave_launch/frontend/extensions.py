@@ -20,7 +20,7 @@ OUR_PACKAGES = {
     ),
 }
 EXTENSION_GROUP = "launch.frontend.launch_extension"
-OUR_EXTENSIONS = frozenset({"launch_ros"})
+OUR_EXTENSIONS = frozenset({"launch_ros", "enclave_launch"})  # the second teaches upstream what we know
 
 _entry_points_loaded = False
 

@@ -15,7 +15,9 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_ros.actions.node import Node
 
 _GROUP = "launch_ros.node_action"
-_REPLACED = frozenset({"ros2launch_security"})  # its enclave per node is what --enclave-scope node gives
+# Extensions for upstream's engine that have no part in ours: our own, and ros2launch_security, whose enclave per
+# node is what --enclave-scope node gives.
+_REPLACED = ("enclave_launch.", "ros2launch_security.")
 
 
 class NodeActionExtension:
@@ -45,7 +47,7 @@ def installed_extensions() -> tuple[NodeActionExtension, ...]:
     import importlib.metadata
 
     found = importlib.metadata.entry_points(group=_GROUP)
-    loaded = [_instantiate(entry) for entry in found if entry.name not in _REPLACED]
+    loaded = [_instantiate(entry) for entry in found if not entry.value.startswith(_REPLACED)]
     return tuple(extension for extension in loaded if extension is not None)
 
 
