@@ -88,13 +88,18 @@ def _identity(interface: NodeInterface) -> list[str]:
     if interface.executable != interface.name:
         fields |= {"executable": interface.executable or "", "plugin": interface.plugin or ""}
         fields["node"] = interface.name or ""
-    fields["namespace"] = interface.namespace or ""
+    fields["namespace"] = _own_namespace(interface)
     if interface.library is not ClientLibrary.UNKNOWN:
         fields["library"] = interface.library.value
     given = [f"{key}: {_scalar(value)}" for key, value in fields.items() if value]
     if interface.lifecycle:
         given.append("lifecycle: true")
     return ["codegen:", f"  {IDENTITY_KEY}: {{{', '.join(given)}}}"] if given else []
+
+
+def _own_namespace(interface: NodeInterface) -> str:
+    """The namespace if it says more than "the root, as everyone's"."""
+    return "" if interface.namespace in (None, "/") else str(interface.namespace)
 
 
 def _v2_type(node: ManifestNode, written: str) -> str:
@@ -134,7 +139,8 @@ def _v1_node(node: ManifestNode) -> list[str]:
         raise InvalidNoDLDocumentError.at(
             interface.source, f"v1 needs a node name; add codegen: {{{IDENTITY_KEY}: {{node: NAME}}}}"
         )
-    name = f"{(interface.namespace or '').rstrip('/')}/{interface.name}" if interface.namespace else interface.name
+    namespace = _own_namespace(interface)
+    name = f"{namespace}/{interface.name}" if namespace else interface.name
     children = [*_v1_interfaces(interface.endpoints)]
     children += [f'    <parameter name="{escape(n)}" type="{escape(t)}"/>' for n, t in node.parameter_types.items()]
     if not children:
