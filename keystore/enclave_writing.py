@@ -52,15 +52,13 @@ class EnclaveWriter:
     @cached_property
     def _validity(self) -> Validity:
         """Of new certificates; permissions take over what their certificate got."""
+        cas = [self._view.ca(role).validity for role in Role]
+        if not all(ca.covers(self._now) for ca in cas):
+            raise DamagedKeystore("a CA of this keystore is expired: secure-keystore renew KEYSTORE --ca start")
         options = self._options
         lifetime = options.lifetime or self._view.settings.lifetime
         asked = Validity.starting(self._now, lifetime, until=options.valid_until, backdate=options.backdate)
-        validity = asked.within(self._identity_ca.validity).within(self._view.ca(Role.PERMISSIONS).validity)
-        if not validity.covers(self._now):
-            raise DamagedKeystore(
-                "a CA of this keystore is expired: secure-keystore renew KEYSTORE --ca start"
-            )
-        return validity
+        return asked.within(cas[0]).within(cas[1])
 
     @property
     def _scheme(self) -> SubjectScheme:

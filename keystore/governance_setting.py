@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from keystore import layout, lock, store
 from keystore.authority import Role
+from keystore.copies import refresh_copies
 from keystore.creation import write_governance
-from keystore.enclaves import keep
 from keystore.governance import Governance, governance_document
 from keystore.governance_file import governance_stands, signed_governance
-from keystore.provisioning import ProvisionOptions, Wish, bring_about
 from keystore.signer import CaAccess
 from keystore.validity import utc_now
 from keystore.view import KeystoreView, resolve_root
@@ -44,9 +43,5 @@ def set_governance(
         changed = not (same and governance_stands(view, None))
         if changed:
             write_governance(opened, document, view.authority(Role.PERMISSIONS, chosen.access), utc_now())
-    provisioning = ProvisionOptions(
-        domains=governance.domains(), create=False, access=chosen.access, lock_timeout=chosen.lock_timeout
-    )
-    wishes = {name: Wish(keep) for name in KeystoreView(root).enclaves()}
-    bring_about(root, wishes, replace(provisioning, durable=chosen.durable))
+        refresh_copies(opened)
     return changed

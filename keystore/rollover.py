@@ -22,6 +22,7 @@ from pathlib import Path
 
 from keystore import authority, layout, safe_files, store
 from keystore.authority import Authority, Role, pem_certificate
+from keystore.copies import refresh_copies
 from keystore.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
 from keystore.enclaves import keep
 from keystore.errors import InvalidInput
@@ -58,6 +59,9 @@ def roll_over(
     with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         install_incoming(opened)
         done = [_STEPS[step](opened, role, chosen, now, encrypt) for role in roles]
+        refresh_copies(opened)
+    if step is not Step.SWITCH:
+        return ProvisionReport(root, tuple(text for text in done if text), ())
     wishes = {name: Wish(keep) for name in KeystoreView(root).enclaves()}
     report = bring_about(root, wishes, with_domains(root, chosen))
     return replace(report, created=(*(text for text in done if text), *report.created))

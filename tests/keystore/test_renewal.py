@@ -1,0 +1,213 @@
+"""Time passes, SROS2 keystores are repaired, CAs are replaced."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from keystore import layout
+from keystore.authority import Role, read_certificates
+from keystore.creation import CreateOptions
+from keystore.enclaves import create_enclave, list_enclaves
+from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.expiry import expires_soon, status
+from keystore.permissions_read import parse_permissions
+from keystore.provisioning import provision
+from keystore.renewal import RenewOptions, renew
+from keystore.revocation import RemoveOptions, remove
+from keystore.rollover import Step, roll_over
+from keystore.trusted_documents import trusted_document
+from keystore.verification import Severity, verify
+from keystore.view import KeystoreView
+from tests.dds import sros2_style
+from tests.keystore.kit import ARTICLE, DAY, NOW, actions, contents, filled, mode, openssl, options, policy, snapshot
+
+
+def codes(root: Path, **more: object) -> set[str]:
+    return {finding.code for finding in verify(root, **more).findings if finding.severity.fails}  # type: ignore[arg-type]
+
+
+def renewing(**changes: object) -> RenewOptions:
+    own = {name: changes.pop(name) for name in ("within", "everything", "new_keys") if name in changes}
+    return RenewOptions(provisioning=options(**changes), **own)  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def sros2(tmp_path: Path) -> Path:
+    """A keystore as SROS2 writes it: one CA, CN=/path, no key usage, keys readable by all."""
+    grants = {name: sros2_style.Grant(publish=("/chatter",)) for name in ARTICLE}
+    sros2_style.create(tmp_path / "sros2", 0, grants)
+    return tmp_path / "sros2"
+
+
+def granted(root: Path, name: str) -> set[str]:
+    document = trusted_document(KeystoreView(root), f"{layout.enclave_directory(name)}/permissions.p7s")
+    (grant,) = parse_permissions(document)
+    return {topic for rule in grant.rules for topic in rule.publish}
+
+
+def test_an_sros2_keystore_is_reported_as_exposed(sros2: Path) -> None:
+    assert list_enclaves(sros2) == sorted(ARTICLE)
+    found = verify(sros2).findings
+    exposed = {finding.code for finding in found if finding.severity is Severity.EXPOSURE}
+    assert exposed == {"shared-ca", "leaf-can-sign", "borrowed-permissions"}
+    assert all(finding.repair for finding in found if finding.severity.fails)
+
+
+def test_an_sros2_keystore_is_extended_in_place(sros2: Path) -> None:
+    before = contents(sros2)
+    provision(sros2, [policy("/new")], options=options())
+    after = contents(sros2)
+    assert {name for name in after if before.get(name) != after[name]} == {
+        f"enclaves/new/{name}" for name in layout.ENCLAVE_FILES - {"crl.pem"}
+    }
+    directory = sros2 / "enclaves/new"
+    openssl("verify", "-CAfile", directory / "identity_ca.cert.pem", directory / "cert.pem")
+    assert "leaf-can-sign" not in {f.code for f in verify(sros2).findings if "enclaves/new" in f.place}
+
+
+def test_renew_repairs_an_sros2_keystore(sros2: Path) -> None:
+    keys = {name: (sros2 / layout.enclave_directory(name) / "key.pem").read_bytes() for name in ARTICLE}
+    grants = {name: granted(sros2, name) for name in ARTICLE}
+    renew(sros2, options=renewing())
+    assert codes(sros2) == set()
+    assert not KeystoreView(sros2).shares_one_ca
+    assert mode(sros2 / "private") == 0o700
+    for name in ARTICLE:
+        key = sros2 / layout.enclave_directory(name) / "key.pem"
+        assert key.read_bytes() == keys[name] and mode(key) == 0o600
+        assert granted(sros2, name) == grants[name]
+    before = snapshot(sros2)
+    assert not renew(sros2, options=renewing()).changed
+    assert snapshot(sros2) == before
+
+
+def test_what_an_enclave_of_the_old_keystore_signed_is_not_taken_over(sros2: Path) -> None:
+    """Before the repair anybody with an enclave's key could sign; renew signs only what the CA had signed."""
+    attacker = sros2_style.Credential.read(sros2 / "enclaves/a")
+    document = (sros2 / "enclaves/a/permissions.xml").read_text().replace("rt/chatter", "*")
+    (sros2 / "enclaves/a/permissions.p7s").write_bytes(attacker.sign(document))
+    (sros2 / "enclaves/a/permissions.xml").write_text(document)
+    with pytest.raises(DamagedKeystore, match="not the permissions CA"):
+        renew(sros2, options=renewing())
+
+
+def test_only_what_is_due_is_renewed(tmp_path: Path) -> None:
+    root = filled(tmp_path / "ks", ["/soon"], now=NOW, lifetime=20 * DAY)
+    filled(root, ["/late"], now=NOW, lifetime=300 * DAY)
+    report = renew(root, options=renewing(now=NOW, lifetime=100 * DAY))
+    assert actions(report) == {"/soon": ("certificate", "permissions")}
+    assert not expires_soon(root, 30 * DAY, now=NOW)
+
+
+def test_named_enclaves_are_renewed_in_any_case(tmp_path: Path) -> None:
+    root = filled(tmp_path / "ks", ["/a", "/b"])
+    key = (root / "enclaves/a/key.pem").read_bytes()
+    report = renew(root, ["/a"], options=renewing())
+    assert actions(report) == {"/a": ("certificate", "permissions")}
+    assert (root / "enclaves/a/key.pem").read_bytes() == key
+    report = renew(root, ["/a"], options=renewing(new_keys=True))
+    assert actions(report) == {"/a": ("key and certificate", "permissions")}
+    assert (root / "enclaves/a/key.pem").read_bytes() != key
+    assert granted(root, "/a") == {"rt/chatter", "ros_discovery_info"}
+    assert codes(root) == set()
+    with pytest.raises(InvalidInput, match="no enclave /c"):
+        renew(root, ["/c"], options=renewing())
+
+
+def test_renewed_permissions_are_those_a_launch_expects(tmp_path: Path) -> None:
+    """Re-dated documents are byte for byte what provision would sign: the next launch changes nothing."""
+    root = filled(tmp_path / "ks", ["/a"])
+    renew(root, ["/a"], options=renewing())
+    assert not provision(root, [policy("/a")], options=options()).changed
+
+
+def test_status_lists_the_earliest_first(tmp_path: Path) -> None:
+    creation = CreateOptions(ca_lifetime=200 * DAY)
+    root = filled(tmp_path / "ks", ["/a"], now=NOW, lifetime=50 * DAY, creation=creation)
+    report = status(root, now=NOW)
+    assert [(one.subject, (one.not_after - NOW).days) for one in report.expiries] == [
+        ("certificate of /a", 50), ("permissions of /a", 50), ("identity CA", 200), ("permissions CA", 200),
+    ]  # fmt: skip
+    assert [one.subject for one in report.due(60 * DAY)] == ["certificate of /a", "permissions of /a"]
+    assert status(root, now=NOW + 60 * DAY).due(0 * DAY)[0].is_valid(NOW + 60 * DAY) is False
+
+
+def test_an_expired_ca_is_said_and_rolled_over(tmp_path: Path) -> None:
+    creation = CreateOptions(ca_lifetime=50 * DAY)
+    root = filled(tmp_path / "ks", ["/a"], now=NOW, creation=creation)
+    late = NOW + 60 * DAY
+    with pytest.raises(DamagedKeystore, match="renew KEYSTORE --ca start"):
+        renew(root, options=renewing(now=late))
+    for step in Step:
+        roll_over(root, step, options=options(now=late))
+    assert codes(root, now=late) == set()
+
+
+def bundle(root: Path, role: Role) -> list[bytes]:
+    return [facts.der for facts in read_certificates((root / layout.ca_cert(role)).read_bytes(), "")]
+
+
+@pytest.mark.parametrize("roles", [tuple(Role), (Role.IDENTITY,), (Role.PERMISSIONS,)])
+def test_roll_over_step_by_step(tmp_path: Path, roles: tuple[Role, ...]) -> None:
+    root = filled(tmp_path / "ks", ARTICLE)
+    keys = {name: (root / layout.enclave_directory(name) / "key.pem").read_bytes() for name in ARTICLE}
+    old = {role: bundle(root, role)[0] for role in Role}
+
+    roll_over(root, Step.START, roles, options=options())
+    for role in roles:
+        first, second = bundle(root, role)
+        assert first == old[role] != second, "Cyclone DDS, which reads one certificate, sees no change yet"
+    assert codes(root) == set()
+
+    roll_over(root, Step.SWITCH, roles, options=options())
+    for role in roles:
+        first, second = bundle(root, role)
+        assert first != old[role] == second
+    assert codes(root) == set()
+
+    roll_over(root, Step.FINISH, roles, options=options())
+    for role in Role:
+        (only,) = bundle(root, role)
+        assert (only != old[role]) is (role in roles)
+    assert codes(root) == set()
+    for name in ARTICLE:
+        assert (root / layout.enclave_directory(name) / "key.pem").read_bytes() == keys[name]
+        assert granted(root, name) == {"rt/chatter", "ros_discovery_info"}
+
+
+@pytest.mark.parametrize("step", Step)
+def test_each_step_can_be_repeated(tmp_path: Path, step: Step) -> None:
+    root = filled(tmp_path / "ks", ["/a"])
+    for earlier in list(Step)[: list(Step).index(step) + 1]:
+        roll_over(root, earlier, options=options())
+    before = snapshot(root)
+    roll_over(root, step, options=options())
+    assert snapshot(root) == before
+
+
+def test_steps_out_of_order_are_refused(tmp_path: Path) -> None:
+    root = filled(tmp_path / "ks", ["/a"])
+    with pytest.raises(InvalidInput, match="first --ca start"):
+        roll_over(root, Step.SWITCH, options=options())
+    roll_over(root, Step.START, options=options())
+    with pytest.raises(InvalidInput, match="first --ca switch"):
+        roll_over(root, Step.FINISH, options=options())
+
+
+def test_revocations_skip_the_overlap(tmp_path: Path) -> None:
+    """A CRL names one CA: with two trusted the old one's revocations would be forgotten."""
+    root = filled(tmp_path / "ks", ["/a", "/b"])
+    remove(root, ["/b"], options=RemoveOptions(durable=False))
+    roll_over(root, Step.START, options=options())
+    roll_over(root, Step.SWITCH, options=options())
+    assert len(bundle(root, Role.IDENTITY)) == 1
+    assert not (root / "public/crl.pem").exists() and not (root / "enclaves/a/crl.pem").is_symlink()
+    assert codes(root) == set()
+
+
+def test_a_repaired_keystore_keeps_working_with_new_enclaves(sros2: Path) -> None:
+    renew(sros2, options=renewing())
+    create_enclave(sros2, "/z", options=options())
+    assert codes(sros2) == set()

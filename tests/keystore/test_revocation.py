@@ -1,0 +1,122 @@
+"""Enclaves taken out: revoked for everybody, deleted here, nothing else touched."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+
+from keystore import layout
+from keystore.bundle import export
+from keystore.certificate import read_pem
+from keystore.enclaves import list_enclaves
+from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.expiry import status
+from keystore.provisioning import provision
+from keystore.renewal import RenewOptions, renew
+from keystore.revocation import RemoveOptions, remove
+from keystore.verification import verify
+from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot
+
+NAMES = ("/", "/a", "/a/b", "/c")
+
+
+def codes(root: Path, **more: object) -> set[str]:
+    return {finding.code for finding in verify(root, **more).findings if finding.severity.fails}  # type: ignore[arg-type]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    return filled(tmp_path / "ks", NAMES)
+
+
+def quick(**changes: object) -> RemoveOptions:
+    return RemoveOptions(**{"durable": False, **changes})  # type: ignore[arg-type]
+
+
+def crl(root: Path) -> x509.CertificateRevocationList:
+    return x509.load_pem_x509_crl((root / "public/crl.pem").read_bytes())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_enclave_is_gone_and_those_around_it_stay(root: Path, name: str) -> None:
+    serial = read_pem((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
+    report = remove(root, [name], options=quick())
+    assert report.removed == (name,) and report.revoked == 1
+    assert list_enclaves(root) == [other for other in NAMES if other != name]
+    assert crl(root).get_revoked_certificate_by_serial_number(serial) is not None
+    assert codes(root) == set()
+
+
+def test_there_is_no_crl_before_the_first_revocation(root: Path) -> None:
+    assert not list(root.rglob("crl.pem"))
+
+
+def test_every_remaining_enclave_gets_the_crl(root: Path) -> None:
+    remove(root, ["/c"], options=quick())
+    for name in ("/", "/a", "/a/b"):
+        link = root / layout.enclave_directory(name) / "crl.pem"
+        assert link.is_symlink() and link.resolve() == (root / "public/crl.pem").resolve()
+    provision(root, [policy("/new")], options=options())
+    assert (root / "enclaves/new/crl.pem").is_symlink()
+
+
+def test_openssl_refuses_the_removed_one(root: Path, tmp_path: Path) -> None:
+    shutil.copy(root / "enclaves/c/cert.pem", tmp_path / "stolen.pem")
+    remove(root, ["/c"], options=quick())
+    ca = root / "public/identity_ca.cert.pem"
+    check = ("verify", "-crl_check", "-CAfile", ca, "-CRLfile", root / "public/crl.pem")
+    openssl(*check, root / "enclaves/a/cert.pem")
+    with pytest.raises(AssertionError, match="certificate revoked"):
+        openssl(*check, tmp_path / "stolen.pem")
+
+
+def test_revocations_add_up(root: Path) -> None:
+    remove(root, ["/c"], options=quick(now=NOW))
+    assert remove(root, ["/a", "/a/b"], options=quick(now=NOW + DAY)).revoked == 3
+    assert len(crl(root)) == 3
+    assert list_enclaves(root) == ["/"]
+    assert not (root / "enclaves/a").exists(), "empty directories go too"
+
+
+def test_a_restored_backup_of_a_revoked_enclave_is_found_and_not_exported(root: Path, tmp_path: Path) -> None:
+    shutil.copytree(root / "enclaves/c", tmp_path / "backup", symlinks=True)
+    remove(root, ["/c"], options=quick())
+    shutil.copytree(tmp_path / "backup", root / "enclaves/c", symlinks=True)
+    assert "revoked" in codes(root)
+    with pytest.raises(DamagedKeystore, match="/c is revoked"):
+        export(root, tmp_path / "out", ["/c"])
+
+
+def test_only_deleting(root: Path) -> None:
+    report = remove(root, ["/c"], options=quick(revoke=False))
+    assert report.revoked == 0 and not (root / "public/crl.pem").exists()
+
+
+def test_an_unknown_enclave_changes_nothing(root: Path) -> None:
+    before = snapshot(root)
+    with pytest.raises(InvalidInput, match="no enclave /nowhere"):
+        remove(root, ["/a", "/nowhere"], options=quick())
+    assert snapshot(root) == before
+
+
+def test_the_crl_is_renewed_before_it_ends(tmp_path: Path) -> None:
+    root = filled(tmp_path / "ks", ["/a", "/b"], now=NOW)
+    remove(root, ["/b"], options=quick(now=NOW))
+    late = NOW + 350 * DAY
+    assert "CRL" in [one.what for one in status(root, now=late).due(30 * DAY)]
+    assert "crl-expired" in codes(root, now=NOW + 400 * DAY)
+    renew(root, options=RenewOptions(provisioning=options(now=late)))
+    assert len(crl(root)) == 1 and crl(root).next_update_utc == late + 365 * DAY
+    assert codes(root, now=NOW + 400 * DAY) == set()
+
+
+def test_a_forged_crl_is_not_trusted(root: Path, tmp_path: Path) -> None:
+    other = filled(tmp_path / "other", ["/x"])
+    remove(other, ["/x"], options=quick())
+    shutil.copy(other / "public/crl.pem", root / "public/crl.pem")
+    assert "crl" in codes(root)
+    with pytest.raises(DamagedKeystore, match="not signed by the identity CA"):
+        remove(root, ["/a"], options=quick())
