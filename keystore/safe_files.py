@@ -134,7 +134,10 @@ def private_problem(path: Path | str, info: os.stat_result) -> str | None:
 
 def refuse_unsafe_directory(path: Path) -> None:
     """A directory we are about to write in: a real one, ours, and not open to everybody."""
-    info = os.lstat(path)
+    try:
+        info = os.lstat(path)
+    except OSError as error:
+        raise StorageError.of(error, "looking at the directory") from None
     quoted = shlex.quote(str(path))
     if stat.S_ISLNK(info.st_mode) or not stat.S_ISDIR(info.st_mode):
         raise UnsafeKeystore(f"{printable(path)} is not a directory (a link?); remove it: rm {quoted}")

@@ -121,9 +121,9 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
         security = SecuritySettings(keystore, options.strategy) if keystore else None
         return plan_json(plan, security) + "\n"
     if options.format == "policy":
-        from keystore.policy_xml import write_policy
+        from keystore.policy_xml import policy_xml
 
-        return write_policy(plan.derived.policy).decode()
+        return policy_xml(plan.derived.policy).decode()
     from enclave_launch.report.tree import plan_tree
 
     return plan_tree(plan)

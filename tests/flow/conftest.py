@@ -1,0 +1,43 @@
+"""What the tests of the whole flow share: the demo workspace and ``secure-launch`` as a user calls it."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
+
+SecureLaunch = Callable[..., "subprocess.CompletedProcess[str]"]
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Callable[..., Path]:
+    """``write(text)`` keeps the content of a ``<launch>`` element as a launch file; other names as they are."""
+
+    def write_file(text: str, name: str = "test.launch.xml") -> Path:
+        path = tmp_path / name
+        path.write_text(f"<launch>\n{text}\n</launch>\n" if name.endswith(".launch.xml") else text)
+        return path
+
+    return write_file
+
+
+@pytest.fixture
+def secure_launch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SecureLaunch:
+    """Run the command in a directory and home of its own, with the demo workspace as the only prefix."""
+    for name in ("ROS_SECURITY_KEYSTORE", "ROS_SECURITY_ENABLE", "AMENT_PREFIX_PATH", "ROS_DISTRO", "ROS_DOMAIN_ID"):
+        monkeypatch.delenv(name, raising=False)
+    home = tmp_path / "home"
+    home.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+
+    def run(*words: object, **options: object) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "enclave_launch", "--prefix", str(DEMO), *map(str, words)]
+        return subprocess.run(command, capture_output=True, text=True, cwd=home, timeout=60, check=False)
+
+    return run

@@ -1,0 +1,193 @@
+"""``secure-launch`` as a user meets it: what it prints, what it refuses, what it leaves behind."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.report.contract import DryRun
+
+from .conftest import DEMO, SecureLaunch
+
+Write = Callable[..., Path]
+
+TALKER = '<node pkg="demo_nodes" exec="talker"/>'
+
+
+def files_below(folder: Path) -> set[str]:
+    return {os.path.relpath(os.path.join(base, name), folder) for base, _, names in os.walk(folder) for name in names}
+
+
+# --- the dry run -----------------------------------------------------------------------------------------------
+
+
+def test_a_dry_run_prints_the_tree_and_writes_nothing_anywhere(secure_launch: SecureLaunch, tmp_path: Path) -> None:
+    before = files_below(tmp_path), files_below(DEMO)
+    run = secure_launch("--dry-run", "--secure", "--keystore", tmp_path / "ks", "demo_nodes", "talker_listener.launch.xml")
+    assert run.returncode == 0
+    assert "enclave /  (shared by 2 processes)" in run.stdout
+    assert "[talker-1] demo_nodes/talker as /talker" in run.stdout
+    assert "publish: /chatter" in run.stdout
+    assert (files_below(tmp_path), files_below(DEMO)) == before
+
+
+def test_the_json_is_what_the_contract_says(secure_launch: SecureLaunch) -> None:
+    run = secure_launch("--dry-run", "--format", "json", "demo_nodes", "talker_listener_namespace.launch.xml", "count:=3")
+    document = DryRun.model_validate_json(run.stdout)
+    talker, listener = document.processes
+    assert (talker.fqn, talker.enclave, listener.enclave) == ("/robot1/talker", "/robot1", "/robot1")
+    assert talker.cmd[:4] == [f"{DEMO}/lib/demo_nodes/talker", "--ros-args", "-r", "__ns:=/robot1"]
+    assert "--enclave" not in talker.cmd
+    assert listener.parameters == {"count": 3, "seconds": 20}
+    assert (Path(talker.launch_file).name, talker.on_event) == ("talker_listener_namespace.launch.xml", None)
+    enclave = document.enclaves["/robot1"]
+    assert enclave.nodes == ["/robot1/listener", "/robot1/talker"]
+    assert "/robot1/chatter" in enclave.publish and "/robot1/chatter" in enclave.subscribe
+    assert "/rosout" in enclave.publish and "/robot1/talker/get_parameters" in enclave.serve_services
+    assert document.warnings == []
+
+
+def test_under_secure_the_json_shows_the_enclave_and_its_variables(secure_launch: SecureLaunch, tmp_path: Path) -> None:
+    words = ("--dry-run", "--secure", "--keystore", tmp_path / "ks", "--format", "json")
+    run = secure_launch(*words, "demo_nodes", "talker_listener_namespace.launch.xml")
+    process = DryRun.model_validate_json(run.stdout).processes[0]
+    assert process.cmd[-2:] == ["--enclave", "/robot1"]
+    assert process.environment == {
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_KEYSTORE": str(tmp_path / "ks"),
+        "ROS_SECURITY_STRATEGY": "Enforce",
+    }
+
+
+def test_the_three_front_ends_give_the_same_plan(secure_launch: SecureLaunch) -> None:
+    plans = []
+    for kind in ("xml", "yaml", "py"):
+        run = secure_launch("--dry-run", "--format", "json", "demo_nodes", f"talker_listener.launch.{kind}")
+        document = DryRun.model_validate_json(run.stdout)
+        plans.append([(p.fqn, p.cmd[0], p.parameters, p.enclave) for p in document.processes])
+    assert plans[0] == plans[1] == plans[2]
+
+
+def test_an_executable_is_no_node(secure_launch: SecureLaunch, write: Write) -> None:
+    file = write('<executable cmd="echo hello"/>\n<executable cmd="ls -l" enclave="/files"/>')
+    run = secure_launch("--dry-run", "--format", "json", file)
+    echo, ls = DryRun.model_validate_json(run.stdout).processes
+    assert (echo.package, echo.executable, echo.fqn, echo.enclave) == (None, "echo", None, None)
+    assert (ls.executable, ls.enclave) == ("ls", "/files")
+
+
+def test_a_node_without_a_manifest_is_a_warning_in_a_dry_run(secure_launch: SecureLaunch, write: Write) -> None:
+    run = secure_launch("--dry-run", "--missing-nodl", "error", write(TALKER + '<node pkg="demo_nodes" exec="unknown_node"/>'))
+    assert run.returncode == 1  # the executable itself is missing, which launch would notice when it starts it
+    assert "unknown_node" in run.stderr
+
+
+def test_explain_names_manifest_and_remap_rule(secure_launch: SecureLaunch) -> None:
+    run = secure_launch("--explain", "/conversation", "demo_nodes", "talker_listener_remap.launch.xml")
+    assert "demo_nodes.nodl.xml:" in run.stdout
+    assert "remapped by chatter:=/conversation at " in run.stdout
+
+
+def test_the_derived_policy_can_be_committed_and_read_again(
+    secure_launch: SecureLaunch, tmp_path: Path
+) -> None:
+    words = ("--dry-run", "--format", "policy", "demo_nodes", "talker_listener.launch.xml")
+    first, second = secure_launch(*words), secure_launch(*words)
+    assert first.stdout == second.stdout and first.stdout.startswith("<?xml")
+    (tmp_path / "policy.xml").write_text(first.stdout)
+    merged = secure_launch("--policy", tmp_path / "policy.xml", *words)
+    assert merged.stdout == first.stdout
+
+
+def test_show_args_and_help_tell_a_person_what_to_do(secure_launch: SecureLaunch) -> None:
+    shown = secure_launch("-s", "demo_nodes", "talker_listener.launch.xml")
+    assert "'count':" in shown.stdout and "(default: '5')" in shown.stdout
+    assert "--secure --keystore ks demo_nodes" in secure_launch("--help").stdout
+    assert secure_launch("--version").stdout.startswith("secure-launch ")
+
+
+# --- refusals: one clear message, exit status not 0, nothing started, nothing written ------------------------------
+
+BAD_FILES = {
+    "an unknown package": ('<node pkg="nosuch_package" exec="e"/>', ":2: <node>", "'nosuch_package' not found"),
+    "an unknown executable": ('<node pkg="demo_nodes" exec="nosuch"/>', ":2: <node>", "'nosuch' not found"),
+    "malformed XML": ('<node pkg="a"', ":3:", "not well-formed"),
+    "an unknown attribute": ('<node pkg="demo_nodes" exec="talker" foo="1"/>', ":2: <node>", "{'foo'}"),
+    "an unknown element": ('<nodes pkg="a" exec="b"/>', ":2: <nodes>", "Unrecognized entity of the type: nodes"),
+    "a missing required argument": (f'<arg name="robot"/>{TALKER}', "test.launch.xml", "required argument 'robot'"),
+    "an invalid node name": ('<node pkg="demo_nodes" exec="talker" name="a-b"/>', ":2: <node>", "Invalid node name"),
+    "an invalid namespace": ('<node pkg="demo_nodes" exec="talker" namespace="a b"/>', ":2: <node>", "namespace"),
+    "an invalid enclave": ('<node pkg="demo_nodes" exec="talker" enclave="../x"/>', ":2: <node>", "'/../x'"),
+    "an undefined variable": ('<node pkg="demo_nodes" exec="$(var x)"/>', ":2: <node>", "'x' does not exist"),
+    "a remap rule rcl refuses": (
+        '<node pkg="demo_nodes" exec="talker"><remap from="a b" to="c"/></node>', "test.launch.xml:2", "invalid remap rule",
+    ),
+    "a later broken element": (f'{TALKER}\n<node pkg="nosuch_package" exec="e"/>', ":3: <node>", "not found"),
+    "a file that includes itself": ('<include file="$(dirname)/test.launch.xml"/>', ":2: <include>", "include each other without end"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_FILES)
+def test_a_bad_launch_file_is_refused(
+    case: str, secure_launch: SecureLaunch, write: Write, tmp_path: Path
+) -> None:
+    text, place, message = BAD_FILES[case]
+    run = secure_launch("--secure", "--keystore", tmp_path / "ks", write(text))
+    assert run.returncode == 1
+    assert run.stderr.startswith("secure-launch: error: ") and "Traceback" not in run.stderr
+    assert place in run.stderr and message in run.stderr
+    assert run.stdout == "" and not (tmp_path / "ks").exists()
+
+
+def test_an_error_in_an_included_file_shows_the_way_there(secure_launch: SecureLaunch, write: Write) -> None:
+    write('<node pkg="demo_nodes" exec="talker" foo="1"/>', "inner.launch.xml")
+    run = secure_launch("--dry-run", write('<include file="$(dirname)/inner.launch.xml"/>'))
+    assert "inner.launch.xml:2: <node>" in run.stderr
+    assert run.stderr.rstrip().endswith("test.launch.xml:2")
+
+
+BAD_WORDS = {
+    "--secure without a keystore": (["--secure"], 2, "give --keystore DIR or set ROS_SECURITY_KEYSTORE"),
+    "a keystore that must exist": (["--secure", "--keystore", "{tmp}/ks", "--no-create-keystore"], 1, "secure-keystore create"),
+    "a directory that is no keystore": (["--secure", "--keystore", "{tmp}/other"], 1, "is no keystore"),
+    "a keystore below a file": (["--secure", "--keystore", "{tmp}/other/file/ks"], 1, "ks"),
+    "a bad domain": (["--secure", "--keystore", "{tmp}/ks", "--domain-id", "7;8"], 2, "domain ids"),
+    "a bad duration": (["--secure", "--keystore", "{tmp}/ks", "--valid-for", "soon"], 2, "soon"),
+    "a policy that is not there": (["--dry-run", "--policy", "{tmp}/nosuch.xml"], 2, "nosuch.xml"),
+    "a manifest that is not there": (["--dry-run", "--nodl", "{tmp}/nosuch.nodl.xml"], 1, "nosuch.nodl.xml"),
+    "an unknown subject to explain": (["--explain", "/nosuch"], 2, "'/nosuch' is no enclave"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", BAD_WORDS)
+def test_bad_options_are_refused(case: str, secure_launch: SecureLaunch, tmp_path: Path) -> None:
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "file").write_text("something else")
+    words, status, message = BAD_WORDS[case]
+    run = secure_launch(*(word.format(tmp=tmp_path) for word in words), "demo_nodes", "talker_listener.launch.xml")
+    assert run.returncode == status
+    assert message in run.stderr and "Traceback" not in run.stderr
+    assert run.stdout == "" and not (tmp_path / "ks").exists()
+    assert files_below(tmp_path / "other") == {"file"}
+
+
+def test_secure_refuses_to_start_anything_when_one_node_has_no_manifest(
+    secure_launch: SecureLaunch, write: Write, tmp_path: Path
+) -> None:
+    (prefix := tmp_path / "prefix" / "lib" / "bare").mkdir(parents=True)
+    marker = tmp_path / "prefix" / "share" / "ament_index" / "resource_index" / "packages" / "bare"
+    marker.parent.mkdir(parents=True)
+    marker.touch()
+    (prefix / "compiled").write_bytes(b"\x7fELF")
+    (prefix / "compiled").chmod(0o755)
+    file = write(f'{TALKER}\n<node pkg="bare" exec="compiled"/>')
+    words = ("--prefix", tmp_path / "prefix", file)
+    looked = secure_launch("--dry-run", *words)
+    assert looked.returncode == 0 and "no NoDL manifest for bare/compiled" in looked.stdout
+    refused = secure_launch("--secure", "--keystore", tmp_path / "ks", *words)
+    assert refused.returncode == 1
+    assert f"{file}:3: no NoDL manifest for bare/compiled: looked at " in refused.stderr
+    assert "process started" not in refused.stdout and not (tmp_path / "ks").exists()
