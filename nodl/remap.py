@@ -184,6 +184,19 @@ class ActionParts:
     services: dict[str, Resolved]
     topics: dict[str, Resolved]
 
+    @property
+    def rules(self) -> tuple[ParsedRule, ...]:
+        """The rules of all parts, services first."""
+        return tuple(rule for part in (*self.services.values(), *self.topics.values()) for rule in part.rules)
+
+    @property
+    def moved_together(self) -> str | None:
+        """The name of the action that all five parts now belong to; ``None`` if they went apart."""
+        found = {**self.services, **self.topics}
+        action = self.services["send_goal"].name.removesuffix("/_action/send_goal")
+        together = all(resolved.name == f"{action}/_action/{part}" for part, resolved in found.items())
+        return action if together else None
+
 
 def parse_rule(text: str, origin: str = "") -> ParsedRule:
     """One rule as it follows ``-r``. Raises ``InvalidRemapRuleError`` for what rcl's lexer refuses."""

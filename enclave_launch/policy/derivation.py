@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 from enclave_launch.policy.node_permissions import NodePermissions, Permission, Reason, node_permissions
-from enclave_launch.policy.policy_file import merge_policy_file
 from enclave_launch.policy.running_node import RunningNode
 from keystore.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
-from keystore.policy_xml import PolicyDocument
+
+if TYPE_CHECKING:
+    from keystore.policy_xml import PolicyDocument
 
 # Distributions whose rcl remaps the name of an action as a whole (ros2/rcl pull request 1170).
 _REMAPS_ACTION_NAMES = frozenset({"kilted", "lyrical", "rolling"})
@@ -96,6 +98,8 @@ def derive_policy(
     derived = collection.result()
     if chosen.policy_file is None:
         return derived
+    from enclave_launch.policy.policy_file import merge_policy_file
+
     merged = merge_policy_file(derived.policy, derived.reasons, chosen.policy_file)
     return replace(
         derived,

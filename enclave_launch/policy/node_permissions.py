@@ -149,6 +149,10 @@ class _Collector:
         if parts is None:
             yield operation, action
             return
+        together = parts.moved_together
+        if together is not None:
+            yield operation, Resolved(together, (*action.rules, *parts.rules))
+            return
         service, topic = _PARTS[operation]
         for operation_of_part, resolved in (
             *((service, part) for part in parts.services.values()),

@@ -20,9 +20,7 @@ class Gain:
     composed: bool
     gained: tuple[Rule, ...]
 
-    @property
-    def text(self) -> str:
-        """One sentence for a report."""
+    def __str__(self) -> str:
         how = "shares a container" if self.composed else f"shares enclave {self.enclave}"
         names = ", ".join(f"{rule.operation.value} {rule.expression}" for rule in self.gained)
         return f"node {self.node} {how} and may thereby also {names}"

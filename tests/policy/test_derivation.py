@@ -107,6 +107,17 @@ def test_actions_in_humble_and_jazzy_are_remapped_part_by_part(node: NodeMaker) 
     assert warning.startswith("demo.launch.xml:7: remap rule fib:=whole has no effect on action /fib")
 
 
+def test_five_rules_that_move_an_action_as_one_give_one_permission(node: NodeMaker) -> None:
+    parts = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+    rules = tuple(f"fib/_action/{part}:=count/_action/{part}" for part in parts)
+    found = derive(node("action fib", namespace="/arm", remap=rules))
+    assert declared(found) == {"execute /arm/count"}
+    (reasons,) = (why for rule, why in found.reasons["/"].items() if rule.expression == "/arm/count")
+    assert {rule.text for rule in reasons[0].rules} == set(rules)
+    apart = derive(node("action fib", remap=rules[:4]))
+    assert "publish /fib/_action/status" in declared(apart) and "execute /count" not in declared(apart)
+
+
 @pytest.mark.parametrize("distro", ["kilted", "lyrical", "rolling"])
 def test_actions_from_kilted_on_are_remapped_as_a_whole(node: NodeMaker, distro: str) -> None:
     found = derive(node("action fib", remap=("fib:=whole",)), distro=distro)
