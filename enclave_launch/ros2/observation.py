@@ -6,9 +6,6 @@ are final then. Next: ``session``. Touches nothing.
 
 from __future__ import annotations
 
-import os
-import re
-import shlex
 from collections.abc import Iterable
 from typing import Any
 
@@ -59,15 +56,15 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
 
 
 def observe_executable(action: Any, context: Any) -> ResolvedProcess:
-    """``action``: an ``ExecuteProcess`` that is no node, with an ``enclave`` of its own."""
-    cmd = (*_prefix(action, context), *(perform_substitutions(context, part) for part in action.cmd))
-    number, label = next_process_name(action, context, cmd)
+    """``action``: an ``ExecuteProcess`` that is no node, being prepared: its command and name are final."""
+    description = action.process_description
+    cmd = tuple(description.final_cmd)
     return ResolvedProcess(
-        index=number,
+        index=int(description.final_name.rpartition("-")[2]),
         kind="executable",
         package=None,
         executable=first_word(cmd),
-        process_name=f"{label}-{number}",
+        process_name=description.final_name,
         name=None,
         namespace=None,
         fqn=None,
@@ -78,14 +75,6 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
         enclave=EnclaveRequest(enclave_attribute(action, context), scope_in_force(context)),
         location=location_in(context, type(action).__name__),
     )
-
-
-def _prefix(action: Any, context: Any) -> list[str]:
-    """``launch-prefix``, unless its filter leaves this program out (launch/descriptions/executable.py)."""
-    pattern = context.launch_configurations.get("launch-prefix-filter", "")
-    program = os.path.basename(perform_substitutions(context, action.cmd[0]))
-    prefix = perform_substitutions(context, action.process_description.prefix)
-    return shlex.split(prefix) if re.match(pattern, program) else []
 
 
 def observe_components(action: Any, context: Any) -> tuple[ResolvedComponent, ...]:

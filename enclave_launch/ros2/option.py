@@ -35,8 +35,9 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         for action in group._group_actions:
             if "--secure" in action.option_strings:
                 action.dest = SECURE
-        # What ros2launch_security reads: not asked for.
+        # What ros2launch_security reads: not asked for. And what our own command line has beyond ros2's.
         parser.set_defaults(**{SECURE: False, "secure": None, "create_keystore": True})
+        parser.set_defaults(distro=None, allow_missing_packages=False, no_python=False)
 
     def prelaunch(self, launch_description: Any, args: argparse.Namespace) -> tuple[Any, ...]:
         """:raises RuntimeError: what ros2 shows as a message, without traceback."""

@@ -21,7 +21,7 @@ from enclave_launch import flow
 from enclave_launch.errors import UsageError
 from enclave_launch.evaluation.distro import choose_release
 from enclave_launch.interfaces import InterfaceFinder
-from enclave_launch.plan import Planner
+from enclave_launch.plan import LaunchSource, Planner
 from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
 from enclave_launch.ros2.session import EnclaveSession, OpenDoor
@@ -46,14 +46,11 @@ def secured(
     """
     options = resolve_options or flow.ResolveOptions()
     check_installed()
-    planner = Planner(
-        "<program>",
-        (),
-        InterfaceFinder(search_prefixes(), options.manifests, options.infer),
-        choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes()).name,
-        flow._plan_options(options),
-    )
-    launch = flow.provision(planner.plan(Evaluation((), ())), keystore, options=security_options)
+    release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes())
+    finder = InterfaceFinder(search_prefixes(), options.manifests, options.infer)
+    planner = Planner(LaunchSource("<program>"), finder, options.plan_options())
+    nothing_yet = Evaluation((), (), distro=release.distro.value)
+    launch = flow.provision(planner.plan(nothing_yet), keystore, options=security_options)
     return enclosed(description, EnclaveSession(OpenDoor(launch)), launch)
 
 

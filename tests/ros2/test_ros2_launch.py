@@ -1,0 +1,278 @@
+"""``ros2 launch --secure`` with upstream's own command and engine, and the same for a description in a program."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.ros2.conftest import Workspace, install_metadata
+
+pytestmark = pytest.mark.real_launch
+
+# A node that says how it was started, and looks whether its enclave is complete by then.
+NODE = """#!/bin/sh
+enclave=none
+for word in "$@"; do
+    [ "$previous" = --enclave ] && enclave=$word
+    previous=$word
+done
+enclave=${ROS_SECURITY_ENCLAVE_OVERRIDE:-$enclave}
+count=0
+for file in cert.pem key.pem governance.p7s permissions.p7s identity_ca.cert.pem permissions_ca.cert.pem; do
+    [ -f "$ROS_SECURITY_KEYSTORE/enclaves$enclave/$file" ] && count=$((count + 1))
+done
+echo "enclave=$enclave files=$count enable=$ROS_SECURITY_ENABLE strategy=$ROS_SECURITY_STRATEGY"
+"""
+
+MANIFEST = """<interface version="1">
+  <node name="talker" executable="talker">
+    <topic name="chatter" type="std_msgs/msg/String" role="publisher"/>
+  </node>
+  <node name="listener" executable="listener">
+    <topic name="chatter" type="std_msgs/msg/String" role="subscription"/>
+  </node>
+</interface>
+"""
+
+LAUNCH = """<launch>
+  <arg name="where" default="robot"/>
+  <node pkg="demo" exec="talker"/>
+  <group>
+    <push_ros_namespace namespace="$(var where)"/>
+    <node pkg="demo" exec="listener" name="ears"><remap from="chatter" to="news"/></node>
+  </group>
+  <node pkg="demo" exec="talker" name="own" enclave="/mine"/>
+  <executable cmd="sh -c 'exec talker'" enclave="/tool" name="tool" output="screen">
+    <env name="PATH" value="$(env PATH):$(find-pkg-prefix demo)/lib/demo"/>
+  </executable>
+</launch>
+"""
+
+
+@pytest.fixture
+def demo(workspace: Workspace) -> Workspace:
+    share = workspace.prefix / "share/demo"
+    programs = workspace.prefix / "lib/demo"
+    (share / "launch").mkdir(parents=True)
+    programs.mkdir(parents=True)
+    (workspace.prefix / "share/ament_index/resource_index/packages/demo").touch()
+    (share / "demo.nodl.xml").write_text(MANIFEST)
+    (share / "launch/demo.launch.xml").write_text(LAUNCH)
+    for name in ("talker", "listener"):
+        (programs / name).write_text(NODE)
+        (programs / name).chmod(0o755)
+    return workspace
+
+
+def launch(workspace: Workspace, *words: str) -> tuple[int, str]:
+    result = workspace.ros2_launch("-a", *words)
+    return result.returncode, result.stdout
+
+
+def test_every_process_finds_its_enclave_complete(demo: Workspace) -> None:
+    keystore = demo.directory / "ks"
+    status, screen = launch(demo, "--secure", "--keystore", str(keystore), "demo", "demo.launch.xml")
+    assert status == 0, screen
+    told = {line for line in screen.splitlines() if " enclave=" in line}
+    names = {line.partition("]")[0].strip("[").rpartition("-")[0]: line for line in told}
+    assert len(told) == 4, screen
+    for enclave in ("/", "/robot", "/mine", "/tool"):
+        (line,) = [line for line in told if f"enclave={enclave} " in line]
+        assert "files=6 enable=true strategy=Enforce" in line
+    assert names["tool"].startswith("[tool-4] enclave=/tool ")
+
+
+def test_permissions_are_least_and_under_final_names(demo: Workspace) -> None:
+    keystore = demo.directory / "ks"
+    status, screen = launch(demo, "--secure", "--keystore", str(keystore), "demo", "demo.launch.xml", "where:=arm")
+    assert status == 0, screen
+    ears = (keystore / "enclaves/arm/permissions.xml").read_text()
+    assert "<topic>rt/arm/news</topic>" in ears
+    assert "chatter" not in ears
+    assert "*" not in ears.split("<allow_rule>")[1]
+
+
+def test_strategy_is_passed_on(demo: Workspace) -> None:
+    _, screen = launch(
+        demo,
+        "--secure",
+        "--keystore",
+        str(demo.directory / "ks"),
+        "--strategy",
+        "Permissive",
+        "demo",
+        "demo.launch.xml",
+    )
+    assert screen.count("strategy=Permissive") == 4
+
+
+def test_without_secure_nothing_changes_and_the_attribute_is_accepted(demo: Workspace) -> None:
+    status, screen = launch(demo, "demo", "demo.launch.xml")
+    assert status == 0, screen
+    assert screen.count("enclave=none files=0 enable= strategy=") == 4
+    assert not (demo.directory / "ks").exists()
+
+
+def test_a_keystore_is_needed(demo: Workspace) -> None:
+    status, screen = launch(demo, "--secure", "demo", "demo.launch.xml")
+    assert status != 0
+    assert "--secure needs a keystore" in screen
+    assert "process started" not in screen
+
+
+def test_a_node_without_manifest_starts_nothing(demo: Workspace) -> None:
+    (demo.prefix / "share/demo/demo.nodl.xml").unlink()
+    status, screen = launch(
+        demo, "--secure", "--keystore", str(demo.directory / "ks"), "--missing-nodl", "error", "demo", "demo.launch.xml"
+    )
+    assert status != 0
+    assert "no NoDL manifest for demo/talker" in screen
+    assert "process started" not in screen
+
+
+LATE = """
+import os
+from launch import LaunchDescription
+from launch.actions import OpaqueFunction
+from launch_ros.actions import Node
+
+def generate_launch_description():
+    return LaunchDescription([OpaqueFunction(function=decide)])
+
+def decide(context):
+    # Another name each time it is asked: no plan can foresee it.
+    count = len(os.listdir(os.environ["SEEN"]))
+    open(os.path.join(os.environ["SEEN"], str(count)), "w").close()
+    return [Node(package="demo", executable="talker", name=f"run{count}")]
+"""
+
+
+@pytest.mark.parametrize("allowed", [False, True])
+def test_a_node_that_the_plan_did_not_foresee(allowed: bool, demo: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = demo.directory / "seen"
+    seen.mkdir()
+    monkeypatch.setenv("SEEN", str(seen))
+    file = demo.add("late.launch.py", LATE)
+    options = ["--allow-late"] if allowed else []
+    status, screen = launch(demo, "--secure", "--keystore", str(demo.directory / "ks"), *options, str(file))
+    assert ("refused: demo/talker" in screen) is not allowed
+    assert ("was not foreseen: provisioned now" in screen) is allowed
+    assert ("process started" in screen) is allowed
+    assert (status == 0) is allowed
+
+
+OTHER = '''
+"""ros2launch_security as it meets ours: same option, same extension points."""
+
+from launch_ros.actions.node import NodeActionExtension
+from ros2launch.option import OptionExtension
+
+
+class SecurityOption(OptionExtension):
+    def add_arguments(self, parser, cli_name, *, argv=None):
+        group = parser.add_argument_group(title="security")
+        group.add_argument("--secure", metavar="keystore", nargs="?", const="")
+        group.add_argument("--no-create-keystore", dest="create_keystore", action="store_false")
+
+    def prelaunch(self, launch_description, args):
+        if args.secure is None:
+            return (launch_description,)
+        raise AssertionError("the other extension was asked to secure the launch, too")
+
+
+class SecurityNodeAction(NodeActionExtension):
+    def prepare_for_execute(self, context, ros_specific_arguments, node_action):
+        assert context.launch_configurations.get("__secure") is None
+        return [], ros_specific_arguments
+'''
+
+
+def test_beside_ros2launch_security_ours_wins(demo: Workspace) -> None:
+    (demo.site / "other_security.py").write_text(OTHER)
+    install_metadata(
+        demo.site,
+        "ros2launch_security",
+        {
+            "ros2launch.option": ["security = other_security:SecurityOption"],
+            "launch_ros.node_action": ["security = other_security:SecurityNodeAction"],
+        },
+    )
+    status, screen = launch(demo, "--secure", "--keystore", str(demo.directory / "ks"), "demo", "demo.launch.xml")
+    assert status == 0, screen
+    assert screen.count("enable=true strategy=Enforce") == 4
+
+
+def test_the_keystore_passes_openssl(demo: Workspace) -> None:
+    if shutil.which("openssl") is None:
+        pytest.fail("openssl is not installed")
+    keystore = demo.directory / "ks"
+    launch(demo, "--secure", "--keystore", str(keystore), "demo", "demo.launch.xml")
+    enclave = keystore / "enclaves/mine"
+    verified = subprocess.run(
+        ["openssl", "verify", "-CAfile", enclave / "identity_ca.cert.pem", enclave / "cert.pem"],
+        capture_output=True,
+        check=False,
+    )
+    assert verified.returncode == 0, verified.stderr
+
+
+PROGRAM = """
+import json, sys
+import stand_ins
+stand_ins.install()
+from launch import LaunchDescription, LaunchService
+from launch_ros.actions import ComposableNodeContainer, Node, PushRosNamespace
+from launch_ros.descriptions import ComposableNode
+from enclave_launch.ros2.secured import secured
+
+def node(**options):
+    return Node(package="demo", output="screen", **options)
+
+cases = {
+    "plain": [node(executable="talker"), PushRosNamespace("robot"), node(executable="listener", name="ears"),
+              node(executable="talker", enclave="sub")],
+    "components": [ComposableNodeContainer(package="rclcpp_components", executable="component_container", name="box",
+                   namespace="/", composable_node_descriptions=[
+                       ComposableNode(package="demo", plugin="demo::X", name="x")])],
+    "unknown": [Node(package="demo", executable="unknown", output="screen")],
+}
+service = LaunchService(noninteractive=True)
+service.include_launch_description(secured(LaunchDescription(cases[sys.argv[1]]), sys.argv[2]))
+sys.exit(service.run())
+"""
+
+
+def program(workspace: Workspace, case: str, keystore: Path) -> tuple[int, str]:
+    result = workspace.python(PROGRAM, case, str(keystore))
+    return result.returncode, result.stdout
+
+
+def test_a_description_in_a_program_is_secured(demo: Workspace) -> None:
+    keystore = demo.directory / "ks"
+    status, screen = program(demo, "plain", keystore)
+    assert status == 0, screen
+    for enclave in ("/", "/robot", "/robot/sub"):
+        assert f"enclave={enclave} " in screen
+        assert (keystore / "enclaves" / enclave.lstrip("/") / "permissions.p7s").is_file()
+
+
+def test_what_only_a_plan_could_permit_is_refused_there(demo: Workspace) -> None:
+    (demo.prefix / "share/ament_index/resource_index/packages/rclcpp_components").touch()
+    programs = demo.prefix / "lib/rclcpp_components"
+    programs.mkdir()
+    shutil.copy(demo.prefix / "lib/demo/talker", programs / "component_container")
+    status, screen = program(demo, "components", demo.directory / "ks")
+    assert status == 1
+    assert "/box loads components" in screen
+    assert "process started" not in screen
+
+
+def test_a_node_without_interface_ends_that_launch(demo: Workspace) -> None:
+    shutil.copy(demo.prefix / "lib/demo/talker", demo.prefix / "lib/demo/unknown")
+    status, screen = program(demo, "unknown", demo.directory / "ks")
+    assert status == 1
+    assert "no NoDL manifest for demo/unknown" in screen
+    assert "process started" not in screen
