@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from keystore import layout
 from keystore.bundle import PublicFiles, export
 from keystore.errors import DamagedKeystore, InvalidInput
 from keystore.revocation import RemoveOptions, remove
@@ -25,8 +26,7 @@ def root(tmp_path: Path) -> Path:
 
 
 def files(*enclaves: str) -> set[str]:
-    names = ("cert.pem", "key.pem", "permissions.p7s", "governance.p7s", "identity_ca.cert.pem", "permissions_ca.cert.pem")
-    return {f"enclaves{enclave}/{name}" for enclave in enclaves for name in names}
+    return {f"enclaves{enclave}/{name}" for enclave in enclaves for name in layout.RUNTIME_FILES}
 
 
 PUBLIC = {"public/identity_ca.cert.pem", "public/permissions_ca.cert.pem", "enclaves/governance.p7s"}
