@@ -150,9 +150,11 @@ class ParameterFile:
 def _substituted(context: LaunchContext, path: Path) -> Path:
     import yaml
 
+    from enclave_launch.description.launch_ros.utilities import yaml_text
+
     text = perform_substitutions(context, parse_substitution(path.read_text(encoding="utf-8")))
     try:
-        yaml.safe_load(text)
+        yaml_text.load(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
     return Path(context.host.write_parameter_file(text))

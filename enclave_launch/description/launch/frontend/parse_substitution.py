@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.substitution import Substitution
     from enclave_launch.evaluation.distro import Release
 
+MAX_SHARED_LENGTH = 1024  # characters; longer texts are whole files, parsed once anyway
 _shared_for: Release | None = None  # the release whose registered names the kept results used
 
 
@@ -46,7 +47,7 @@ def parse_substitution(string_value: str) -> list[Substitution]:
     if release is not _shared_for:
         _parse_shared.cache_clear()
         _shared_for = release
-    shared = _parse_shared(string_value)
+    shared = _parse_shared(string_value) if len(string_value) <= MAX_SHARED_LENGTH else None
     if shared is None:
         return _instantiate(parse_template(string_value), string_value)
     return list(shared)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import pathlib
 import warnings
 from collections.abc import Iterator, Mapping
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 from enclave_launch.description.launch.launch_context import LaunchContext
@@ -63,7 +64,13 @@ def to_parameters_list(
 
 def _read(context: LaunchContext, path: pathlib.Path) -> Any:
     generated = context.host.parameter_file(str(path))
-    return yaml_text.load(path.read_text(encoding="utf-8") if generated is None else generated)
+    return _parse(path.read_text(encoding="utf-8") if generated is None else generated)
+
+
+@lru_cache(maxsize=256)
+def _parse(text: str) -> Any:
+    """Shared by the components that name the same file; nobody changes it."""
+    return yaml_text.load(text)
 
 
 def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
+from enclave_launch.frontend import yaml_scalar
 
 # What PyYAML writes without quotes and reads back as the same text: no word of YAML 1.1's booleans and
 # nulls, nothing that starts like a number, no space at which a long line would be folded.
@@ -31,10 +32,12 @@ class YamlConstant(TextSubstitution):
 
 
 def load(text: str) -> Any:
-    """YAML 1.1 as PyYAML reads it. Raises ``yaml.YAMLError``."""
-    import yaml
+    """YAML 1.1 as ``yaml.safe_load`` reads it. Raises ``yaml.YAMLError``, ``ValueError``."""
+    if "\n" not in text:
+        return yaml_scalar.load(text)
+    from enclave_launch.frontend.yaml_tree import parse_yaml
 
-    return yaml.load(text, Loader=getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    return parse_yaml(text).root
 
 
 def dump(value: Any) -> str:
