@@ -22,6 +22,7 @@ class State:
         self._trail: list[tuple[Cells, object, Value | None]] = []
         self._stamps = itertools.count(1)
         self.stamp = 0
+        self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
@@ -87,6 +88,7 @@ class State:
     def join_seen(self, mark: int, own: Cells | None = None) -> None:
         """Give each cell written since ``mark`` (except in ``own``) every value it held since then."""
         seen: Written = {}
+        self.work += len(self._trail) - mark
         for cells, key, old in self._trail[mark:]:
             if cells is own or (type(cells) is LocalCells and cells.dead):
                 continue
@@ -123,6 +125,7 @@ class State:
         return stable
 
     def _written(self, mark: int) -> Written:
+        self.work += len(self._trail) - mark
         return {
             (id(cells), key): (cells, key, cells[key])
             for cells, key, _ in self._trail[mark:]

@@ -309,20 +309,24 @@ def join_all(values: Iterable[Value]) -> Value:
 
 
 def contains(value: Value, atom: object) -> bool:
+    """Whether ``atom`` is one of ``value``: ``1`` is not ``True``, and unknown is unknown."""
     kind = type(atom)
     if kind is str:
         return atom in value
     if kind is Unknown:
-        return any(type(other) is Unknown for other in value)
-    if kind is Items:
-        return any(other == atom for other in value)
-    return any(other is atom or (type(other) is kind and other == atom) for other in value)
+        for other in value:
+            if type(other) is Unknown:
+                return True
+        return False
+    for other in value:
+        if other is atom or (type(other) is kind and other == atom):
+            return True
+    return False
 
 
 def _limited(value: Value) -> Value:
-    items = [atom for atom in value if type(atom) is Items]
-    if items:
-        return (_join_items(items),)
+    if type(value[0]) is Items:
+        return (_join_items([atom for atom in value if isinstance(atom, Items)]),)
     if len(value) <= MAX_STRINGS:
         return value
     texts = [atom for atom in value if isinstance(atom, str | Text)]

@@ -33,33 +33,37 @@ from nodl.infer.values import (
     widen,
 )
 
-MAX_RECURSION = 2
+MAX_ROUNDS = 8
 _MISSING = unknown("an argument that the caller does not give")
 
 
 @dataclass
 class Summary:
-    """A function that calls itself too deep: its joined parameters and result, run to a fixpoint."""
+    """A function that calls itself: its joined parameters and result, run to a fixpoint.
 
-    parameters: dict[object, Value]
+    ``active``: its body is running; a call of it then adds to the parameters and gets the result so far.
+    """
+
+    parameters: dict[object, Value] = field(default_factory=dict)
     result: Value = BOTTOM
-    changed: bool = False
-    widened: int = field(default=0)
+    active: bool = False
+    widened: int = 0
 
 
 def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     node = function.node
-    depth = run.stack.count(node)
     if len(run.stack) >= MAX_DEPTH:
         run.gap(call.node, call.frame, "calls are nested too deep to be followed")
         return unknown("the result of a deeply nested call")
     cells = bind(run, function, call)
     run.called.setdefault(node)
-    if node in run.summaries:
-        return _recursive_result(run, run.summaries[node], cells)
-    if depth > MAX_RECURSION:
-        return _run_recursive(run, function, cells, call)
-    return _remembered(run, function, cells, call)
+    if node not in run.stack:
+        return _remembered(run, function, cells, call)
+    summary = run.summaries.setdefault(node, Summary())
+    _widen_parameters(run, summary, cells)
+    if not summary.active:
+        _run_recursive(run, function, summary, call)
+    return summary.result or unknown("the result of a recursion")
 
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
@@ -110,35 +114,37 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     return frame.returned or ANY
 
 
-def _run_recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    summary = Summary(dict(cells))
-    run.summaries[function.node] = summary
+def _run_recursive(run: Run, function: FunctionValue, summary: Summary, call: Call) -> None:
+    """Run the body with the joined parameters; the outermost recursion repeats until nothing changes."""
+    outermost = not any(other.active for other in run.summaries.values())
+    summary.active = True
     run.repeated += 1
-    for _ in range(6):
-        summary.changed = False
+    for _ in range(MAX_ROUNDS if outermost else 1):
+        run.unstable = False if outermost else run.unstable
         cells = LocalCells()
         cells.update(summary.parameters)
-        result = _run_body(run, function, cells, call)
-        merged = join(summary.result, result)
-        if merged is summary.result and not summary.changed:
+        result = join(summary.result, _run_body(run, function, cells, call))
+        run.unstable = run.unstable or result is not summary.result
+        summary.result = result
+        if not run.unstable:
             break
-        summary.result = merged
     else:
-        run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
+        if outermost:
+            run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
     run.repeated -= 1
-    del run.summaries[function.node]
-    return summary.result or ANY
+    summary.active = False
+    if outermost:
+        run.summaries.clear()
 
 
-def _recursive_result(run: Run, summary: Summary, cells: LocalCells) -> Value:
+def _widen_parameters(run: Run, summary: Summary, cells: LocalCells) -> None:
     for key, value in cells.items():
         old = summary.parameters.get(key, BOTTOM)
         new = widen(old, value, summary.widened > 2)
         if new is not old:
             summary.parameters[key] = new
-            summary.changed = True
             summary.widened += 1
-    return summary.result or unknown("the result of a recursion")
+            run.unstable = True
 
 
 # --- binding ----------------------------------------------------------------------------------------------

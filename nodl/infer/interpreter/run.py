@@ -35,7 +35,7 @@ from nodl.infer.values import (
 )
 from nodl.source_ref import SourceRef
 
-MAX_STEPS = 400_000  # statements analysed in one run
+MAX_STEPS = 60_000  # statements analysed in one run, and cells touched to join branches over 32
 MAX_DEPTH = 48  # analysed calls inside calls
 
 
@@ -157,6 +157,7 @@ class Run:
         self.summaries: dict[ast.AST, Any] = {}
         self.options = OptionDefaults()
         self.memo: dict[tuple[object, ...], tuple[int, Value]] = {}
+        self.unstable = False  # a recursion learned something new since its outermost call asked
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
         self.context = 0
@@ -175,7 +176,7 @@ class Run:
     def execute(self, body: list[ast.stmt], frame: Frame) -> bool:
         """Run statements in order. False: control cannot reach the end of ``body``."""
         self.steps += len(body)
-        if self.steps > MAX_STEPS:
+        if self.steps + (self.state.work >> 5) > MAX_STEPS:
             raise BudgetExceeded(f"more than {MAX_STEPS} statements to analyse")
         statements = self._statements
         for statement in body:
