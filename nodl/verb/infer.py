@@ -1,12 +1,15 @@
-"""``secure-nodl infer``: interfaces from source, as JSON, text, policy or manifests to start from."""
+"""Infer nodes and their interfaces from source: as text, JSON, policy, or manifests to start from."""
 
 from __future__ import annotations
 
 import argparse
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
+
+from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
     from nodl.infer.report.expanded import ExpandedSystem
@@ -15,12 +18,9 @@ if TYPE_CHECKING:
 FORMATS = ("text", "json", "policy", "v1", "v2")
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     parser = subparsers.add_parser(
-        "infer",
-        help="infer nodes and their interfaces from source",
-        description="Infer nodes and their interfaces from Python (and, with the extra cpp, C++) source. "
-        "Nothing of the analysed program is executed.",
+        "infer", help="infer nodes and their interfaces from source, without running it", description=__doc__
     )
     parser.add_argument(
         "subjects", nargs="+", metavar="PACKAGE|PATH", help="an installed package, or files and folders"
@@ -31,14 +31,16 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--accept-patterns", action="store_true", help="allow names known in part as patterns in a policy"
     )
+    add_prefix_argument(parser)
     parser.set_defaults(run=run)
-    return parser
 
 
 def run(args: argparse.Namespace) -> int:
     """0: nodes were found; 1: none; 2: a subject does not exist. Open questions go to standard error."""
+    from nodl.ament_index import search_prefixes
+
     try:
-        system = _infer(args.subjects)
+        system = _infer(args.subjects, search_prefixes(args.prefix))
     except LookupError as error:
         print(f"secure-nodl infer: {error.args[0]}", file=sys.stderr)
         return 2
@@ -85,13 +87,13 @@ def _write(folder: Path, documents: dict[str, str]) -> None:
         print(folder / name)
 
 
-def _infer(subjects: list[str]) -> InferredSystem:
+def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
     """Paths together, so that they find each other's modules; packages by their executables."""
     from nodl.infer.system import InferredSystem, infer_paths
 
     paths = [subject for subject in subjects if os.path.exists(subject)]
     found = [infer_paths(paths)] if paths else []
-    found.extend(_infer_package(subject) for subject in subjects if subject not in paths)
+    found.extend(_infer_package(subject, prefixes) for subject in subjects if subject not in paths)
     return InferredSystem(
         tuple(node for each in found for node in each.nodes),
         tuple(gap for each in found for gap in each.gaps),
@@ -99,14 +101,13 @@ def _infer(subjects: list[str]) -> InferredSystem:
     )
 
 
-def _infer_package(package: str) -> InferredSystem:
-    from nodl.ament_index import PackageNotFoundError, package_prefix, search_prefixes
+def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
+    from nodl.ament_index import PackageNotFoundError, package_prefix
     from nodl.infer.executable import infer_executable
     from nodl.infer.system import InferredSystem
     from nodl.node_interface import Gap
     from nodl.source_ref import SourceRef
 
-    prefixes = search_prefixes()
     try:
         folder = Path(package_prefix(package, prefixes), "lib", package)
     except (PackageNotFoundError, ValueError) as error:
