@@ -13,8 +13,22 @@ __version__ = "0.1.0"
 
 if TYPE_CHECKING:
     from enclave_launch.enclave import EnclaveScope
-    from enclave_launch.errors import EnclaveLaunchError, LaunchFileError, ManifestError, ProvisionError, RuntimeFailure
-    from enclave_launch.flow import ResolveOptions, RunSettings, SecurityOptions, provision, resolve, run, run_async
+    from enclave_launch.errors import (
+        EnclaveLaunchError,
+        LaunchFileError,
+        ManifestError,
+        ProvisionError,
+        RuntimeFailure,
+    )
+    from enclave_launch.flow import (
+        ResolveOptions,
+        RunSettings,
+        SecurityOptions,
+        provision,
+        resolve,
+        run,
+        run_async,
+    )
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.secured import ProvisionedLaunch
 

@@ -29,7 +29,9 @@ class UsageError(EnclaveLaunchError):
 class LaunchFileError(EnclaveLaunchError):
     """``cause`` is the exception that real launch would have raised, where it has one."""
 
-    def __init__(self, message: str, location: SourceLocation | None = None, cause: BaseException | None = None):
+    def __init__(
+        self, message: str, location: SourceLocation | None = None, cause: BaseException | None = None
+    ):
         self.message = message
         self.location = location
         self.cause = cause

@@ -12,8 +12,7 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +21,7 @@ from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import ManifestError, UsageError
 from enclave_launch.plan import LaunchPlan, LaunchSource, Planner, PlanOptions
 from enclave_launch.policy import PolicyOptions
+from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.secured import ProvisionedLaunch
@@ -97,10 +97,11 @@ def resolve(
     source = LaunchSource(
         os.path.abspath(launch_file),
         tuple(arguments),
+        tuple(map(os.path.abspath, chosen.prefixes)),
         {**chosen.launch_configurations},
         {**chosen.host_options(), "anonymous_seed": secrets.randbits(64)},
     )
-    with ament_prefixes(chosen.prefixes):
+    with ament_prefixes(source.prefixes):
         evaluation = evaluate(
             source.launch_file,
             source.arguments,
@@ -129,22 +130,6 @@ def provision(
     wanted = chosen.keystore or ProvisionOptions()
     report = provision_policies(settings, plan.derived.policy.enclaves, wanted)
     return ProvisionedLaunch(plan, settings, report, wanted)
-
-
-@contextmanager
-def ament_prefixes(prefixes: Sequence[Path]) -> Iterator[None]:
-    """Within the block ``prefixes`` come before the rest of ``AMENT_PREFIX_PATH``, for us and for what we start."""
-    previous = os.environ.get("AMENT_PREFIX_PATH")
-    if prefixes:
-        listed = [os.path.abspath(prefix) for prefix in prefixes]
-        os.environ["AMENT_PREFIX_PATH"] = os.pathsep.join([*listed, *([previous] if previous else [])])
-    try:
-        yield
-    finally:
-        if previous is not None:
-            os.environ["AMENT_PREFIX_PATH"] = previous
-        elif prefixes:
-            del os.environ["AMENT_PREFIX_PATH"]
 
 
 @dataclass(frozen=True, slots=True)

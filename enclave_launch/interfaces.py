@@ -21,7 +21,9 @@ from nodl.source_ref import SourceRef
 CONTAINER_PACKAGE = "rclcpp_components"
 """Its executables (``component_container``, ``_mt``, ``_isolated``) are containers and nothing else."""
 
-_CONTAINER_NODE_NAME = "ComponentManager"  # rclcpp_components/src/component_manager.hpp, the constructor's default
+_CONTAINER_NODE_NAME = (
+    "ComponentManager"  # rclcpp_components/src/component_manager.hpp, the constructor's default
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +62,9 @@ class InterfaceFinder:
 
     def _find(self, subject: _Subject) -> Found | Missing:
         try:
-            manifest = self._lookup.find(subject.package or "", executable=subject.executable, plugin=subject.plugin)
+            manifest = self._lookup.find(
+                subject.package or "", executable=subject.executable, plugin=subject.plugin
+            )
         except NoDLError as error:
             raise ManifestError(str(error)) from error
         if manifest:

@@ -131,12 +131,13 @@ class PlanOptions:
 class LaunchSource:
     """What was asked for: enough to evaluate it once more, live, with the same results.
 
-    ``launch_file`` is absolute; ``launch_configurations`` are set before it is included; ``host_options`` are those
-    of the evaluation's host (distribution, seed of anonymous names).
+    ``launch_file`` and ``prefixes`` are absolute; ``launch_configurations`` are set before the file is included;
+    ``host_options`` are those of the evaluation's host (distribution, seed of anonymous names).
     """
 
     launch_file: str
     arguments: tuple[tuple[str, str], ...] = ()
+    prefixes: tuple[str, ...] = ()
     launch_configurations: Mapping[str, str] = field(default_factory=dict)
     host_options: Mapping[str, object] = field(default_factory=dict)
 

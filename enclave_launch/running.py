@@ -10,6 +10,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from enclave_launch.plan import LaunchPlan
+from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
 from enclave_launch.runtime.service import RunOptions, run_launch, run_launch_async
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
@@ -21,17 +22,17 @@ if TYPE_CHECKING:
 def run_plan(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> int:
     """Block until all is over. Raises ``RuntimeFailure`` before anything was started."""
     source = _plan(launch).planner.source
-    return run_launch(
-        source.launch_file, source.arguments, gate=_gate(launch, settings), options=_options(launch, settings)
-    )
+    gate, options = _gate(launch, settings), _options(launch, settings)
+    with ament_prefixes(source.prefixes):
+        return run_launch(source.launch_file, source.arguments, gate=gate, options=options)
 
 
 async def run_plan_async(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> int:
     """The same inside a running event loop."""
     source = _plan(launch).planner.source
-    return await run_launch_async(
-        source.launch_file, source.arguments, gate=_gate(launch, settings), options=_options(launch, settings)
-    )
+    gate, options = _gate(launch, settings), _options(launch, settings)
+    with ament_prefixes(source.prefixes):
+        return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
 
 
 def _plan(launch: LaunchPlan | ProvisionedLaunch) -> LaunchPlan:

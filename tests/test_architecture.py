@@ -75,7 +75,15 @@ def modules_loaded_by(arguments: list[str]) -> set[str]:
 @pytest.mark.parametrize("form", ["tree", "json"])
 def test_a_dry_run_imports_only_what_its_path_needs(form: str) -> None:
     loaded = modules_loaded_by(
-        ["--dry-run", "--format", form, "--prefix", "fixtures/demo_ws", "demo_nodes", "talker_listener.launch.xml"]
+        [
+            "--dry-run",
+            "--format",
+            form,
+            "--prefix",
+            "fixtures/demo_ws",
+            "demo_nodes",
+            "talker_listener.launch.xml",
+        ]
     )
     assert {"lxml.etree", "enclave_launch.plan"} <= loaded
     assert loaded.isdisjoint({"cryptography", "pydantic", "asyncio", "yaml", "cyclonedds", "tree_sitter"})

@@ -82,12 +82,16 @@ def assign_enclave(
         validate_enclave_name(assignment.path)
     except InvalidEnclaveName as error:
         raise LaunchFileError(
-            f"enclave {assignment.path!r} ({assignment.reason.value}) is not valid: {error}", process.location, error
+            f"enclave {assignment.path!r} ({assignment.reason.value}) is not valid: {error}",
+            process.location,
+            error,
         ) from error
     return assignment
 
 
-def _unchecked(process: ResolvedProcess, scope: EnclaveScope, default_name: str | None) -> EnclaveAssignment | None:
+def _unchecked(
+    process: ResolvedProcess, scope: EnclaveScope, default_name: str | None
+) -> EnclaveAssignment | None:
     request = process.enclave
     if request.argument is not None:
         return EnclaveAssignment(request.argument, Reason.ARGUMENT)

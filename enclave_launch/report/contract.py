@@ -27,16 +27,22 @@ class Process(_Strict):
     package: str | None = Field(description="null for executable actions and nodes given without a package")
     executable: str = Field(description="executable name; the first word of an executable action")
     namespace: str | None = Field(description="as launch shows it; null for executable actions")
-    name: str | None = Field(description="node name, the manifest's where launch gives none; null for executables")
+    name: str | None = Field(
+        description="node name, the manifest's where launch gives none; null for executables"
+    )
     fqn: str | None
     cmd: list[str] = Field(description="what would be executed; holds --enclave only under --secure")
     remaps: list[tuple[str, str]] = Field(description="from, to; global rules before the node's own")
     parameters: dict[str, JsonParameter] = Field(description="as the node will see them")
     enclave: str | None
-    environment: dict[str, str] = Field(description="variables added or changed, values as the process sees them")
+    environment: dict[str, str] = Field(
+        description="variables added or changed, values as the process sees them"
+    )
     launch_file: str
     line: int = Field(description="line of the element, 0 when not known")
-    on_event: str | None = Field(description="the event that would start it; null when the launch itself does")
+    on_event: str | None = Field(
+        description="the event that would start it; null when the launch itself does"
+    )
 
 
 class Component(_Strict):
@@ -48,7 +54,9 @@ class Component(_Strict):
     fqn: str
     remaps: list[tuple[str, str]]
     parameters: dict[str, JsonParameter]
-    enclave: str | None = Field(description="the container's; null when the container is not part of this launch")
+    enclave: str | None = Field(
+        description="the container's; null when the container is not part of this launch"
+    )
     launch_file: str
     line: int
     on_event: str | None

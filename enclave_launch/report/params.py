@@ -23,7 +23,10 @@ def params_yaml(plan: LaunchPlan) -> str:
 def _named(plan: LaunchPlan) -> Iterator[tuple[str, Mapping[str, ParameterValue]]]:
     for process in plan.processes:
         if process.process.kind != "executable":
-            yield (process.nodes[0].fqn if process.nodes else process.fqn or "/**"), process.process.parameters
+            yield (
+                (process.nodes[0].fqn if process.nodes else process.fqn or "/**"),
+                process.process.parameters,
+            )
     for component in plan.components:
         yield (component.nodes[0].fqn if component.nodes else component.fqn), component.component.parameters
 

@@ -13,6 +13,7 @@ from keystore.policy import EnclavePolicy, Qualifier
 
 VERSION = 1
 
+
 def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) -> dict[str, object]:
     """The document as plain values. ``security``: as ``--secure`` would start the processes; ``None``: plainly."""
     return {

@@ -51,7 +51,11 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     names = " ".join(node.fqn for node in item.nodes) or item.fqn or ""
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
-    place = f"line {process.location.line}" if process.location.file == plan.launch_file else str(process.location)
+    place = (
+        f"line {process.location.line}"
+        if process.location.file == plan.launch_file
+        else str(process.location)
+    )
     head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{event})"
     loaded: list[Branch] = [
         (f"component {component.component.package} {component.component.plugin} as {component.fqn}", ())
@@ -76,7 +80,10 @@ def _permissions(plan: LaunchPlan, enclave: EnclavePolicy) -> Iterator[Branch]:
 def _outside(plan: LaunchPlan) -> list[Branch]:
     without: list[Branch] = [_process(item, plan) for item in plan.processes if item.enclave is None]
     without += [
-        (f"component {item.component.package} {item.component.plugin} as {item.fqn} in {item.component.container}", ())
+        (
+            f"component {item.component.package} {item.component.plugin} as {item.fqn} in {item.component.container}",
+            (),
+        )
         for item in plan.components
         if item.container is None
     ]

@@ -37,7 +37,9 @@ def build_parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument("words", nargs="*", metavar="PACKAGE LAUNCH_FILE | PATH [name:=value ...]", help=argparse.SUPPRESS)
+    parser.add_argument(
+        "words", nargs="*", metavar="PACKAGE LAUNCH_FILE | PATH [name:=value ...]", help=argparse.SUPPRESS
+    )
     parser.add_argument("--version", action="version", version=f"secure-launch {__version__}")
     add_security_options(parser.add_argument_group("security"))
     add_policy_options(parser.add_argument_group("what each node may do"))
@@ -49,7 +51,9 @@ def build_parser() -> argparse.ArgumentParser:
 
 def add_security_options(group: argparse._ArgumentGroup) -> None:
     """Also those of ``ros2 launch``, see ``ros2.option``."""
-    group.add_argument("--secure", action="store_true", help="give every process its enclave; refuse to start otherwise")
+    group.add_argument(
+        "--secure", action="store_true", help="give every process its enclave; refuse to start otherwise"
+    )
     group.add_argument(
         "--keystore",
         metavar="DIR",
@@ -64,64 +68,143 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
         default="Enforce",
         help="ROS_SECURITY_STRATEGY of the processes (default: Enforce)",
     )
-    group.add_argument("--domain-id", metavar="IDS", help="DDS domains of the permissions: N, N-M, or a list "
-                       "(default: ROS_DOMAIN_ID, else 0)")
-    group.add_argument("--valid-for", metavar="TIME", help="validity of new certificates and permissions, such as 90d")
-    group.add_argument("--warn-expiry", metavar="TIME", default="30d",
-                       help="warn when an enclave expires within this time (default: 30d)")
-    group.add_argument("--compatible-subjects", action="store_true",
-                       help="certificate subjects as SROS2 writes them; see secure-keystore verify for the exposure")
+    group.add_argument(
+        "--domain-id",
+        metavar="IDS",
+        help="DDS domains of the permissions: N, N-M, or a list (default: ROS_DOMAIN_ID, else 0)",
+    )
+    group.add_argument(
+        "--valid-for", metavar="TIME", help="validity of new certificates and permissions, such as 90d"
+    )
+    group.add_argument(
+        "--warn-expiry",
+        metavar="TIME",
+        default="30d",
+        help="warn when an enclave expires within this time (default: 30d)",
+    )
+    group.add_argument(
+        "--compatible-subjects",
+        action="store_true",
+        help="certificate subjects as SROS2 writes them; see secure-keystore verify for the exposure",
+    )
     passphrase = group.add_mutually_exclusive_group()
-    passphrase.add_argument("--ca-passphrase-file", metavar="FILE", type=Path, help="passphrase of encrypted CA keys")
-    passphrase.add_argument("--ca-passphrase-env", metavar="NAME",
-                            help="the variable that holds it; no process of the launch sees it")
-    group.add_argument("--allow-late", action="store_true",
-                       help="provision actions that only exist at run time instead of refusing them")
+    passphrase.add_argument(
+        "--ca-passphrase-file", metavar="FILE", type=Path, help="passphrase of encrypted CA keys"
+    )
+    passphrase.add_argument(
+        "--ca-passphrase-env",
+        metavar="NAME",
+        help="the variable that holds it; no process of the launch sees it",
+    )
+    group.add_argument(
+        "--allow-late",
+        action="store_true",
+        help="provision actions that only exist at run time instead of refusing them",
+    )
 
 
 def add_policy_options(group: argparse._ArgumentGroup) -> None:
     """Also those of ``ros2 launch``."""
-    group.add_argument("--nodl", metavar="FILE", action="append", type=Path, default=[],
-                       help="use this NoDL manifest where definitions conflict (repeatable)")
-    group.add_argument("--missing-nodl", choices=("infer", "error"), default="infer",
-                       help="nodes without a manifest: infer from their Python source (default), or an error")
-    group.add_argument("--accept-patterns", action="store_true",
-                       help="accept names of which inference knows only a part, as wildcards; each is reported")
-    group.add_argument("--enclave-scope", choices=("namespace", "node", "process", "launch"), default="namespace",
-                       help="enclave of a process that names none (default: namespace)")
+    group.add_argument(
+        "--nodl",
+        metavar="FILE",
+        action="append",
+        type=Path,
+        default=[],
+        help="use this NoDL manifest where definitions conflict (repeatable)",
+    )
+    group.add_argument(
+        "--missing-nodl",
+        choices=("infer", "error"),
+        default="infer",
+        help="nodes without a manifest: infer from their Python source (default), or an error",
+    )
+    group.add_argument(
+        "--accept-patterns",
+        action="store_true",
+        help="accept names of which inference knows only a part, as wildcards; each is reported",
+    )
+    group.add_argument(
+        "--enclave-scope",
+        choices=("namespace", "node", "process", "launch"),
+        default="namespace",
+        help="enclave of a process that names none (default: namespace)",
+    )
     group.add_argument("--policy", metavar="FILE", type=Path, help="SROS2 policy merged over the derived one")
 
 
 def _add_inspection(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--dry-run", action="store_true", help="print the plan; start nothing, write nothing")
-    group.add_argument("--format", choices=("tree", "json", "policy"), default="tree",
-                       help="of the dry run: tree (default), json, or the derived SROS2 policy")
-    group.add_argument("--explain", metavar="ENCLAVE|NODE|TOPIC",
-                       help="why each permission is there: manifest, remap rule or built-in, with file and line")
-    group.add_argument("--dump-params", action="store_true", help="print every node's parameters as one YAML file")
-    group.add_argument("-s", "--show-args", "--show-arguments", action="store_true",
-                       help="print the launch arguments that the file declares")
-    group.add_argument("-p", "--print", "--print-description", dest="print_description", action="store_true",
-                       help="print the launch description")
+    group.add_argument(
+        "--format",
+        choices=("tree", "json", "policy"),
+        default="tree",
+        help="of the dry run: tree (default), json, or the derived SROS2 policy",
+    )
+    group.add_argument(
+        "--explain",
+        metavar="ENCLAVE|NODE|TOPIC",
+        help="why each permission is there: manifest, remap rule or built-in, with file and line",
+    )
+    group.add_argument(
+        "--dump-params", action="store_true", help="print every node's parameters as one YAML file"
+    )
+    group.add_argument(
+        "-s",
+        "--show-args",
+        "--show-arguments",
+        action="store_true",
+        help="print the launch arguments that the file declares",
+    )
+    group.add_argument(
+        "-p",
+        "--print",
+        "--print-description",
+        dest="print_description",
+        action="store_true",
+        help="print the launch description",
+    )
 
 
 def _add_evaluation(group: argparse._ArgumentGroup) -> None:
-    group.add_argument("--prefix", metavar="DIR", action="append", type=Path, default=[],
-                       help="ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)")
-    group.add_argument("--distro", choices=DISTROS, help="ROS distribution to behave like (default: ROS_DISTRO, else "
-                       "the newest)")
-    group.add_argument("--allow-missing-packages", action="store_true",
-                       help="go on with a marked placeholder for packages that are not installed")
-    group.add_argument("--no-python", action="store_true", help="refuse to run Python launch files (they are code)")
+    group.add_argument(
+        "--prefix",
+        metavar="DIR",
+        action="append",
+        type=Path,
+        default=[],
+        help="ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)",
+    )
+    group.add_argument(
+        "--distro",
+        choices=DISTROS,
+        help="ROS distribution to behave like (default: ROS_DISTRO, else the newest)",
+    )
+    group.add_argument(
+        "--allow-missing-packages",
+        action="store_true",
+        help="go on with a marked placeholder for packages that are not installed",
+    )
+    group.add_argument(
+        "--no-python", action="store_true", help="refuse to run Python launch files (they are code)"
+    )
 
 
 def _add_running(group: argparse._ArgumentGroup) -> None:
     group.add_argument("-n", "--noninteractive", action="store_true", help="the launch has no terminal")
     group.add_argument("-d", "--debug", action="store_true", help="more output from the launcher itself")
-    group.add_argument("-a", "--show-all-subprocesses-output", action="store_true",
-                       help="all output of the processes on the screen, by setting OVERRIDE_LAUNCH_PROCESS_OUTPUT")
-    group.add_argument("--launch-prefix", metavar="COMMAND", help="put this before the commands of all processes")
-    group.add_argument("--launch-prefix-filter", metavar="REGEX", help="only where the executable's name matches")
+    group.add_argument(
+        "-a",
+        "--show-all-subprocesses-output",
+        action="store_true",
+        help="all output of the processes on the screen, by setting OVERRIDE_LAUNCH_PROCESS_OUTPUT",
+    )
+    group.add_argument(
+        "--launch-prefix", metavar="COMMAND", help="put this before the commands of all processes"
+    )
+    group.add_argument(
+        "--launch-prefix-filter", metavar="REGEX", help="only where the executable's name matches"
+    )
 
 
 def _path_from_environment(variable: str) -> Path | None:

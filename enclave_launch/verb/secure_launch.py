@@ -34,19 +34,19 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(options: argparse.Namespace) -> int:
-    from enclave_launch.flow import ament_prefixes
+    from enclave_launch.prefixes import ament_prefixes
     from enclave_launch.verb.target import find_target
     from nodl.ament_index import search_prefixes
 
-    with ament_prefixes(options.prefix):
-        target = find_target(options.words, search_prefixes())
-        if options.show_args or options.print_description:
+    target = find_target(options.words, search_prefixes(options.prefix))
+    if options.show_args or options.print_description:
+        with ament_prefixes(options.prefix):
             return _show_file(target, options)
-        keystore = _keystore(options)
-        plan = _resolve(target, options)
-        if _only_looking(options):
-            return _show_plan(plan, options, keystore)
-        return _launch(plan, options, keystore)
+    keystore = _keystore(options)
+    plan = _resolve(target, options)
+    if _only_looking(options):
+        return _show_plan(plan, options, keystore)
+    return _launch(plan, options, keystore)
 
 
 def _only_looking(options: argparse.Namespace) -> bool:
@@ -59,7 +59,7 @@ def _keystore(options: argparse.Namespace) -> str | None:
         return None
     if options.keystore is None:
         raise UsageError("--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE")
-    return os.path.abspath(options.keystore)
+    return str(os.path.abspath(options.keystore))
 
 
 def _resolve(target: Target, options: argparse.Namespace) -> LaunchPlan:
@@ -73,6 +73,7 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
     from enclave_launch.flow import ResolveOptions
 
     return ResolveOptions(
+        prefixes=tuple(options.prefix),
         manifests=tuple(options.nodl),
         policy=options.policy,
         distro=options.distro,
@@ -135,7 +136,9 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
     lines = explain(plan.derived, subject)
     if not lines:
         known = " ".join(enclave.path for enclave in plan.derived.policy.enclaves)
-        raise UsageError(f"{subject!r} is no enclave, node, topic, service or action of this launch; enclaves: {known}")
+        raise UsageError(
+            f"{subject!r} is no enclave, node, topic, service or action of this launch; enclaves: {known}"
+        )
     return "\n".join(lines) + "\n"
 
 

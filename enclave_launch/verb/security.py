@@ -12,9 +12,9 @@ from enclave_launch.plan import LaunchPlan
 from keystore.creation import CreateOptions
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError
+from keystore.expiry import expires_soon
 from keystore.provisioning import ProvisionOptions
 from keystore.signer import CaAccess, Secret
-from keystore.expiry import expires_soon
 from keystore.subject import SubjectScheme
 from keystore.validity import parse_duration, parse_end, utc_now
 

@@ -29,7 +29,13 @@ def write(tmp_path: Path) -> Callable[..., Path]:
 @pytest.fixture
 def secure_launch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SecureLaunch:
     """Run the command in a directory and home of its own, with the demo workspace as the only prefix."""
-    for name in ("ROS_SECURITY_KEYSTORE", "ROS_SECURITY_ENABLE", "AMENT_PREFIX_PATH", "ROS_DISTRO", "ROS_DOMAIN_ID"):
+    for name in (
+        "ROS_SECURITY_KEYSTORE",
+        "ROS_SECURITY_ENABLE",
+        "AMENT_PREFIX_PATH",
+        "ROS_DISTRO",
+        "ROS_DOMAIN_ID",
+    ):
         monkeypatch.delenv(name, raising=False)
     home = tmp_path / "home"
     home.mkdir()

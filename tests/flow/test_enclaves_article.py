@@ -49,7 +49,7 @@ def test_the_keystore_has_exactly_the_tree_of_the_article(example: str, tmp_path
     name, enclaves = EXAMPLES[example]
     plan = resolve(LAUNCH / f"{name}.launch.xml", options=ResolveOptions(prefixes=(DEMO,)))
     provision(plan, tmp_path / "keystore")
-    assert enclave_tree(tmp_path / "keystore") == {path: ARTIFACTS for path in enclaves}
+    assert enclave_tree(tmp_path / "keystore") == dict.fromkeys(enclaves, ARTIFACTS)
 
 
 @pytest.mark.parametrize("example", EXAMPLES)
@@ -57,7 +57,8 @@ def test_each_enclave_holds_the_nodes_of_the_article(example: str) -> None:
     name, enclaves = EXAMPLES[example]
     plan = resolve(LAUNCH / f"{name}.launch.xml", options=ResolveOptions(prefixes=(DEMO,)))
     nodes = {
-        path.removeprefix("/"): sorted(node.fqn for node in nodes) for path, nodes in plan.derived.nodes.items()
+        path.removeprefix("/"): sorted(node.fqn for node in nodes)
+        for path, nodes in plan.derived.nodes.items()
     }
     assert nodes == enclaves
 

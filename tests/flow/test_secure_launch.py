@@ -18,15 +18,23 @@ TALKER = '<node pkg="demo_nodes" exec="talker"/>'
 
 
 def files_below(folder: Path) -> set[str]:
-    return {os.path.relpath(os.path.join(base, name), folder) for base, _, names in os.walk(folder) for name in names}
+    return {
+        os.path.relpath(os.path.join(base, name), folder)
+        for base, _, names in os.walk(folder)
+        for name in names
+    }
 
 
 # --- the dry run -----------------------------------------------------------------------------------------------
 
 
-def test_a_dry_run_prints_the_tree_and_writes_nothing_anywhere(secure_launch: SecureLaunch, tmp_path: Path) -> None:
+def test_a_dry_run_prints_the_tree_and_writes_nothing_anywhere(
+    secure_launch: SecureLaunch, tmp_path: Path
+) -> None:
     before = files_below(tmp_path), files_below(DEMO)
-    run = secure_launch("--dry-run", "--secure", "--keystore", tmp_path / "ks", "demo_nodes", "talker_listener.launch.xml")
+    run = secure_launch(
+        "--dry-run", "--secure", "--keystore", tmp_path / "ks", "demo_nodes", "talker_listener.launch.xml"
+    )
     assert run.returncode == 0
     assert "enclave /  (shared by 2 processes)" in run.stdout
     assert "[talker-1] demo_nodes/talker as /talker" in run.stdout
@@ -35,7 +43,9 @@ def test_a_dry_run_prints_the_tree_and_writes_nothing_anywhere(secure_launch: Se
 
 
 def test_the_json_is_what_the_contract_says(secure_launch: SecureLaunch) -> None:
-    run = secure_launch("--dry-run", "--format", "json", "demo_nodes", "talker_listener_namespace.launch.xml", "count:=3")
+    run = secure_launch(
+        "--dry-run", "--format", "json", "demo_nodes", "talker_listener_namespace.launch.xml", "count:=3"
+    )
     document = DryRun.model_validate_json(run.stdout)
     talker, listener = document.processes
     assert (talker.fqn, talker.enclave, listener.enclave) == ("/robot1/talker", "/robot1", "/robot1")
@@ -50,7 +60,9 @@ def test_the_json_is_what_the_contract_says(secure_launch: SecureLaunch) -> None
     assert document.warnings == []
 
 
-def test_under_secure_the_json_shows_the_enclave_and_its_variables(secure_launch: SecureLaunch, tmp_path: Path) -> None:
+def test_under_secure_the_json_shows_the_enclave_and_its_variables(
+    secure_launch: SecureLaunch, tmp_path: Path
+) -> None:
     words = ("--dry-run", "--secure", "--keystore", tmp_path / "ks", "--format", "json")
     run = secure_launch(*words, "demo_nodes", "talker_listener_namespace.launch.xml")
     process = DryRun.model_validate_json(run.stdout).processes[0]
@@ -77,12 +89,6 @@ def test_an_executable_is_no_node(secure_launch: SecureLaunch, write: Write) -> 
     echo, ls = DryRun.model_validate_json(run.stdout).processes
     assert (echo.package, echo.executable, echo.fqn, echo.enclave) == (None, "echo", None, None)
     assert (ls.executable, ls.enclave) == ("ls", "/files")
-
-
-def test_a_node_without_a_manifest_is_a_warning_in_a_dry_run(secure_launch: SecureLaunch, write: Write) -> None:
-    run = secure_launch("--dry-run", "--missing-nodl", "error", write(TALKER + '<node pkg="demo_nodes" exec="unknown_node"/>'))
-    assert run.returncode == 1  # the executable itself is missing, which launch would notice when it starts it
-    assert "unknown_node" in run.stderr
 
 
 def test_explain_names_manifest_and_remap_rule(secure_launch: SecureLaunch) -> None:
@@ -123,10 +129,14 @@ BAD_FILES = {
     "an invalid enclave": ('<node pkg="demo_nodes" exec="talker" enclave="../x"/>', ":2: <node>", "'/../x'"),
     "an undefined variable": ('<node pkg="demo_nodes" exec="$(var x)"/>', ":2: <node>", "'x' does not exist"),
     "a remap rule rcl refuses": (
-        '<node pkg="demo_nodes" exec="talker"><remap from="a b" to="c"/></node>', "test.launch.xml:2", "invalid remap rule",
+        '<node pkg="demo_nodes" exec="talker"><remap from="a b" to="c"/></node>',
+        "test.launch.xml:2",
+        "invalid remap rule",
     ),
     "a later broken element": (f'{TALKER}\n<node pkg="nosuch_package" exec="e"/>', ":3: <node>", "not found"),
-    "a file that includes itself": ('<include file="$(dirname)/test.launch.xml"/>', ":2: <include>", "include each other without end"),
+    "a file that includes itself": (
+        '<include file="$(dirname)/test.launch.xml"/>', ":2: <include>", "include each other without end"
+    ),
 }  # fmt: skip
 
 
@@ -151,7 +161,9 @@ def test_an_error_in_an_included_file_shows_the_way_there(secure_launch: SecureL
 
 BAD_WORDS = {
     "--secure without a keystore": (["--secure"], 2, "give --keystore DIR or set ROS_SECURITY_KEYSTORE"),
-    "a keystore that must exist": (["--secure", "--keystore", "{tmp}/ks", "--no-create-keystore"], 1, "secure-keystore create"),
+    "a keystore that must exist": (
+        ["--secure", "--keystore", "{tmp}/ks", "--no-create-keystore"], 1, "secure-keystore create"
+    ),
     "a directory that is no keystore": (["--secure", "--keystore", "{tmp}/other"], 1, "is no keystore"),
     "a keystore below a file": (["--secure", "--keystore", "{tmp}/other/file/ks"], 1, "ks"),
     "a bad domain": (["--secure", "--keystore", "{tmp}/ks", "--domain-id", "7;8"], 2, "domain ids"),
@@ -167,7 +179,9 @@ def test_bad_options_are_refused(case: str, secure_launch: SecureLaunch, tmp_pat
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "file").write_text("something else")
     words, status, message = BAD_WORDS[case]
-    run = secure_launch(*(word.format(tmp=tmp_path) for word in words), "demo_nodes", "talker_listener.launch.xml")
+    run = secure_launch(
+        *(word.format(tmp=tmp_path) for word in words), "demo_nodes", "talker_listener.launch.xml"
+    )
     assert run.returncode == status
     assert message in run.stderr and "Traceback" not in run.stderr
     assert run.stdout == "" and not (tmp_path / "ks").exists()

@@ -36,9 +36,15 @@ REFUSED = {
     "nothing at all": ([], "PACKAGE LAUNCH_FILE"),
     "a path that does not exist": (["nosuch.launch.xml"], "'nosuch.launch.xml' does not exist"),
     "the same, with an argument": (["nosuch.launch.xml", "a:=b"], "does not exist"),
-    "an unknown package": (["nosuch_package", "x.launch.xml"], "'nosuch_package' not found, searched:\n  {prefix}"),
+    "an unknown package": (
+        ["nosuch_package", "x.launch.xml"],
+        "'nosuch_package' not found, searched:\n  {prefix}",
+    ),
     "a file the package does not have": (["demo", "nosuch.launch.xml"], "nosuch.launch.xml"),
-    "several files of that name": (["demo", "twice.launch.xml"], "{prefix}/share/demo/other/deep/twice.launch.xml"),
+    "several files of that name": (
+        ["demo", "twice.launch.xml"],
+        "{prefix}/share/demo/other/deep/twice.launch.xml",
+    ),
     "an argument without a value": (["demo", "one.launch.xml", "a:="], "malformed launch argument 'a:='"),
     "an argument that is none": (["demo", "one.launch.xml", "a=1"], "malformed launch argument 'a=1'"),
 }

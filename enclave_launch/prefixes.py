@@ -1,0 +1,26 @@
+"""Install prefixes named by the user: they come before ``AMENT_PREFIX_PATH``, for us and for what we start."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from nodl.ament_index import PREFIX_VARIABLE
+
+
+@contextmanager
+def ament_prefixes(prefixes: Sequence[Path | str]) -> Iterator[None]:
+    """Within the block ``prefixes`` come before the rest of ``AMENT_PREFIX_PATH``, for us and for what we start."""
+    previous = os.environ.get(PREFIX_VARIABLE)
+    if prefixes:
+        listed = [os.path.abspath(prefix) for prefix in prefixes]
+        os.environ[PREFIX_VARIABLE] = os.pathsep.join([*listed, *([previous] if previous else [])])
+    try:
+        yield
+    finally:
+        if previous is not None:
+            os.environ[PREFIX_VARIABLE] = previous
+        elif prefixes:
+            del os.environ[PREFIX_VARIABLE]
