@@ -20,8 +20,10 @@ MAX_EXPANDED_NODES = 4_000_000  # values in a document once each alias is writte
 
 _SafeLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CParser: Any = getattr(yaml, "CLoader", yaml.Loader)
-_LIBYAML_DIFFERS = re.compile(r"[\t!?\ufeff]")  # trailing tab, lone tag, "?" in flow, inner mark: by fuzzing
-_MAYBE_DEEP = re.compile(rf"^(?: {{{MAX_NESTING}}}|.*(?:[-?:]\s+){{{MAX_NESTING // 2}}})", re.MULTILINE)
+# Where libyaml reads otherwise, found by fuzzing: trailing tab, lone tag, "?" in flow context, mark inside.
+_LIBYAML_DIFFERS = re.compile(r"[\t!?\ufeff]")
+# Surely no part of a text whose quotes end in the same line.
+_COMMENT = re.compile(r"(?:^|\s)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
 
 
 class RefusedYaml(ValueError):
@@ -39,7 +41,7 @@ class YamlDocument:
 def parse_yaml(text: str) -> YamlDocument:
     """Text -> its one document (``None`` when empty). Raises ``yaml.YAMLError`` or ``RefusedYaml``."""
     _refuse_deep_nesting(text)
-    if not _LIBYAML_DIFFERS.search(text):
+    if not (_LIBYAML_DIFFERS.search(text) and _LIBYAML_DIFFERS.search(_COMMENT.sub("", text))):
         with contextlib.suppress(yaml.YAMLError):
             return _load(text, _SafeLoader)
     return _load(text, yaml.SafeLoader)
@@ -51,7 +53,7 @@ def _load(text: str, base: Any) -> YamlDocument:
         node = loader.get_single_node()
         if node is None:
             return YamlDocument(None, {})
-        if "*" in text:
+        if "*" in text and "&" in text:
             _refuse_many_aliases(node)
         return YamlDocument(loader.construct_document(node), loader.lines)
     finally:
@@ -124,7 +126,9 @@ def _parts(node: Any) -> list[Any]:
 
 def _refuse_deep_nesting(text: str) -> None:
     """Libyaml's loader would overflow the C stack; events are read without recursion."""
-    if text.count("[") + text.count("{") < MAX_NESTING and not _MAYBE_DEEP.search(text):
+    # A block inside a block begins further to the right, a flow inside a flow after one more bracket.
+    longest_line = max(map(len, text.splitlines()), default=0)
+    if longest_line <= MAX_NESTING and text.count("[") + text.count("{") <= MAX_NESTING:
         return
     depth = 0
     try:
