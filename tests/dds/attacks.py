@@ -87,7 +87,9 @@ class Workshop:
             yield replace(attempt, claim=claim)
 
     def self_signed_permissions(self, path: str) -> Attempt:
-        return self._attempt(f"self-signed permissions {path}", path, SECRET, {"permissions.p7s": self._forge(path)})
+        return self._attempt(
+            f"self-signed permissions {path}", path, SECRET, {"permissions.p7s": self._forge(path)}
+        )
 
     def self_signed_governance(self, path: str) -> Attempt:
         """Permissions and governance both: what is forged can then also be exempt from any check."""

@@ -164,7 +164,9 @@ class _Run:
         return cls(process, folder)
 
     def answers(self) -> Answers:
-        output, log = ((self.folder / name).read_text(encoding="utf-8", errors="replace") for name in ("output", "log"))
+        output, log = (
+            (self.folder / name).read_text(encoding="utf-8", errors="replace") for name in ("output", "log")
+        )
         return Answers.parse(output, log)
 
     def wait_for_voices(self, expected: Collection[str]) -> None:

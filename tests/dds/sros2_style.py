@@ -38,7 +38,9 @@ class Credential:
     @classmethod
     def of_ca(cls, keystore: Path) -> Credential:
         """The identity CA of a keystore with its key on disk."""
-        key = serialization.load_pem_private_key((keystore / "private/identity_ca.key.pem").read_bytes(), None)
+        key = serialization.load_pem_private_key(
+            (keystore / "private/identity_ca.key.pem").read_bytes(), None
+        )
         assert isinstance(key, ec.EllipticCurvePrivateKey)
         certificate = (keystore / "public/identity_ca.cert.pem").read_bytes()
         return cls(key, x509.load_pem_x509_certificate(certificate))
@@ -61,7 +63,9 @@ class Credential:
         )
 
 
-def issue(common_name: str, issuer: Credential | None = None, days: int = 3650, is_ca: bool = False) -> Credential:
+def issue(
+    common_name: str, issuer: Credential | None = None, days: int = 3650, is_ca: bool = False
+) -> Credential:
     """``days`` until the end; negative: it ended so many days ago."""
     key = ec.generate_private_key(ec.SECP256R1())
     subject = x509.Name([x509.NameAttribute(NameOID.COMMON_NAME, common_name)])

@@ -79,7 +79,9 @@ def outcome(
         environment={"LD_PRELOAD": str(patched)} if patched else None,
     )
     assert HONEST_VOICE in listener.voices, f"the victim heard not even the honest talker\n{listener.log}"
-    admitted = {attempt.label for attempt in attempts if talking.may(attempt.label, "publish", f"rt{attempt.topic}")}
+    admitted = {
+        attempt.label for attempt in attempts if talking.may(attempt.label, "publish", f"rt{attempt.topic}")
+    }
     return Outcome(admitted, listener.voices - {HONEST_VOICE})
 
 
@@ -189,4 +191,6 @@ def test_renewal_repairs_a_keystore_of_sros2(
     renewed = Workshop(sros2.keystore, tmp_path / "afterwards")
     after = [*renewed.borrowed(), renewed.self_signed_permissions("/a"), renewed.self_signed_governance("/a")]
     assert outcome(dds, domain_id, renewed, after) == NOBODY
-    assert outcome(dds, domain_id, renewed, after[-2:], patched=patched_dds) == Outcome(labels(after[-2:]), set())
+    assert outcome(dds, domain_id, renewed, after[-2:], patched=patched_dds) == Outcome(
+        labels(after[-2:]), set()
+    )

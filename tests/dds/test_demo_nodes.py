@@ -104,7 +104,9 @@ def test_without_security_nobody_stops_the_intruder(domain_id: int) -> None:
 def test_pushed_namespace_and_remapped_names(secured: Path, domain_id: int) -> None:
     env = environment(domain_id, secured)
     names = ("-r", "__ns:=/robot1", "-r", "__node:=speaker")
-    speaker = Node("talker", env, *enclave("/robot1"), *names, "-r", "chatter:=/conversation", *parameters(seconds=1))
+    speaker = Node(
+        "talker", env, *enclave("/robot1"), *names, "-r", "chatter:=/conversation", *parameters(seconds=1)
+    )
     assert speaker.end().status == 0
     undeclared = Node("talker", env, *enclave("/robot1"), *names, *parameters(seconds=1)).end()
     assert undeclared.status == 1

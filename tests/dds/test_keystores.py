@@ -64,7 +64,9 @@ def test_any_enclave_name_works_beside_the_root(dds: Probe, domain_id: int, tmp_
 def test_permissions_hold_in_their_domains_only(dds: Probe, domain_id: int, tmp_path: Path) -> None:
     for name, text in {"range": f"0-{domain_id}", "list": f"{domain_id},230", "elsewhere": "200-230"}.items():
         options = keystore.ProvisionOptions(domains=Domains.parse(text), durable=False)
-        keystore.provision(tmp_path / name, our_keystore.policies({"/a": Grant(publish=("/x",))}), options=options)
+        keystore.provision(
+            tmp_path / name, our_keystore.policies({"/a": Grant(publish=("/x",))}), options=options
+        )
     enclaves = {name: directory(tmp_path / name, "/a") for name in ("range", "list", "elsewhere")}
     answers = dds.try_endpoints(
         domain_id, [Participant(name, path, publish=("rt/x",)) for name, path in enclaves.items()]
@@ -87,7 +89,9 @@ LIGHTEST = DomainRule(
     liveliness_protection_kind=Protection.NONE,
     rtps_protection_kind=Protection.NONE,
     topic_rules=(
-        TopicRule("rt/chatter", metadata_protection_kind=Protection.NONE, data_protection_kind=Protection.NONE),
+        TopicRule(
+            "rt/chatter", metadata_protection_kind=Protection.NONE, data_protection_kind=Protection.NONE
+        ),
         TopicRule(),
     ),
 )

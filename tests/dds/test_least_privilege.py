@@ -75,13 +75,19 @@ TALKERS_AND_LISTENERS = {
     | every_node("/robot1/listener")
     | publisher("/robot1/chatter")
     | subscription("/robot1/chatter"),
-    "/shared": every_node("/talker") | every_node("/back/listener") | publisher("/chatter") | subscription("/chatter"),
+    "/shared": every_node("/talker")
+    | every_node("/back/listener")
+    | publisher("/chatter")
+    | subscription("/chatter"),
 }
 # Names that somebody might have meant: before the remap, without the namespace, one letter more.
 NEIGHBOURS: Endpoints = frozenset().union(
     *(publisher(name) | subscription(name) for name in ("/chatters", "/front/chatter", "/back/chatter")),
     *(server(name) | client(name) for name in ("/add_two_ints", "/robot1/add_two_int")),
-    *(action_server(name) | action_client(name) for name in ("/fibonacci", "/robot1/arm/fibonacci", "/count_up")),
+    *(
+        action_server(name) | action_client(name)
+        for name in ("/fibonacci", "/robot1/arm/fibonacci", "/count_up")
+    ),
     subscription("/rosout"),
 )
 
@@ -124,7 +130,9 @@ def test_a_policy_grants_its_names_and_no_others(dds: Probe, domain_id: int, tmp
     policies = [
         enclave("/robot1/adder", "/robot1", "add_two_ints_server", allow(Operation.REPLY, "add_two_ints")),
         enclave("/operator", "/", "add_two_ints_client", allow(Operation.REQUEST, "/robot1/add_two_ints")),
-        enclave("/robot1/arm/counter", "/robot1/arm", "fibonacci_server", allow(Operation.EXECUTE, "count_up")),
+        enclave(
+            "/robot1/arm/counter", "/robot1/arm", "fibonacci_server", allow(Operation.EXECUTE, "count_up")
+        ),
         enclave(
             "/robot1/arm/planner",
             "/robot1/arm",

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +44,12 @@ class Launcher:
         command = ["secure-launch", "--prefix", str(DEMO_WS), *arguments]
         env = {**environment(self.domain), "ROS_LOG_DIR": str(self.folder / "log")}
         result = subprocess.run(
-            command, env=env, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=LONGEST_SECONDS
+            command,
+            env=env,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            timeout=LONGEST_SECONDS,
         )
         return Launched(result.returncode, result.stdout)
 
@@ -106,7 +109,9 @@ def test_services_and_actions(launch: Launcher) -> None:
 def test_the_intruder_is_refused_and_the_talk_goes_on(launch: Launcher) -> None:
     launched = launch.secured("demo_nodes", "talker_listener_intruder.launch.xml", "count:=10")
     assert launched.status == 0, launched.output
-    assert any("REFUSED: DDS refuses the publisher on rt/chatter" in line for line in launched.lines_of("intruder"))
+    assert any(
+        "REFUSED: DDS refuses the publisher on rt/chatter" in line for line in launched.lines_of("intruder")
+    )
     assert len(launched.heard()) >= 10
     assert "forged" not in launched.output
 
@@ -174,23 +179,3 @@ def test_a_second_launch_uses_what_the_first_made(launch: Launcher) -> None:
 
 def _files(keystore: Path) -> list[Path]:
     return sorted(path for path in keystore.rglob("*") if path.is_file() and path.name != ".lock")
-
-
-def test_a_custom_launcher(tmp_path: Path, domain_id: int) -> None:
-    """The three calls of the library, as a program of about twenty lines."""
-    script = DEMO_WS.parent / "custom_launcher.py"
-    launch_file = DEMO_WS / "share/demo_nodes/launch/talker_listener_intruder.launch.xml"
-    env = {**environment(domain_id), "ROS_LOG_DIR": str(tmp_path / "log")}
-    result = subprocess.run(
-        [sys.executable, script, launch_file, tmp_path / "keystore", "--prefix", DEMO_WS],
-        env=env,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT,
-        text=True,
-        timeout=LONGEST_SECONDS,
-    )
-    launched = Launched(result.returncode, result.stdout)
-    assert launched.status == 0, launched.output
-    assert "listener-2 runs in /listener" in launched.output
-    assert launched.heard() and "REFUSED" in launched.output
-    assert os.path.isfile(tmp_path / "keystore/enclaves/listener/key.pem")
