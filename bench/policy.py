@@ -3,7 +3,8 @@
     python bench/policy.py [nodes] [interfaces]
 
 Prints a table. The floor is the least that any implementation must do with the same names: put each
-once into a set per enclave and sort it. Nothing is asserted.
+once into a set per enclave and sort it. The peer is SROS2's stylesheet from policy to permissions, where
+the package ``sros2`` is importable (``PYTHONPATH``, ``AMENT_PREFIX_PATH``). Nothing is asserted.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from datetime import datetime, timezone
-from time import perf_counter
+from time import process_time
 
 from enclave_launch.policy import RunningNode, derive_policy
 from enclave_launch.policy.explanation import explain
@@ -66,12 +67,25 @@ def floor(fleet: list[RunningNode]) -> None:
         sorted(names)
 
 
+def peer(policy: bytes) -> Callable[[], object] | None:
+    """What ``ros2 security create_permission`` does with the policy before signing; ``None``: no sros2 here."""
+    try:
+        from sros2.policy import get_transport_template
+    except (ImportError, OSError, KeyError):
+        return None
+    from lxml import etree
+
+    stylesheet = etree.XSLT(etree.parse(str(get_transport_template("dds", "permissions.xsl"))))
+    document = etree.fromstring(policy)
+    return lambda: etree.tostring(stylesheet(document), pretty_print=True)
+
+
 def best(action: Callable[[], object], repeat: int = 5) -> float:
     times = []
     for _ in range(repeat):
-        start = perf_counter()
+        start = process_time()
         action()
-        times.append(perf_counter() - start)
+        times.append(process_time() - start)
     return min(times)
 
 
@@ -99,9 +113,15 @@ def main() -> None:
         ("explain one node", best(lambda: explain(derived, "/robot0/worker0"))),
     )
     print(f"{count} nodes, {interfaces} interfaces each, {len(enclaves)} enclaves, {rules} rules")
-    print(f"{'':38}{'ms':>9}{'x floor':>10}")
+    print(f"{'':38}{'CPU ms':>9}{'x floor':>10}")
     for label, seconds in rows:
         print(f"{label:38}{seconds * 1000:9.1f}{seconds / base:10.1f}")
+    transform = peer(policy_xml(derived.policy))
+    if transform is None:
+        print(f"{'peer: sros2 permissions.xsl':38}  not available")
+    else:
+        seconds = best(transform, repeat=1)
+        print(f"{'peer: sros2 permissions.xsl':38}{seconds * 1000:9.1f}{seconds / base:10.1f}")
 
 
 if __name__ == "__main__":

@@ -28,7 +28,9 @@ class Domains:
             raise InvalidInput("at least one ROS domain id is needed")
         for first, last in self.ranges:
             if not LOWEST_ID <= first <= last <= HIGHEST_ID:
-                raise InvalidInput(f"domain ids {_text(first, last)} are no range within {LOWEST_ID}..{HIGHEST_ID}")
+                raise InvalidInput(
+                    f"domain ids {_text(first, last)} are no range within {LOWEST_ID}..{HIGHEST_ID}"
+                )
         object.__setattr__(self, "ranges", tuple(_merged(self.ranges)))
 
     @classmethod

@@ -111,7 +111,9 @@ def _candidates(operation: Operation, topics: tuple[set[str], set[str]]) -> set[
 
 def _check_profile(profile: Profile) -> None:
     if not _NAMESPACE.match(profile.ns):
-        raise PolicyError(f"ns={printable(profile.ns)} is not an absolute namespace; write for example '/' or '/robot'")
+        raise PolicyError(
+            f"ns={printable(profile.ns)} is not an absolute namespace; write for example '/' or '/robot'"
+        )
     if not _NODE.match(profile.node) or len(profile.node) > 255:
         raise PolicyError(f"node={printable(profile.node)} is not a node name")
 

@@ -120,7 +120,9 @@ class _PolicyReader:
         if not found:
             raise PolicyError(f"{place.at(element)}: <profiles> needs at least one <profile>")
 
-    def _profile(self, path: str, profile: Profile, element: etree._Element, place: Place, rules: Rules) -> None:
+    def _profile(
+        self, path: str, profile: Profile, element: etree._Element, place: Place, rules: Rules
+    ) -> None:
         self._check_name("~/x", profile, place.at(element))  # looks at ns and node
         for group, at in self._reader.children(element, place):
             if group.tag not in _GROUPS:
@@ -141,7 +143,9 @@ class _PolicyReader:
             if value is None:
                 continue
             if value not in ("ALLOW", "DENY"):
-                raise PolicyError(f"{place.at(group)}: {operation.value}={printable(value)} must be ALLOW or DENY")
+                raise PolicyError(
+                    f"{place.at(group)}: {operation.value}={printable(value)} must be ALLOW or DENY"
+                )
             found.append((operation, Qualifier(value)))
         if not found:
             names = " or ".join(operation.value for operation in operations)
@@ -175,7 +179,9 @@ class _PolicyReader:
         except PolicyError as error:
             raise PolicyError(f"{where}: {error}") from None
 
-    def _some_children(self, element: etree._Element, place: Place, tag: str) -> list[tuple[etree._Element, Place]]:
+    def _some_children(
+        self, element: etree._Element, place: Place, tag: str
+    ) -> list[tuple[etree._Element, Place]]:
         children = list(self._reader.children(element, place))
         if not children:
             raise PolicyError(f"{place.at(element)}: <{element.tag}> needs at least one <{tag}>")

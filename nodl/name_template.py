@@ -12,7 +12,9 @@ from dataclasses import dataclass
 Edit = tuple[str, tuple[str, ...]]
 """A method of ``str`` with its arguments: ``("strip", ("/",))``."""
 
-EDITS = frozenset({"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"})
+EDITS = frozenset(
+    {"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"}
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,9 @@ class ParameterPart:
         if not isinstance(value, list | tuple):
             return ()
         if isinstance(self.item, int):
-            return tuple(value[self.item : self.item + 1]) if self.item >= 0 else tuple(value[self.item :][:1])
+            return (
+                tuple(value[self.item : self.item + 1]) if self.item >= 0 else tuple(value[self.item :][:1])
+            )
         return tuple(value)
 
     def _edited(self, text: str) -> str:

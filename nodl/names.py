@@ -119,7 +119,7 @@ def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> 
     plain = _PLAIN.match(name)
     if plain:
         quick = f"{join(namespace, node)}{name[1:]}" if plain[1] else join(namespace, name)
-        if is_full_name(quick):
+        if len(quick) <= MAX_NAME_LENGTH:
             return quick
     validate_name(name, what)
     expanded = name

@@ -56,7 +56,9 @@ def node_of(manifest: ManifestNode) -> Node:
     return Node(
         name=_v1_name(manifest),
         executable=interface.executable or interface.plugin or "",
-        topics=[Topic(name=_name(e), message_type=e.type, role=PubSubRole(e.kind.value)) for e in kinds["topic"]],
+        topics=[
+            Topic(name=_name(e), message_type=e.type, role=PubSubRole(e.kind.value)) for e in kinds["topic"]
+        ],
         services=[Service(name=_name(e), service_type=e.type, role=_role(e)) for e in kinds["service"]],
         actions=[Action(name=_name(e), action_type=e.type, role=_role(e)) for e in kinds["action"]],
         parameters=[Parameter(name=n, parameter_type=t) for n, t in manifest.parameter_types.items()],

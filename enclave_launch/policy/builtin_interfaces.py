@@ -119,5 +119,6 @@ def _rows(distro: str, library: ClientLibrary, conditions: frozenset[Condition])
 
 def _listens_to_tf(interface: NodeInterface) -> bool:
     return any(
-        endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.text == "/tf" for endpoint in interface.endpoints
+        endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.text == "/tf"
+        for endpoint in interface.endpoints
     )

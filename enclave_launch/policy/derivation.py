@@ -32,6 +32,9 @@ LIST_NAMES: dict[Operation, str] = {
     Operation.EXECUTE: "serve_actions",
 }
 
+# Below that, even actions with names of the greatest length stay under the sizes that matter.
+_MANY_RULES = 20
+
 Reasons = dict[Rule, list[Reason]]
 ProfileKey = tuple[str, str]  # namespace and node name
 
@@ -96,11 +99,16 @@ def derive_policy(
             chosen.policy_file,
         )
     derived = collection.result()
-    if chosen.policy_file is None:
-        return derived
+    if chosen.policy_file is not None:
+        derived = _merged(derived, chosen.policy_file)
+    concerns = _size_warnings(derived.policy.enclaves)
+    return replace(derived, warnings=_unique((*derived.warnings, *concerns)))
+
+
+def _merged(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
     from enclave_launch.policy.policy_file import merge_policy_file
 
-    merged = merge_policy_file(derived.policy, derived.reasons, chosen.policy_file)
+    merged = merge_policy_file(derived.policy, derived.reasons, document)
     return replace(
         derived,
         policy=merged.policy,
@@ -151,6 +159,20 @@ class _Collection:
         }
         nodes = {path: tuple(each) for path, each in self.nodes.items()}
         return DerivedPolicy(Policy(enclaves), reasons, nodes, _unique(self.problems), _unique(self.warnings))
+
+
+def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[str]:
+    """Enclaves whose permissions come near what DDS can carry, told before anything is signed.
+
+    Only those with many rules are looked at: the others need not load the code that knows DDS.
+    """
+    large = [enclave for enclave in enclaves if sum(len(p.rules) for p in enclave.profiles) > _MANY_RULES]
+    if not large:
+        return []
+    from keystore.permissions_size import expected_concern
+
+    concerns = (expected_concern(enclave) for enclave in large)
+    return [concern.text for concern in concerns if concern]
 
 
 def _note(permission: Permission, rules: set[Rule], reasons: Reasons) -> None:

@@ -47,7 +47,9 @@ def launcher_node(
         source=SourceRef(calls[0].location.file, calls[0].location.line),
         library=ClientLibrary.RCLPY,
     )
-    return RunningNode(interface, name, name, "/", RemapRules(), {}, enclave, calls[0].location, role="launcher")
+    return RunningNode(
+        interface, name, name, "/", RemapRules(), {}, enclave, calls[0].location, role="launcher"
+    )
 
 
 def _endpoint(kind: EndpointKind, name: str, type_name: str, source: SourceRef) -> Endpoint:

@@ -187,7 +187,9 @@ class _Collector:
         except InvalidNameError as error:
             self._unresolved(operation, place, str(error))
             return
-        note = f"a pattern, because {why or 'only a part of the name is known'}; accepted by --accept-patterns"
+        note = (
+            f"a pattern, because {why or 'only a part of the name is known'}; accepted by --accept-patterns"
+        )
         reason = Reason(self._fqn, "declared", place, written, (), note)
         self._result.permissions.append(Permission(operation, name, reason))
         self._result.warnings.append(f"{place}: node {self._fqn} may {operation.value} {name}: {note}")

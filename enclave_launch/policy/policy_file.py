@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from enclave_launch.policy.node_permissions import Reason
+from keystore.permissions import dds_rules
 from keystore.permissions_names import full_name
 from keystore.permissions_patterns import can_meet
 from keystore.policy import EnclavePolicy, Policy, Profile, Qualifier, Rule
@@ -44,12 +45,14 @@ def merge_policy_file(derived: Policy, reasons: ReasonsByEnclave, document: Poli
             enclaves.append(enclave)
             continue
         added = _absolute(other, document)
-        enclaves.append(EnclavePolicy(enclave.path, _union(enclave, added)))
+        merged = EnclavePolicy(enclave.path, _union(enclave, added))
+        enclaves.append(merged)
         known = merged_reasons.setdefault(enclave.path, {})
         for rules in added.values():
             for rule, reason in rules.items():
                 known[rule] = (*known.get(rule, ()), reason)
         warnings.extend(_denials(enclave.path, known))
+        warnings.extend(f"enclave {enclave.path}: {hazard}" for hazard in dds_rules(merged).hazards)
     return MergedPolicy(Policy(tuple(enclaves)), merged_reasons, tuple(warnings))
 
 

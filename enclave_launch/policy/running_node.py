@@ -44,9 +44,13 @@ class RunningNode:
         return join(self.namespace, self.name)
 
 
-def node_of_process(process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role) -> RunningNode:
+def node_of_process(
+    process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role
+) -> RunningNode:
     """One node of ``process``. Raises ``LaunchFileError`` for a remap rule that would make rcl refuse to start."""
-    rules = RemapRules(process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location))
+    rules = RemapRules(
+        process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location)
+    )
     return _named(interface, rules, process.parameters, enclave, process.location, role)
 
 
@@ -83,11 +87,17 @@ def _named(
             location,
         )
     namespace = rules.namespace(interface.namespace or "/", name).name
-    return RunningNode(interface, original or name, name, namespace, rules, parameters, enclave, location, role)
+    return RunningNode(
+        interface, original or name, name, namespace, rules, parameters, enclave, location, role
+    )
 
 
-def _parse(texts: Iterable[str], written: Iterable[RemapRule], location: SourceLocation) -> tuple[ParsedRule, ...]:
-    places = {f"{rule.source}:={rule.target}": str(rule.location) for rule in written if rule.location is not None}
+def _parse(
+    texts: Iterable[str], written: Iterable[RemapRule], location: SourceLocation
+) -> tuple[ParsedRule, ...]:
+    places = {
+        f"{rule.source}:={rule.target}": str(rule.location) for rule in written if rule.location is not None
+    }
     try:
         return tuple(parse_rule(text, places.get(text, str(location))) for text in texts)
     except InvalidRemapRuleError as error:

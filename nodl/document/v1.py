@@ -91,7 +91,9 @@ def _parse_xml(text: bytes, file: str) -> etree._Element:
             if root.getroottree().docinfo.internalDTD is None:
                 return root
     except etree.XMLSyntaxError as error:
-        raise InvalidXMLError.at(SourceRef(file, error.lineno or 0), f"not well-formed XML: {error.msg}") from None
+        raise InvalidXMLError.at(
+            SourceRef(file, error.lineno or 0), f"not well-formed XML: {error.msg}"
+        ) from None
     raise InvalidXMLError.at(SourceRef(file), "a DOCTYPE is not allowed; remove it and write entities out")
 
 
@@ -100,7 +102,9 @@ def _node(element: etree._Element, file: str, package: str | None) -> ManifestNo
     namespace, name = _node_name(element, file)
     executable = element.get("executable", "")
     if not executable or not executable.isprintable():
-        raise InvalidElementError.at(_at(element, file), f"executable {shown(executable)} is not a program name")
+        raise InvalidElementError.at(
+            _at(element, file), f"executable {shown(executable)} is not a program name"
+        )
     if not len(element):
         raise InvalidNoDLDocumentError.at(_at(element, file), f"node {name} describes no interface at all")
     own_prefix = f"{(namespace or '').rstrip('/')}/{name}/"
@@ -162,7 +166,10 @@ def _endpoints(element: etree._Element, file: str, own_prefix: str) -> list[Endp
     private = name.startswith(own_prefix)
     template = NameTemplate.literal(f"~/{name[len(own_prefix) :]}" if private else name)
     written = name if private else ""
-    return [Endpoint(kind, template, element.get("type", ""), source, written=written) for kind in _ROLES[tag][role]]
+    return [
+        Endpoint(kind, template, element.get("type", ""), source, written=written)
+        for kind in _ROLES[tag][role]
+    ]
 
 
 def _once(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:

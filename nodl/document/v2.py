@@ -49,7 +49,9 @@ class _Identity:
     explicit: bool
 
 
-def parse_v2(text: bytes, file: str, *, package: str | None, name: str, prefixes: Sequence[str] = ()) -> ManifestNode:
+def parse_v2(
+    text: bytes, file: str, *, package: str | None, name: str, prefixes: Sequence[str] = ()
+) -> ManifestNode:
     """The node of one document. ``name`` as registered; ``prefixes`` to find ``nodl://`` includes.
 
     Reads the included files. Raises ``InvalidNoDLError`` with file:line.

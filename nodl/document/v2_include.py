@@ -78,7 +78,9 @@ class _Walk:
             return self._from_index(rest, source)
         if scheme == "local":
             return _local(rest, source, origin)
-        raise IncludeError.at(source, f"{shown(ref)}: only nodl://<package>/<name> and local://<path> are known")
+        raise IncludeError.at(
+            source, f"{shown(ref)}: only nodl://<package>/<name> and local://<path> are known"
+        )
 
     def _from_index(self, body: str, source: SourceRef) -> Path:
         package, _, name = body.partition("/")
@@ -101,7 +103,9 @@ def _local(body: str, source: SourceRef, origin: Path) -> Path:
     path = (origin.parent / body).resolve()
     root = package_root(origin)
     if not path.is_relative_to(root):
-        raise IncludeError.at(source, f"{shown('local://' + body)} is outside of {root}, where its package is")
+        raise IncludeError.at(
+            source, f"{shown('local://' + body)} is outside of {root}, where its package is"
+        )
     return path
 
 

@@ -110,7 +110,9 @@ def _map(
             checker = (keys or {}).get(name) or next(by_pattern, others)
             if checker is None:
                 known = ", ".join(keys or ())
-                raise InvalidNoDLDocumentError.at(value.keys[name], f"{what} has no key {shown(name)}; known: {known}")
+                raise InvalidNoDLDocumentError.at(
+                    value.keys[name], f"{what} has no key {shown(name)}; known: {known}"
+                )
             checker(each, name if what == "the document" else f"{what}.{name}")
         if also:
             also(value, what)

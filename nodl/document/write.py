@@ -26,7 +26,9 @@ _YAML_WORDS = frozenset({"yes", "no", "on", "off", "true", "false", "null", "y",
 _PARAMETER_TYPES = {
     **{name: name for name in PARAMETER_TYPES},
     **dict.fromkeys(("boolean",), "bool"),
-    **dict.fromkeys(("integer", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"), "int"),
+    **dict.fromkeys(
+        ("integer", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"), "int"
+    ),
     **dict.fromkeys(("float", "float32", "float64"), "double"),
     **dict.fromkeys(("str", "std::string"), "string"),
     **dict.fromkeys(("integer_array", "int64_array"), "int_array"),
@@ -78,7 +80,9 @@ def v1_xml(nodes: Sequence[ManifestNode]) -> Written:
     for node in nodes:
         lines += _v1_node(node)
         if node.version == 2:
-            notes.append(f"{node.interface.name}: QoS, descriptions and details of parameters have no place in v1")
+            notes.append(
+                f"{node.interface.name}: QoS, descriptions and details of parameters have no place in v1"
+            )
     return Written("\n".join([*lines, "</interface>", ""]), tuple(notes))
 
 
@@ -142,7 +146,9 @@ def _v1_node(node: ManifestNode) -> list[str]:
     namespace = _own_namespace(interface)
     name = f"{namespace}/{interface.name}" if namespace else interface.name
     children = [*_v1_interfaces(interface.endpoints)]
-    children += [f'    <parameter name="{escape(n)}" type="{escape(t)}"/>' for n, t in node.parameter_types.items()]
+    children += [
+        f'    <parameter name="{escape(n)}" type="{escape(t)}"/>' for n, t in node.parameter_types.items()
+    ]
     if not children:
         raise InvalidNoDLDocumentError.at(interface.source, "v1 cannot describe a node without any interface")
     executable = interface.executable or interface.plugin or ""

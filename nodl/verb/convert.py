@@ -16,7 +16,9 @@ from nodl.verb.options import add_prefix_argument
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
-    parser = subparsers.add_parser("convert", help="v1 to v2 or v2 to v1; what gets lost is told", description=__doc__)
+    parser = subparsers.add_parser(
+        "convert", help="v1 to v2 or v2 to v1; what gets lost is told", description=__doc__
+    )
     parser.add_argument("files", nargs="+", metavar="FILE", help="documents of one version")
     parser.add_argument(
         "-o",

@@ -52,11 +52,15 @@ def run(arguments: argparse.Namespace) -> int:
     return 1 if missing or not nodes else 0
 
 
-def _of_package(lookup: ManifestLookup, package: str, names: Iterable[str]) -> tuple[list[NodeInterface], list[str]]:
+def _of_package(
+    lookup: ManifestLookup, package: str, names: Iterable[str]
+) -> tuple[list[NodeInterface], list[str]]:
     wanted = list(names)
     if not wanted:
         everything = lookup.all_of(package)
-        where = "" if everything else f"no NoDL of package {package}; looked at {_listing(everything.searched)}"
+        where = (
+            "" if everything else f"no NoDL of package {package}; looked at {_listing(everything.searched)}"
+        )
         return list(everything.found), [where] if where else []
     nodes: list[NodeInterface] = []
     missing: list[str] = []

@@ -13,7 +13,12 @@ from keystore.permissions import dds_rules, permissions_document
 from keystore.permissions_names import dds_topics, full_name
 from keystore.permissions_patterns import can_meet, covers
 from keystore.permissions_read import parse_permissions
-from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, signed_size, size_concern
+from keystore.permissions_size import (
+    FAST_DDS_LIMIT_BYTES,
+    expected_concern,
+    signed_size,
+    size_concern,
+)
 from keystore.policy import EnclavePolicy, Operation, PolicyError, Profile, Qualifier, Rule
 from keystore.validity import Validity
 
@@ -71,7 +76,11 @@ TOPICS = {
     "request": (["rq/xRequest"], ["rr/xReply"]),
     "reply": (["rr/xReply"], ["rq/xRequest"]),
     "call": (
-        ["rq/x/_action/cancel_goalRequest", "rq/x/_action/get_resultRequest", "rq/x/_action/send_goalRequest"],
+        [
+            "rq/x/_action/cancel_goalRequest",
+            "rq/x/_action/get_resultRequest",
+            "rq/x/_action/send_goalRequest",
+        ],
         [
             *("rr/x/_action/cancel_goalReply", "rr/x/_action/get_resultReply", "rr/x/_action/send_goalReply"),
             *("rt/x/_action/feedback", "rt/x/_action/status"),
@@ -118,7 +127,9 @@ def test_names_that_no_permission_is_written_for(expression: str) -> None:
         document(enclave(allow("publish", expression)))
 
 
-@pytest.mark.parametrize(("ns", "node"), [("a", "n"), ("", "n"), ("/a/", "n"), ("/", "n/m"), ("/", ""), ("/1", "n")])
+@pytest.mark.parametrize(
+    ("ns", "node"), [("a", "n"), ("", "n"), ("/a/", "n"), ("/", "n/m"), ("/", ""), ("/1", "n")]
+)
 def test_profiles_that_cannot_be(ns: str, node: str) -> None:
     with pytest.raises(PolicyError):
         document(enclave(allow("publish", "x"), ns=ns, node=node))
@@ -132,7 +143,9 @@ def test_a_subject_that_would_not_match_is_refused(subject: str) -> None:
 
 def test_an_empty_profile_may_join_and_nothing_else() -> None:
     (grant,) = parse_permissions(document(enclave()))
-    assert [(r.publish, r.subscribe) for r in grant.rules] == [(("ros_discovery_info",), ("ros_discovery_info",))]
+    assert [(r.publish, r.subscribe) for r in grant.rules] == [
+        (("ros_discovery_info",), ("ros_discovery_info",))
+    ]
 
 
 def test_discovery_topic_by_rmw() -> None:
@@ -179,12 +192,16 @@ def test_a_denial_that_would_still_block_is_told() -> None:
 
 
 def test_a_denial_that_meets_no_wildcard_is_not_written() -> None:
-    rules = dds_rules(enclave(allow("publish", "/open/*"), deny("publish", "/closed"), deny("subscribe", "/*")))
+    rules = dds_rules(
+        enclave(allow("publish", "/open/*"), deny("publish", "/closed"), deny("subscribe", "/*"))
+    )
     assert not rules.deny
 
 
 def test_denial_of_one_profile_beats_allowance_of_another() -> None:
-    policy = EnclavePolicy("/e", (Profile("/", "a", (allow("reply", "s"),)), Profile("/", "b", (deny("reply", "s"),))))
+    policy = EnclavePolicy(
+        "/e", (Profile("/", "a", (allow("reply", "s"),)), Profile("/", "b", (deny("reply", "s"),)))
+    )
     assert "rr/sReply" not in dds_rules(policy).allow.publish
 
 
@@ -195,7 +212,10 @@ def test_no_wildcard_that_the_input_did_not_contain() -> None:
 
 def test_domains_and_validity() -> None:
     text = permissions_document(
-        "CN=x", enclave(), validity=Validity(START, START + timedelta(days=400 * 365)), domains=Domains.parse("3,5-7")
+        "CN=x",
+        enclave(),
+        validity=Validity(START, START + timedelta(days=400 * 365)),
+        domains=Domains.parse("3,5-7"),
     ).decode()
     assert "<domains><id>3</id><id_range><min>5</min><max>7</max></id_range></domains>" in text
     assert "<not_after>2262-04-11T00:00:00</not_after>" in text  # later dates are refused by Cyclone DDS
@@ -210,7 +230,9 @@ def test_names_are_escaped_in_the_only_free_texts() -> None:
 def big(topics: int, nodes: int = 1) -> EnclavePolicy:
     profiles = tuple(
         Profile(
-            f"/fleet/robot{i}", f"driver{i}", tuple(allow("publish", f"~/topic{j}") for j in range(topics // nodes))
+            f"/fleet/robot{i}",
+            f"driver{i}",
+            tuple(allow("publish", f"~/topic{j}") for j in range(topics // nodes)),
         )
         for i in range(nodes)
     )
@@ -226,6 +248,17 @@ def test_size_is_warned_of_before_fast_dds_stops_matching(topics: int, expected:
         assert str(concern.size) in concern.text and "/fleet/robot0/driver0/* (" in concern.text
 
 
+@pytest.mark.parametrize("operation", ["publish", "reply", "call"])
+@pytest.mark.parametrize("topics", [50, 150, 400, 1200])
+def test_the_size_is_foreseen_before_signing(operation: str, topics: int) -> None:
+    rules = tuple(allow(operation, f"~/channel{j}") for j in range(topics))
+    policy = EnclavePolicy("/fleet", (Profile("/fleet", "driver", rules),))
+    real = signed_size(document(policy))
+    foreseen = expected_concern(policy)
+    assert (foreseen is None) == (size_concern(real, policy) is None)
+    assert foreseen is None or abs(foreseen.size - real) < 200
+
+
 def test_a_shared_enclave_is_told_which_nodes_to_move_out() -> None:
     policy = big(3000, nodes=3)
     concern = size_concern(FAST_DDS_LIMIT_BYTES + 1, policy)
@@ -237,7 +270,9 @@ def test_a_shared_enclave_is_told_which_nodes_to_move_out() -> None:
 
 tokens = st.from_regex(r"[a-c]{1,2}", fullmatch=True)
 literals = st.lists(tokens, min_size=1, max_size=3).map(lambda parts: "/" + "/".join(parts))
-patterns = st.text("ab*?/", min_size=1, max_size=6).map(lambda t: "/" + t.replace("//", "/a/").strip("/") + "a")
+patterns = st.text("ab*?/", min_size=1, max_size=6).map(
+    lambda t: "/" + t.replace("//", "/a/").strip("/") + "a"
+)
 expressions = st.one_of(literals, patterns.filter(lambda text: "//" not in text))
 rules_strategy = st.builds(Rule, st.sampled_from(Operation), st.sampled_from(Qualifier), expressions)
 

@@ -27,7 +27,9 @@ Rules = Sequence[tuple[bool, tuple[Sequence[str], Sequence[str]]]]
 
 def ours(case: str) -> Grant:
     (enclave,) = read_policy(GOLDEN / f"{case}.policy.xml").policy.enclaves
-    document = permissions_document(f"CN={enclave.path}", enclave, validity=VALIDITY, domains=Domains.single(0))
+    document = permissions_document(
+        f"CN={enclave.path}", enclave, validity=VALIDITY, domains=Domains.single(0)
+    )
     (grant,) = parse_permissions(document)
     return grant
 

@@ -28,7 +28,9 @@ def document(
 
 def test_a_document_of_another_tool() -> None:
     (grant,) = parse_permissions(
-        document(domains="<id>3</id><id_range><min>5</min></id_range>", topics="<!-- c --><topic>rt/a</topic>")
+        document(
+            domains="<id>3</id><id_range><min>5</min></id_range>", topics="<!-- c --><topic>rt/a</topic>"
+        )
     )
     (rule,) = grant.rules
     assert (rule.qualifier, rule.domains, rule.publish) == (Qualifier.ALLOW, ((3, 3), (5, None)), ("rt/a",))

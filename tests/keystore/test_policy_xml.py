@@ -17,7 +17,9 @@ from keystore.safe_xml import check_schema, parse_xml
 GROUP = '<topics publish="ALLOW"><topic>chatter</topic></topics>'
 
 
-def policy(body: str = GROUP, *, path: str = "/talker", profile: str = 'ns="/" node="talker"', head: str = "") -> str:
+def policy(
+    body: str = GROUP, *, path: str = "/talker", profile: str = 'ns="/" node="talker"', head: str = ""
+) -> str:
     return (
         f'{head}<policy version="0.2.0"><enclaves><enclave path="{path}"><profiles>'
         f"<profile {profile}>{body}</profile></profiles></enclave></enclaves></policy>"
@@ -179,7 +181,9 @@ tokens = st.from_regex(r"[a-z_][a-z0-9_]{0,3}", fullmatch=True)
 names = st.builds(lambda head, tail: head + tail, st.sampled_from(["", "/", "~/", "/*", "/[a-c]"]), tokens)
 rules_strategy = st.builds(Rule, st.sampled_from(Operation), st.sampled_from(Qualifier), names)
 profiles = st.builds(
-    lambda node, rules: Profile("/ns", node, tuple(sorted(set(rules)))), tokens, st.lists(rules_strategy, max_size=6)
+    lambda node, rules: Profile("/ns", node, tuple(sorted(set(rules)))),
+    tokens,
+    st.lists(rules_strategy, max_size=6),
 )
 enclaves = st.builds(
     lambda name, found: EnclavePolicy(f"/{name}", tuple(sorted(found, key=lambda p: p.node))),

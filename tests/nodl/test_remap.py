@@ -53,7 +53,19 @@ def test_rules_that_rcl_accepts(text: str) -> None:
 
 REJECTED = (
     *("", "a", ":", "1", "~", ":=", "a:=", ":=b", "::=", "1:=", "~:=", "~:=b", "a:=~"),
-    *("/:=b", "a:=/", "a/:=b", "a:=b/", "a//b:=c", "a b:=c", "a:=b c", "a-b:=c", "a.b:=c", "1a:=b", "a/1b:=c"),
+    *(
+        "/:=b",
+        "a:=/",
+        "a/:=b",
+        "a:=b/",
+        "a//b:=c",
+        "a b:=c",
+        "a:=b c",
+        "a-b:=c",
+        "a.b:=c",
+        "1a:=b",
+        "a/1b:=c",
+    ),
     *("a__b:=c", "a:=b__c", "__x:=b", "a:=__node", "~abc:=d", "a:=~abc", "{node}:=a", "f{oo:=/b", "a:=/b}c"),
     *("n1:n2:a:=b", "/ns/n:a:=b", "rostopic://n:a:=b", "a:=b:=c", "a:=rostopic://b", "rostopic://:=b"),
     *("rostopic::=b", "__node:=", "__node:=a/b", "__ns:=", "__ns:=a", "__ns:=//", "__ns:=/1", "a\n:=b"),
@@ -68,7 +80,9 @@ def test_rules_at_which_rcl_refuses_to_start(text: str) -> None:
 
 
 def test_a_bad_rule_is_told_with_its_place() -> None:
-    with pytest.raises(InvalidRemapRuleError, match=r"demo.launch.xml:7: invalid remap rule 'a__b:=c': .*'__'"):
+    with pytest.raises(
+        InvalidRemapRuleError, match=r"demo.launch.xml:7: invalid remap rule 'a__b:=c': .*'__'"
+    ):
         parse_rule("a__b:=c", "demo.launch.xml:7")
 
 
@@ -133,7 +147,10 @@ def test_parts_of_an_action_are_remapped_one_by_one() -> None:
     names = NodeNames("n", "/", rules("fib/_action/feedback:=news", "rosservice://fib/_action/send_goal:=go"))
     parts = names.action_parts("/fib")
     assert parts is not None
-    assert {k: r.name for k, r in parts.topics.items()} == {"feedback": "/news", "status": "/fib/_action/status"}
+    assert {k: r.name for k, r in parts.topics.items()} == {
+        "feedback": "/news",
+        "status": "/fib/_action/status",
+    }
     assert parts.services["send_goal"].name == "/go"
     assert parts.services["get_result"].name == "/fib/_action/get_result"
 

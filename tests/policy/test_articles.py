@@ -75,7 +75,9 @@ def process(
     )
 
 
-def derive(prefix: str, *processes: ResolvedProcess, scope: EnclaveScope = EnclaveScope.NAMESPACE) -> DerivedPolicy:
+def derive(
+    prefix: str, *processes: ResolvedProcess, scope: EnclaveScope = EnclaveScope.NAMESPACE
+) -> DerivedPolicy:
     nodes = []
     for each in processes:
         (interface,) = find_node_interfaces("demo_nodes_cpp", each.executable, prefixes=[prefix]).found

@@ -49,7 +49,14 @@ def everything(derived: DerivedPolicy, enclave: str = "/") -> set[str]:
 
 def test_every_kind_of_interface(node: NodeMaker) -> None:
     found = derive(node("pub a", "sub b", "serve c", "call d", "action e", "goal f"))
-    assert declared(found) == {"publish /a", "subscribe /b", "reply /c", "request /d", "execute /e", "call /f"}
+    assert declared(found) == {
+        "publish /a",
+        "subscribe /b",
+        "reply /c",
+        "request /d",
+        "execute /e",
+        "call /f",
+    }
 
 
 NAMES = [
@@ -209,7 +216,9 @@ def test_interfaces_that_a_manifest_repeats_are_not_doubled(node: NodeMaker) -> 
 
 
 def endpoint(*parts: str | ParameterPart | UnknownPart, certainty: Certainty = Certainty.EXACT) -> Endpoint:
-    return Endpoint(EndpointKind.PUBLISHER, NameTemplate(parts), "x/msg/Y", SourceRef("talker.py", 12), certainty)
+    return Endpoint(
+        EndpointKind.PUBLISHER, NameTemplate(parts), "x/msg/Y", SourceRef("talker.py", 12), certainty
+    )
 
 
 def test_names_from_parameters_follow_what_launch_sets(node: NodeMaker) -> None:
@@ -266,7 +275,9 @@ def test_gaps_of_inference_are_problems(node: NodeMaker) -> None:
     assert problem.startswith("talker.py:30: node /talker: eval() cannot be followed; describe demo/talker")
 
 
-@pytest.mark.parametrize(("name", "namespace"), [("a b", "/"), ("n", "/a/"), ("<node_name_unspecified>", "/")])
+@pytest.mark.parametrize(
+    ("name", "namespace"), [("a b", "/"), ("n", "/a/"), ("<node_name_unspecified>", "/")]
+)
 def test_a_node_with_an_impossible_name_gets_nothing(node: NodeMaker, name: str, namespace: str) -> None:
     found = derive(node("pub a", name=name, namespace=namespace))
     assert found.reasons["/"] == {} and len(found.problems) == 1
@@ -306,8 +317,12 @@ def test_enclaves_without_a_known_node_exist_and_allow_nothing() -> None:
 words = st.sampled_from(["a", "b", "/a", "~/a", "c/d"])
 kinds = st.sampled_from(["pub", "sub", "serve", "call", "action", "goal"])
 interfaces = st.lists(st.builds(lambda k, n: f"{k} {n}", kinds, words), max_size=4)
-specs = st.lists(st.tuples(interfaces, st.sampled_from(["n1", "n2", "n3"]), st.sampled_from(["/", "/e"])), max_size=4)
-FIXTURE_IS_PURE = settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+specs = st.lists(
+    st.tuples(interfaces, st.sampled_from(["n1", "n2", "n3"]), st.sampled_from(["/", "/e"])), max_size=4
+)
+FIXTURE_IS_PURE = settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
 
 
 def build(make: NodeMaker, found: Iterable[tuple[list[str], str, str]]) -> list[RunningNode]:
@@ -316,7 +331,9 @@ def build(make: NodeMaker, found: Iterable[tuple[list[str], str, str]]) -> list[
 
 @FIXTURE_IS_PURE
 @given(specs)
-def test_law_the_policy_of_many_is_the_union_of_each(node: NodeMaker, found: list[tuple[list[str], str, str]]) -> None:
+def test_law_the_policy_of_many_is_the_union_of_each(
+    node: NodeMaker, found: list[tuple[list[str], str, str]]
+) -> None:
     nodes = build(node, found)
     together = derive(*nodes)
     for enclave in {each.enclave for each in nodes}:
@@ -358,6 +375,13 @@ def test_law_the_order_of_nodes_does_not_matter_and_every_rule_has_a_reason(
         assert all(derived.reasons[enclave.path].values())
     if derived.policy.enclaves:
         assert parse_policy(policy_xml(derived.policy)).policy == derived.policy
+
+
+def test_an_enclave_too_large_for_fast_dds_is_told_at_once(node: NodeMaker) -> None:
+    many = [node(*(f"action task{i}_{j}" for j in range(10)), name=f"n{i}") for i in range(12)]
+    (warning,) = derive(*many, distro="rolling").warnings
+    assert "the permissions of enclave / take" in warning and "Give some of its 12 nodes" in warning
+    assert derive(*many[:3], distro="rolling").warnings == ()
 
 
 def test_renaming_a_node_renames_its_private_names_only(node: NodeMaker) -> None:

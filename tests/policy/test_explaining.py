@@ -137,7 +137,9 @@ def test_enclaves_that_this_launch_does_not_use_are_left_out(node: NodeMaker) ->
     options = PolicyOptions(policy_file=document(body, enclave="/other"))
     derived = derive_policy([node("pub a")], distro="humble", options=options)
     assert [enclave.path for enclave in derived.policy.enclaves] == ["/"]
-    assert derived.warnings == ("enclave /other of the policy file is not used by this launch and was left out",)
+    assert derived.warnings == (
+        "enclave /other of the policy file is not used by this launch and was left out",
+    )
 
 
 def test_a_policy_file_can_answer_for_a_name_that_nobody_knows(node: NodeMaker) -> None:
@@ -159,7 +161,9 @@ def test_a_policy_file_from_disk(node: NodeMaker, tmp_path: Path) -> None:
         '<services request="ALLOW"><service>ask</service></services>'
         "</profile></profiles></enclave></enclaves></policy>"
     )
-    derived = derive_policy([node("pub a")], distro="humble", options=PolicyOptions(policy_file=read_policy(path)))
+    derived = derive_policy(
+        [node("pub a")], distro="humble", options=PolicyOptions(policy_file=read_policy(path))
+    )
     assert "rq/ns/askRequest" in dds_rules(derived.policy.enclaves[0]).allow.publish
 
 
@@ -180,7 +184,9 @@ def test_the_launcher_gets_exactly_its_calls_and_what_every_rclpy_node_has() -> 
     )
     derived = derive_policy([launcher], distro="humble")
     reasons = derived.reasons[LAUNCHER_ENCLAVE]
-    declared = {f"{r.operation.value} {r.expression}" for r, w in reasons.items() if w[0].origin == "declared"}
+    declared = {
+        f"{r.operation.value} {r.expression}" for r, w in reasons.items() if w[0].origin == "declared"
+    }
     assert declared == {
         "request /box/_container/load_node",
         "request /arm/change_state",
