@@ -11,11 +11,11 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib import import_module
-from importlib.abc import Loader, MetaPathFinder
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
+from typing import Any, cast
 
 PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")
 FALLBACK_NAMES = ("lifecycle_msgs",)
@@ -56,7 +56,9 @@ def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
         _depth -= 1
 
 
-class _Finder(MetaPathFinder):
+class _Finder:
+    """A meta path finder; not derived from ``importlib.abc``, whose import costs more than all of this."""
+
     def __init__(self, names: tuple[str, ...]) -> None:
         self._names = names
 
@@ -65,10 +67,10 @@ class _Finder(MetaPathFinder):
     ) -> ModuleSpec | None:
         if fullname.partition(".")[0] not in self._names or find_spec(_OURS + fullname) is None:
             return None
-        return ModuleSpec(fullname, _Alias())
+        return ModuleSpec(fullname, cast(Any, _Alias()))
 
 
-class _Alias(Loader):
+class _Alias:
     """Gives our module itself, which keeps its own name and spec."""
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
@@ -77,7 +79,13 @@ class _Alias(Loader):
         return module
 
     def exec_module(self, module: ModuleType) -> None:
+        """Submodules loaded already get their public name at once: importing one later would bind it in its
+        package, over a function of the same name (``launch_ros.utilities.evaluate_parameters``)."""
         module.__spec__ = self._own_spec
+        below = f"{module.__name__}."
+        for name, loaded in list(sys.modules.items()):
+            if name.startswith(below):
+                sys.modules.setdefault(name.removeprefix(_OURS), loaded)
 
 
 _FINDER = _Finder(PUBLIC_NAMES)
@@ -114,7 +122,7 @@ def _is_ours(module: ModuleType) -> bool:
 
 def _dependents(names: set[str], belongs: Callable[[str], bool]) -> set[str]:
     """Of ``names``, the modules of each top-level package in which some module holds such an object."""
-    tops = {name.partition(".")[0] for name in names if _holds(sys.modules[name], belongs)}
+    tops = {name.partition(".")[0] for name in names if _holds(sys.modules[name], belongs)} - {"enclave_launch"}
     return {name for name in names if name.partition(".")[0] in tops}
 
 

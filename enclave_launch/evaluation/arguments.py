@@ -48,9 +48,17 @@ def check_required_arguments(description: LaunchDescription, given: list[str]) -
     """
     # Whatever a Python file returned is asked as upstream asks it, so that None or a list fails alike.
     description.get_launch_arguments_with_include_launch_description_actions  # noqa: B018
-    for name, declared in _summarize(description).declared.items():
-        if not declared.required:
-            continue
+    required = {name: d for name, d in _summarize(description).declared.items() if d.required}
+    offers = {id(d.given): d.given for d in required.values() if d.given is not None}
+    names = set(given).union(*offers.values())
+    if None not in names and required.keys() <= names:
+        return
+    _complain(required, given)
+
+
+def _complain(required: dict[str, Declared], given: list[str]) -> None:
+    """Raise what upstream raises, in its words: the list of names grows with each argument looked at."""
+    for name, declared in required.items():
         if declared.given is not None:
             given.extend(_known(declared.given))
         if name not in given:
@@ -67,6 +75,8 @@ def _known(names: list[str | None]) -> list[str]:
 
 
 def _summarize(description: LaunchDescription) -> Summary:
+    if getattr(description, "argument_summary", None) is not None:
+        return description.argument_summary
     summary = Summary()
     for entity, conditional in _walk(description.describe_sub_entities(), False):
         if isinstance(entity, DeclareLaunchArgument):

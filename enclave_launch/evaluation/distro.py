@@ -14,9 +14,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
+from typing import NamedTuple
 
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)
@@ -32,8 +32,7 @@ class Distro(str, Enum):
     ROLLING = "rolling"
 
 
-@dataclass(frozen=True, slots=True)
-class Since:
+class Since(NamedTuple):
     """The first version with a feature, per distribution; ``None``: not in that series."""
 
     what: str
@@ -158,8 +157,7 @@ _VERSIONS: dict[Distro, tuple[Version, Version]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Release:
+class Release(NamedTuple):
     """A distribution with the versions of its launch packages; asks the table."""
 
     distro: Distro

@@ -12,34 +12,42 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
 
+_last: tuple[dict[bytes, bytes], dict[str, str]] | None = None
+
+
+def environment_snapshot() -> dict[str, str]:
+    """The variables of this moment. Shared between calls while nothing changes: do not modify."""
+    global _last
+    raw: dict[bytes, bytes] | None = getattr(os.environ, "_data", None)
+    if raw is None:
+        return dict(os.environ)
+    if _last is None or _last[0] != raw:
+        _last = dict(raw), dict(os.environ)
+    return _last[1]
+
+
 class Environment:
     """``start`` is the environment when the context was made: what ``reset_env`` goes back to."""
 
     def __init__(self) -> None:
-        self._raw: dict[bytes, bytes] | None = None
-        self._text: dict[str, str] = {}
-        self.start = self.snapshot()
+        self.start = environment_snapshot()
         self._stack: list[dict[str, str]] = []
         self._changes: tuple[dict[str, str], dict[str, str]] | None = None
 
     def snapshot(self) -> dict[str, str]:
-        """The variables of this moment. Shared between calls while nothing changes: do not modify."""
-        raw = os.environ._data if hasattr(os.environ, "_data") else None
-        if raw is None or raw != self._raw:
-            self._raw = None if raw is None else dict(raw)
-            self._text = dict(os.environ)
-        return self._text
+        """As ``environment_snapshot``."""
+        return environment_snapshot()
 
     def changes(self) -> dict[str, str]:
         """The variables that differ from ``start``; shared like ``snapshot``."""
-        now = self.snapshot()
+        now = environment_snapshot()
         if self._changes is None or self._changes[0] is not now:
             self._changes = now, changed(self.start, now)
         return self._changes[1]
 
     def assign(self, variables: Mapping[str, str]) -> None:
         """Make ``os.environ`` exactly ``variables``, touching only what differs."""
-        now = self.snapshot()
+        now = environment_snapshot()
         if now is variables:
             return
         for name in now.keys() - variables.keys():
@@ -47,7 +55,7 @@ class Environment:
         os.environ.update(changed(now, variables))
 
     def push(self) -> None:
-        self._stack.append(self.snapshot())
+        self._stack.append(environment_snapshot())
 
     def pop(self) -> None:
         if not self._stack:

@@ -5,6 +5,7 @@ The visit and the events run against a ``PlanHost``; our process is left as it w
 
 from __future__ import annotations
 
+import gc
 import os
 import threading
 from collections.abc import Iterator, Mapping, Sequence
@@ -55,7 +56,7 @@ def evaluate(
 
     host = host or PlanHost()
     path = os.path.abspath(launch_file)
-    with evaluation_surroundings(host):
+    with evaluation_surroundings(host), _collector_paused():
         context = LaunchContext(host=host)
         context.launch_configurations.update(launch_configurations or {})
         try:
@@ -111,7 +112,27 @@ def evaluation_surroundings(host: Host) -> Iterator[None]:
         stack.enter_context(environment_untouched())
         stack.enter_context(active_host(host))
         stack.enter_context(installed(host.prefixes()))
+        stack.callback(_forget_elements_of_launch_files)
         yield
+
+
+@contextmanager
+def _collector_paused() -> Iterator[None]:
+    """Evaluation builds much and drops little: looking for garbage meanwhile only costs time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
+
+
+def _forget_elements_of_launch_files() -> None:
+    from enclave_launch.description.launch.frontend import expose
+    from enclave_launch.frontend.python_file import MODULE_NAME
+
+    expose.forget(MODULE_NAME)
 
 
 def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:

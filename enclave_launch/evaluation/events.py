@@ -49,7 +49,7 @@ class HandlerTable:
 
     def __init__(self) -> None:
         self._buckets: Buckets = {}
-        self._of_class: Counter[type[Event] | None] = Counter()
+        self._of_name: Counter[str] = Counter()  # registrations by the event's name; "" for any event
         self._newest = 0
         self._oldest = 0
 
@@ -62,7 +62,7 @@ class HandlerTable:
             number = self._newest
         key = _key(handler)
         self._buckets.setdefault(key, {})[number] = handler
-        self._of_class[key[0]] += 1
+        self._of_name[_event_name(key)] += 1
 
     def unregister(self, handler: BaseEventHandler) -> None:
         """Remove its newest registration."""
@@ -72,7 +72,7 @@ class HandlerTable:
         if not numbers:
             raise ValueError(f"{handler!r} is not in deque")
         del bucket[max(numbers)]
-        self._of_class[key[0]] -= 1
+        self._of_name[_event_name(key)] -= 1
 
     def candidates(self, event: Event) -> list[BaseEventHandler]:
         """Those worth asking, newest first."""
@@ -96,9 +96,7 @@ class HandlerTable:
 
     def awaits(self, event_name: str) -> bool:
         """Is there a handler of any event, or one of the class with this name?"""
-        return any(
-            count and (cls is None or cls.name == event_name) for cls, count in self._of_class.items()
-        )
+        return bool(self._of_name[event_name] or self._of_name[""])
 
     def all(self) -> list[BaseEventHandler]:
         """Every registered handler, oldest first."""
@@ -110,9 +108,13 @@ class HandlerTable:
 
     def restore(self, saved: Buckets) -> None:
         self._buckets = saved
-        self._of_class = Counter()
-        for (cls, _), bucket in saved.items():
-            self._of_class[cls] += len(bucket)
+        self._of_name = Counter()
+        for key, bucket in saved.items():
+            self._of_name[_event_name(key)] += len(bucket)
+
+
+def _event_name(key: tuple[type[Event] | None, int]) -> str:
+    return "" if key[0] is None else key[0].name
 
 
 def _key(handler: BaseEventHandler) -> tuple[type[Event] | None, int]:

@@ -134,6 +134,7 @@ class BaseHost:
         self._anonymous_random: Any = None
         self._loads: LoadCache | None = None
         self._prefix_cache: dict[tuple[str, str], str] = {}
+        self._executable_cache: dict[tuple[str, str, str], str] = {}
 
     @property
     def loads(self) -> LoadCache:
@@ -164,6 +165,13 @@ class BaseHost:
 
     def find_executable(self, package: str, executable: str) -> str:
         prefix = self.find_package_prefix(package)
+        key = (prefix, package, executable)
+        known = self._executable_cache.get(key)
+        if known is None:
+            known = self._executable_cache[key] = self._find_executable(prefix, package, executable)
+        return known
+
+    def _find_executable(self, prefix: str, package: str, executable: str) -> str:
         if self.is_missing(prefix):
             return os.path.join(prefix, "lib", package, executable)
         return ament_index.executable_path(package, executable, [prefix])

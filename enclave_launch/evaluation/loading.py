@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from enclave_launch.evaluation.environment import Environment
+from enclave_launch.evaluation.environment import environment_snapshot
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_description import LaunchDescription
@@ -28,7 +28,6 @@ class LoadCache:
     """Valid while the environment stays the same: paths and Python files may depend on it."""
 
     def __init__(self) -> None:
-        self._environment = Environment()
         self._seen: dict[str, str] | None = None
         self._summaries: dict[Key, Summary | None] = {}
         self._unvisited: dict[Key, LaunchDescription] = {}
@@ -66,6 +65,7 @@ class LoadCache:
         finally:
             self._in_progress.pop()
         if not _runs_python(key[1]):
+            description.argument_summary = summary
             self._unvisited[key] = description
         return summary
 
@@ -75,7 +75,7 @@ class LoadCache:
         return self._unvisited.pop((type(source), location), None)
 
     def _drop_outdated(self) -> None:
-        now = self._environment.snapshot()
+        now = environment_snapshot()
         if now is not self._seen:
             self._seen = now
             self._summaries.clear()

@@ -14,10 +14,13 @@ if TYPE_CHECKING:
         IncludeLaunchDescription,
     )
     from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.evaluation.arguments import Summary
 
 
 class LaunchDescription(LaunchDescriptionEntity):
     """Visited, it gives its entities. ``deprecated_reason`` is warned about at each visit."""
+
+    argument_summary: Summary | None = None  # of a file whose arguments were collected before
 
     def __init__(
         self,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
 
 _OURS = "enclave_launch."
-_FRONTEND = "enclave_launch.description.launch.frontend"
+_BUILDERS = ("enclave_launch.description.launch.frontend", "enclave_launch.evaluation")
 
 
 class LaunchDescriptionEntity:
@@ -46,13 +46,13 @@ class LaunchDescriptionEntity:
 
 
 def creation_location(element: str) -> SourceLocation | None:
-    """The nearest calling frame outside of our own code; ``None`` when a front end is building the object."""
+    """The nearest calling frame outside of our own code; ``None`` when a front end or a visit builds the object."""
     frame: FrameType | None = sys._getframe(2)
     while frame is not None:
-        name = frame.f_globals.get("__name__", "")
+        name: str = frame.f_globals.get("__name__", "")
         if not name.startswith(_OURS):
             return SourceLocation(frame.f_code.co_filename, frame.f_lineno, element)
-        if name.startswith(_FRONTEND):
+        if name.startswith(_BUILDERS):
             return None
         frame = frame.f_back
     return None

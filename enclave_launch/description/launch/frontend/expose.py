@@ -123,6 +123,15 @@ def _exposer(kind: str, name: str, gate: Feature | None) -> Callable[[Exposed], 
     return expose
 
 
+def forget(module: str) -> None:
+    """Drop what ``module`` registered: a launch file may register elements, each time it is evaluated."""
+    for methods in _METHODS.values():
+        for name, method in list(methods.items()):
+            registered = inspect.unwrap(method)
+            if getattr(registered, "__self__", registered).__module__ == module:
+                del methods[name]
+
+
 def _parse_method(exposed: object, name: str, kind: str) -> ParseMethod:
     if inspect.isclass(exposed):
         method = getattr(exposed, "parse", None)

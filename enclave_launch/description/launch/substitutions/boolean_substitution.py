@@ -121,11 +121,17 @@ class _Variadic(Substitution):
 
 @expose_substitution("any", feature=Feature.EQUALS_IF)
 class AnySubstitution(_Variadic):
+    def __init__(self, *args: SomeSubstitutionsType) -> None:
+        super().__init__(*args)
+
     def perform(self, context: LaunchContext) -> str:
         return _text(any(self._operands(context)))
 
 
 @expose_substitution("all", feature=Feature.EQUALS_IF)
 class AllSubstitution(_Variadic):
+    def __init__(self, *args: SomeSubstitutionsType) -> None:
+        super().__init__(*args)
+
     def perform(self, context: LaunchContext) -> str:
         return _text(all(self._operands(context)))

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
 
 
+_DEFAULT_MODULES = ("math",)
+
+
 @expose_substitution("eval")
 class PythonExpression(Substitution):
     """The value of a Python expression, as text. It sees the builtins and the modules given.
@@ -29,8 +32,10 @@ class PythonExpression(Substitution):
     """
 
     def __init__(
-        self, expression: SomeSubstitutionsType, python_modules: SomeSubstitutionsType = ("math",)
+        self, expression: SomeSubstitutionsType, python_modules: SomeSubstitutionsType = _DEFAULT_MODULES
     ) -> None:
+        if python_modules is not _DEFAULT_MODULES and not current_release().has(Feature.EVAL_MODULES):
+            raise TypeError("PythonExpression.__init__() got an unexpected keyword argument 'python_modules'")
         self.__expression = normalize_to_list_of_substitutions(expression)
         self.__python_modules = normalize_to_list_of_substitutions(python_modules)
 

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 
 
 def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution]) -> str:
-    """Perform each and concatenate."""
+    """Perform each and concatenate. Raises ``TypeError`` where one does not give text."""
+    if type(subs) is list and len(subs) == 1:
+        text = subs[0].perform(context)
+        return text if type(text) is str else "".join((text,))
     return "".join([sub.perform(context) for sub in subs])
 
 
@@ -30,7 +33,7 @@ def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Pat
     """Text becomes a ``TextSubstitution``, one substitution a list. Raises ``TypeError`` for anything else."""
     if isinstance(subs, str):
         return [TextSubstitution(text=subs)]
-    if isinstance(subs, list):
+    if type(subs) is list:
         return [item if isinstance(item, Substitution) else _normalize(item) for item in subs]
     if is_a_subclass(subs, Substitution):
         return [subs]  # type: ignore[list-item]

@@ -1,0 +1,135 @@
+"""How fast launch files are resolved: ours, the floor, and real launch, in the same run.
+
+    python bench/resolve.py [runs]
+
+ours    ``secure-launch --dry-run``'s evaluation as a whole process
+floor   a process that reads every file which was touched and parses it with lxml or PyYAML (libyaml), no more
+real    a process that resolves the same file with the sources of ros2/launch, starting nothing
+        (``REAL_LAUNCH_PYTHONPATH`` holds their PYTHONPATH; else "not available")
+
+CPU seconds of the process and its children, the best of several runs (real: one). The import of launch_ros alone is
+in real's time for two nodes.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT))
+
+from bench.synthetic_stack import write_nodes, write_stack  # noqa: E402
+
+RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 5
+
+OURS = """
+import sys
+from enclave_launch.evaluation.evaluate import evaluate
+result = evaluate(sys.argv[1])
+print(len(result.processes), len(result.components))
+"""
+
+FLOOR = """
+import sys
+from pathlib import Path
+import lxml.etree
+paths = [Path(line) for line in sys.stdin.read().split()]
+for path in paths:
+    if path.suffix == ".xml":
+        lxml.etree.fromstring(path.read_bytes())
+if any(path.suffix == ".yaml" for path in paths):
+    import yaml
+    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+    for path in paths:
+        if path.suffix == ".yaml":
+            yaml.load(path.read_text(), loader)
+"""
+
+
+def main() -> None:
+    peer = os.environ.get("REAL_LAUNCH_PYTHONPATH")
+    print(f"{'':28}{'ours':>9}{'floor':>9}{'real':>9}{'ours/floor':>12}{'real/ours':>11}")
+    with tempfile.TemporaryDirectory() as folder:
+        prefix = Path(folder)
+        files = {
+            "driving stack": write_stack(prefix),
+            "two nodes": write_nodes(prefix, 2),
+            "1,000 nodes": write_nodes(prefix, 1_000),
+            "10,000 nodes": write_nodes(prefix, 10_000),
+        }
+        for name, file in files.items():
+            # Real launch takes minutes for the largest file, and its time grows faster than the file.
+            _row(name, file, prefix, None if name == "10,000 nodes" else peer)
+    _print_memory()
+
+
+def _row(name: str, file: Path, prefix: Path, peer: str | None) -> None:
+    environment = {**os.environ, "AMENT_PREFIX_PATH": str(prefix), "PYTHONPATH": str(ROOT)}
+    touched = "\n".join(_touched(file, prefix))
+    ours = _best([sys.executable, "-c", OURS, str(file)], environment)
+    floor = _best([sys.executable, "-c", FLOOR], environment, touched)
+    line = f"{name:28}{ours:9.3f}{floor:9.3f}"
+    if peer is None:
+        print(f"{line}{'-':>9}{ours / floor:12.1f}{'not available':>15}", flush=True)
+        return
+    real = _real(file, {**environment, "PYTHONPATH": peer})
+    print(f"{line}{real:9.3f}{ours / floor:12.1f}{real / ours:11.1f}", flush=True)
+
+
+def _touched(file: Path, prefix: Path) -> list[str]:
+    """Every launch file and parameter file that a resolution of ``file`` opens."""
+    if file.parent.parent.name == "many":
+        return [str(file)]
+    share = prefix / "share"
+    return [str(path) for pattern in ("*/launch/*.xml", "*/config/*.yaml") for path in share.glob(pattern)
+            if path.parent.parent.name != "many"]  # fmt: skip
+
+
+def _real(file: Path, environment: dict[str, str]) -> float:
+    job = {"file": str(file), "arguments": [], "environment": {}, "folder": str(file.parent)}
+    driver = ROOT / "tests" / "conformance" / "real_driver.py"
+    return _best([sys.executable, "-W", "ignore", str(driver)], environment, json.dumps([job]), 1)
+
+
+def _best(
+    command: Sequence[str], environment: dict[str, str] | None = None, text: str = "", runs: int = RUNS
+) -> float:
+    return min(_cpu_seconds(lambda: _run(command, environment, text)) for _ in range(runs))
+
+
+def _run(command: Sequence[str], environment: dict[str, str] | None, text: str) -> None:
+    subprocess.run(command, env=environment, input=text, text=True, check=True, capture_output=True)
+
+
+def _cpu_seconds(work: Callable[[], None]) -> float:
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    work()
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
+
+
+def _print_memory() -> None:
+    """Resident memory after 10 and after 60 evaluations in one process."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = write_nodes(Path(folder), 200)
+        script = (
+            "import sys, resource\nfrom enclave_launch.evaluation.evaluate import evaluate\n"
+            "for count in range(60):\n    evaluate(sys.argv[1])\n    if count in (9, 59):\n"
+            "        print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)\n"
+        )
+        environment = {**os.environ, "AMENT_PREFIX_PATH": folder, "PYTHONPATH": str(ROOT)}
+        result = subprocess.run([sys.executable, "-c", script, str(file)], env=environment, text=True,
+                                capture_output=True, check=True)  # fmt: skip
+    first, last = (int(line) / 1024 for line in result.stdout.split())
+    print(f"peak memory, MB: {first:.1f} after 10 evaluations, {last:.1f} after 60")
+
+
+if __name__ == "__main__":
+    main()
