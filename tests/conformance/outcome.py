@@ -19,8 +19,10 @@ from typing import Any
 
 # Messages that come from the parsing library or from Python, not from launch: the type is what counts.
 _TYPE_ONLY = frozenset({"UnexpectedCharacters", "UnexpectedEOF", "ParseError", "XMLSyntaxError", "ScannerError",
-                        "ParserError", "ConstructorError", "ComposerError", "SyntaxError"})  # fmt: skip
+                        "AssertionError", "InvalidNodeNameException", "InvalidNamespaceException", "ParserError", "ConstructorError", "ComposerError", "SyntaxError"})  # fmt: skip
 
+
+_SET = re.compile(r"\{('[^']*'(?:, '[^']*')+)\}")  # of names: its order is by chance
 
 # What may differ without meaning: addresses, where classes really live, the driver's own folder, empty lines
 # (they would end a section of a case file).
@@ -81,6 +83,7 @@ def render(outcome: Outcome) -> str:
     text = "\n".join(lines).strip() or "nothing"
     for path in sorted(outcome.folders, key=len, reverse=True):
         text = text.replace(path, outcome.folders[path])
+    text = _SET.sub(lambda found: f"{{{', '.join(sorted(found[1].split(', ')))}}}", text)
     for pattern, replacement in _NORMALIZED:
         text = pattern.sub(replacement, text)
     return text

@@ -206,7 +206,7 @@ class _Recorder(logging.Handler):
         if record.levelno >= logging.ERROR and text.startswith("Caught exception in launch") and error:
             self.error = error
         elif record.name == "launch.user" or record.levelno == logging.WARNING:
-            prefix = "" if record.name.startswith("launch") else f"{record.name}: "
+            prefix = "" if record.name.startswith(("launch", "root")) else f"{record.name}: "
             self.logs.append((record.levelname, prefix + text))
 
 
@@ -244,7 +244,7 @@ def resolve(path: str, arguments: list[str]) -> dict[str, Any]:
                 "fqn": self.node_name if isinstance(self, launch_ros.actions.Node) else None,
                 "environment": {k: v for k, v in description.final_env.items() if before.get(k) != v},
                 "cwd": description.final_cwd,
-                "shell": bool(self.shell),
+                "shell": self.shell is True,
             })  # fmt: skip
         return result
 
@@ -300,10 +300,7 @@ def _innermost(error: BaseException) -> tuple[str, str]:
     while likely:
         error = likely[0]
         likely = getattr(error, "_likely_errors", None)
-    original = getattr(error, "orig_exc", None)  # lark's VisitError
-    while original is not None:
-        error, original = original, getattr(original, "orig_exc", None)
-    return type(error).__name__, str(error)
+    return type(error).__name__, str(error.args[0] if isinstance(error, KeyError) else error)
 
 
 def run_forked(job: dict[str, Any]) -> dict[str, Any]:

@@ -77,6 +77,7 @@ class _ChangeStateHandler(EventHandler):
     """Passes requests for this node on to the host, which calls the service."""
 
     event_class: type[Event] | None = ChangeState
+    internal = True
 
     def __init__(self, node: LifecycleNode):
         def change_state(context: LaunchContext) -> None:

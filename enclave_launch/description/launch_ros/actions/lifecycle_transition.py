@@ -98,6 +98,7 @@ class LifecycleTransition(Action):
             entities=[OpaqueFunction(function=partial(self.__forget, name=name))],
             handle_once=True,
         )
+        handler.internal = True
         self.__handlers[name].append(handler)
         context.register_event_handler(handler)
 

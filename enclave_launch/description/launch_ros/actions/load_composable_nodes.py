@@ -38,6 +38,7 @@ from enclave_launch.description.launch_ros.utilities.namespace_utils import (
 from enclave_launch.description.launch_ros.utilities.normalize_parameters import normalize_parameter_dict
 from enclave_launch.description.launch_ros.utilities.remap_rules import performed_remaps, placed
 from enclave_launch.description.launch_ros.utilities.to_parameters_list import to_parameters_list
+from enclave_launch.description.launch_ros.utilities.track_node_names import warn_about_repeats
 from enclave_launch.evaluation.distro import Feature
 from enclave_launch.evaluation.location import location_of
 from enclave_launch.process import LauncherCall, ParameterValue, RemapRule, ResolvedComponent
@@ -92,6 +93,9 @@ class LoadComposableNodes(Action):
         components = [self.__resolve(item, container, context) for item in wanted]
         if components:
             context.host.load_components(components, context)
+        for component in components:
+            if component.name:  # else the container reports a name that only the plugin knows
+                warn_about_repeats(context, component.fqn, container)
         return [action for pair in zip(wanted, components, strict=True) for action in _autostart(*pair)]
 
     def __container_name(self, context: LaunchContext) -> str:

@@ -30,10 +30,7 @@ from enclave_launch.description.launch_ros.utilities.remap_rules import (
     placed,
     remap_from_text,
 )
-from enclave_launch.description.launch_ros.utilities.track_node_names import (
-    add_node_name,
-    get_node_name_count,
-)
+from enclave_launch.description.launch_ros.utilities.track_node_names import warn_about_repeats
 from enclave_launch.evaluation.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
 from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, ProcessKind
@@ -212,17 +209,8 @@ class Node(ExecuteProcess):
         context.extend_locals({"ros_specific_arguments": arguments})
         actions = super().execute(context)
         if self.is_node_name_fully_specified():
-            self.__count_name(context)
+            warn_about_repeats(context, self.node_name, self.name)
         return actions
-
-    def __count_name(self, context: LaunchContext) -> None:
-        add_node_name(context, self.node_name)
-        count = get_node_name_count(context, self.node_name)
-        if count > 1:
-            context.host.warn(
-                f"{self.name}: there are now at least {count} nodes with the name {self.node_name} "
-                "created within this launch context"
-            )
 
     def resolve(self, context: LaunchContext) -> ResolvedProcess:
         process = super().resolve(context)

@@ -32,7 +32,7 @@ class Parameter(Substitution):
     @classmethod
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Parameter], dict[str, Any]]:
         if len(data) != 1 and not _takes_default():
-            raise TypeError("param substitution expects 1 argument")
+            raise AttributeError("param substitutions expect 1 argument")
         if not 1 <= len(data) <= 2:
             raise TypeError("param substitution expects 1 or 2 arguments")
         return cls, dict(zip(("name", "default"), data, strict=False))

@@ -107,9 +107,10 @@ def _checked(name: str, value: Any) -> Any:
 def _uniform(name: str, items: Sequence[Any]) -> tuple[Any, ...]:
     kind = type(items[0]) if items else None
     if kind not in _SCALARS or not all(isinstance(item, kind) for item in items):
+        tells_name = current_release().has(Feature.PARAMETER_NAME_IN_ERRORS)
         raise TypeError(
             "Expected a non-empty sequence, with items of uniform type. Allowed sequence item types are "
-            f'bool, int, float, str. Got inconsistent input for "{name}"'
+            "bool, int, float, str." + (f' Got inconsistent input for "{name}"' if tells_name else "")
         )
     return tuple(items)
 

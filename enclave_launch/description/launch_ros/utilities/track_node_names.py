@@ -17,6 +17,20 @@ def get_node_name_count(context: LaunchContext, node_name: str) -> int:
     return _counts(context)[node_name]
 
 
+def warn_about_repeats(context: LaunchContext, node_name: str, started_by: str) -> None:
+    """Count one more node of this fully qualified name and warn if it is not the first.
+
+    ``started_by``: the process, or for a component its container.
+    """
+    add_node_name(context, node_name)
+    count = get_node_name_count(context, node_name)
+    if count > 1:
+        context.host.warn(
+            f"{started_by}: there are now at least {count} nodes with the name {node_name} "
+            "created within this launch context"
+        )
+
+
 def _counts(context: LaunchContext) -> Counter[str]:
     """The table lives in the context's globals, where third-party code may look for it."""
     counts: Counter[str] | None = getattr(context.locals, _GLOBAL, None)
