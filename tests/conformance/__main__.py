@@ -31,7 +31,9 @@ def record(path: Path) -> None:
     for index, block in enumerate(blocks[1:], start=1):
         if block.split("\n", 1)[0].strip() == "shared":
             continue
-        blocks[index] = _with_expectations(block, {distro: texts[number] for distro, texts in answers.items()})
+        blocks[index] = _with_expectations(
+            block, {distro: texts[number] for distro, texts in answers.items()}
+        )
         number += 1
     path.write_text("\n=== ".join(blocks).lstrip("\n"), encoding="utf-8")
     print(f"{path.stem}: {len(cases)} cases")

@@ -36,7 +36,8 @@ def run(case: Case, distro: str, folder: Path, prefix: Path, *, with_supposition
             shown = likeliest(failure.cause) if failure.cause is not None else failure
             error = (type(shown).__name__, str(shown))
     logs += [("WARNING", text) for text in evaluation.warnings]
-    return render(_outcome(evaluation, host, logs, error, {str(folder): "DIR", str(prefix): "PREFIX"}, with_suppositions))
+    folders = {str(folder): "DIR", str(prefix): "PREFIX"}
+    return render(_outcome(evaluation, host, logs, error, folders, with_suppositions))
 
 
 def _outcome(

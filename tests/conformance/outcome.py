@@ -18,8 +18,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 # Messages that come from the parsing library or from Python, not from launch: the type is what counts.
-_TYPE_ONLY = frozenset({"UnexpectedCharacters", "UnexpectedEOF", "ParseError", "XMLSyntaxError", "ScannerError",
-                        "AssertionError", "InvalidNodeNameException", "InvalidNamespaceException", "ParserError", "ConstructorError", "ComposerError", "SyntaxError"})  # fmt: skip
+_TYPE_ONLY = frozenset(
+    ["UnexpectedCharacters", "UnexpectedEOF", "ParseError", "XMLSyntaxError", "ScannerError", "ParserError", "ConstructorError", "ComposerError", "SyntaxError", "AssertionError", "InvalidNodeNameException", "InvalidNamespaceException"]
+)
 
 
 _SET = re.compile(r"\{('[^']*'(?:, '[^']*')+)\}")  # of names: its order is by chance

@@ -12,6 +12,7 @@ in a forked child, so that nothing leaks from one to the next.
 
 from __future__ import annotations
 
+import importlib
 import json
 import logging
 import os
@@ -257,7 +258,7 @@ def resolve(path: str, arguments: list[str]) -> dict[str, Any]:
         module.get_ros_node = lambda context: node
     recorder = _Recorder()
     logging.root.setLevel(logging.DEBUG)
-    logging.Logger.callHandlers = lambda logger, entry: recorder.handle(entry)  # whatever launch.logging sets up
+    setattr(logging.Logger, "callHandlers", lambda logger, entry: recorder.handle(entry))  # noqa: B010
     service = launch.LaunchService(argv=[], noninteractive=True)
     service.include_launch_description(
         launch.LaunchDescription([
@@ -323,8 +324,8 @@ def run_forked(job: dict[str, Any]) -> dict[str, Any]:
     with os.fdopen(reader) as pipe:
         text = pipe.read()
     os.waitpid(child, 0)
-    answer = json.loads(text) if text else {"crash": "no answer"}
-    return answer  # type: ignore[no-any-return]
+    answer: dict[str, Any] = json.loads(text) if text else {"crash": "no answer"}
+    return answer
 
 
 def main() -> None:
@@ -342,9 +343,8 @@ def main() -> None:
         paths = [*filter(None, [os.environ.get("AMENT_PREFIX_PATH")]), own]
         os.environ["AMENT_PREFIX_PATH"] = os.pathsep.join(paths)
         os.environ["ROS_LOG_DIR"] = f"{own}/log"
-        import launch_ros.actions
-        import launch_xml
-        import launch_yaml  # noqa: F401  (imported once, inherited by every child)
+        for name in ("launch_ros.actions", "launch_xml", "launch_yaml"):
+            importlib.import_module(name)  # once; every child inherits it
 
         for job in jobs:
             print(json.dumps(run_forked(job)), flush=True)

@@ -52,7 +52,10 @@ def run_all(cases: Sequence[Case], distro: str) -> list[str]:
         if answer.returncode != 0:
             raise RuntimeError(answer.stderr[-4000:])
         folders = [{job["folder"]: "DIR", str(prefix): "PREFIX"} for job in jobs]
-        return [_render(json.loads(line), names) for line, names in zip(answer.stdout.splitlines(), folders, strict=True)]
+        return [
+            _render(json.loads(line), names)
+            for line, names in zip(answer.stdout.splitlines(), folders, strict=True)
+        ]
 
 
 def _job(case: Case, folder: Path) -> dict[str, Any]:
@@ -74,7 +77,13 @@ def _render(answer: dict[str, Any], folders: dict[str, str]) -> str:
         Outcome(
             processes=[Process(**item) for item in answer["processes"]],
             components=[
-                Component(**{**item, "parameters": dict(item["parameters"]), "extra_arguments": dict(item["extra_arguments"])})
+                Component(
+                    **{
+                        **item,
+                        "parameters": dict(item["parameters"]),
+                        "extra_arguments": dict(item["extra_arguments"]),
+                    }
+                )
                 for item in answer["loads"]
             ],
             logs=[(level, text) for level, text in answer["logs"]],

@@ -30,8 +30,8 @@ class ROSAdapter:
             raise RuntimeError("Cannot start a ROS adapter that is already running")
         import threading
 
-        import rclpy  # type: ignore[import-not-found]  # part of a ROS installation, never of ours
-        from rclpy.executors import SingleThreadedExecutor  # type: ignore[import-not-found]
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
 
         self.__context = rclpy.Context()
         rclpy.init(args=self.__argv, context=self.__context)
