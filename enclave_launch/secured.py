@@ -21,6 +21,7 @@ from enclave_launch.security_environment import (
     launcher_environment,
     secured_environment,
 )
+from keystore import layout
 from keystore.errors import KeystoreError
 from keystore.policy import EnclavePolicy
 from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
@@ -51,6 +52,7 @@ class PlanProvider:
 
     def __init__(self, launch: ProvisionedLaunch):
         self._launch = launch
+        self._completed: dict[str, tuple[EnclavePolicy, tuple[tuple[str, int, int, int], ...]]] = {}
         self._follow(launch.plan)
 
     def _follow(self, plan: LaunchPlan) -> None:
@@ -83,7 +85,22 @@ class PlanProvider:
         return Grant(("--enclave", launcher.enclave), launcher_environment(self._launch.settings))
 
     def _complete(self, enclave: str) -> None:
-        provision_policies(self._launch.settings, [self._policies[enclave]], self._launch.options)
+        """Nodes that share an enclave, and restarts, pay for a look at its files only while nobody touches those."""
+        policy = self._policies[enclave]
+        if self._completed.get(enclave) == (policy, self._files(enclave)):
+            return
+        provision_policies(self._launch.settings, [policy], self._launch.options)
+        self._completed[enclave] = (policy, self._files(enclave))
+
+    def _files(self, enclave: str) -> tuple[tuple[str, int, int, int], ...]:
+        """What any change to the enclave's files changes: name, inode, size and time of each."""
+        directory = os.path.join(self._launch.settings.keystore, layout.enclave_directory(enclave))
+        try:
+            with os.scandir(directory) as entries:
+                files = [(entry.name, entry.stat()) for entry in entries if not entry.is_dir(follow_symlinks=False)]
+        except OSError:
+            return ()
+        return tuple(sorted((name, status.st_ino, status.st_size, status.st_mtime_ns) for name, status in files))
 
     def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
         variables = dict(secured_environment(planned, self._launch.settings))
