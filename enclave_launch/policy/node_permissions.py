@@ -9,11 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Literal
 
-from enclave_launch.policy.builtin_interfaces import BuiltIn, built_in_interfaces
+from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
 from keystore.policy import Operation
+from nodl.builtin_interfaces import BuiltIn, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import InvalidNameError, validate_namespace, validate_node_name
 from nodl.node_interface import Certainty, Endpoint, EndpointKind
@@ -105,26 +107,30 @@ class _Collector:
             return self._result
         for endpoint in self._node.interface.endpoints:
             self._endpoint(endpoint)
-        for row in built_in_interfaces(self._node, self._distro):
+        for row in built_in_interfaces(self._distro, self._node.interface.library, conditions_of(self._node)):
             self._built_in(row)
         for gap in self._node.interface.gaps:
             self._unresolved(None, str(gap.source), gap.why)
         return self._result
 
     def _endpoint(self, endpoint: Endpoint) -> None:
-        operation = _OPERATIONS[endpoint.kind]
-        place = str(endpoint.source)
         template = endpoint.name
-        note = f"{endpoint.written} is taken as the private name {template}" if endpoint.written else ""
-        if not template.is_literal:
-            note = _parameter_note(template, self._node)
-            template = template.fill(self._node.parameters)
-        elif endpoint.certainty is Certainty.FROM_DEFAULT:
-            note = "from a default value in the source"
-        written = endpoint.written or str(endpoint.name)
-        if not template.is_literal:
-            self._pattern(operation, template, place, written)
+        if template.is_literal:
+            note = f"{endpoint.written} is taken as the private name {template}" if endpoint.written else ""
+            if endpoint.certainty is Certainty.FROM_DEFAULT:
+                note = "from a default value in the source"
+            self._name(endpoint, template, note)
             return
+        note = _parameter_note(template, self._node)
+        for filled in template.fill_each(self._node.parameters):
+            if filled.is_literal:
+                self._name(endpoint, filled, note)
+            else:
+                self._pattern(endpoint, filled)
+
+    def _name(self, endpoint: Endpoint, template: NameTemplate, note: str) -> None:
+        operation, place = _OPERATIONS[endpoint.kind], str(endpoint.source)
+        written = endpoint.written or str(endpoint.name)
         try:
             for final_operation, resolved in self._resolve(operation, template.text, place):
                 reason = Reason(self._fqn, "declared", place, written, resolved.rules, note)
@@ -133,9 +139,10 @@ class _Collector:
             self._unresolved(operation, place, str(error))
 
     def _built_in(self, row: BuiltIn) -> None:
-        resolved = self._plain(row.operation, row.name)
-        reason = Reason(self._fqn, "built-in", str(row), row.name, resolved.rules)
-        self._result.permissions.append(Permission(row.operation, resolved.name, reason))
+        operation = _OPERATIONS[row.kind]
+        resolved = self._plain(operation, row.name)
+        reason = Reason(self._fqn, "built-in", _shown(row), row.name, resolved.rules)
+        self._result.permissions.append(Permission(operation, resolved.name, reason))
 
     def _resolve(self, operation: Operation, name: str, place: str) -> Iterator[tuple[Operation, Resolved]]:
         """The final names: one, or five where the parts of an action were remapped one by one."""
@@ -171,8 +178,9 @@ class _Collector:
                 f"{self._fqn}: {self._distro} remaps only the five names below {action}/_action/, one by one"
             )
 
-    def _pattern(self, operation: Operation, template: NameTemplate, place: str, written: str) -> None:
+    def _pattern(self, endpoint: Endpoint, template: NameTemplate) -> None:
         """Only a part of the name is known: unresolved, unless patterns are accepted and it has text."""
+        operation, place = _OPERATIONS[endpoint.kind], str(endpoint.source)
         text = template.text
         why = "; ".join(p.why for p in template.parts if isinstance(p, UnknownPart) and p.why)
         if not self._accept_patterns or not text.replace("*", "").strip("/~"):
@@ -190,13 +198,18 @@ class _Collector:
         note = (
             f"a pattern, because {why or 'only a part of the name is known'}; accepted by --accept-patterns"
         )
-        reason = Reason(self._fqn, "declared", place, written, (), note)
+        reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note)
         self._result.permissions.append(Permission(operation, name, reason))
         self._result.warnings.append(f"{place}: node {self._fqn} may {operation.value} {name}: {note}")
 
     def _unresolved(self, operation: Operation | None, place: str, why: str) -> None:
         text = f"{place}: node {self._fqn}: {why}"
         self._result.unresolved.append(Unresolved(operation, text))
+
+
+@cache
+def _shown(row: BuiltIn) -> str:
+    return str(row)
 
 
 def _parameter_note(template: NameTemplate, node: RunningNode) -> str:

@@ -12,15 +12,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
-from enclave_launch.policy.builtin_interfaces import (
-    DISTROS,
-    TABLE,
-    built_in_interfaces,
-)
 from keystore.domains import Domains
 from keystore.permissions import permissions_document
 from keystore.policy_xml import parse_policy, policy_xml
 from keystore.validity import Validity
+from nodl.builtin_interfaces import DISTROS, TABLE, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
@@ -196,12 +192,12 @@ def test_tf_where_declared(node: NodeMaker) -> None:
 
 
 def test_every_row_of_the_table_has_its_source() -> None:
-    assert all(row.source and row.since in DISTROS for row in TABLE)
+    assert all(row.source and row.type.count("/") == 2 and row.since in DISTROS for row in TABLE)
 
 
-def test_an_unknown_distribution_is_an_error(node: NodeMaker) -> None:
+def test_an_unknown_distribution_is_an_error() -> None:
     with pytest.raises(ValueError, match="unknown ROS distribution 'dashing'"):
-        built_in_interfaces(node(), "dashing")
+        built_in_interfaces("dashing", PY)
 
 
 def test_interfaces_that_a_manifest_repeats_are_not_doubled(node: NodeMaker) -> None:
@@ -228,6 +224,13 @@ def test_names_from_parameters_follow_what_launch_sets(node: NodeMaker) -> None:
     assert declared(derive(node(topic))) == {"publish /cam/image"}
     (reasons,) = (r for rule, r in given_value.reasons["/"].items() if rule.expression == "/cam/raw")
     assert (reasons[0].written, reasons[0].note) == ("cam/param:topic", "parameter topic, set by launch")
+
+
+def test_names_from_a_list_parameter_are_one_for_each_element(node: NodeMaker) -> None:
+    each = node(endpoint("cam/", ParameterPart("cameras", item="each")), parameters={"cameras": ("l", "r")})
+    assert declared(derive(each)) == {"publish /cam/l", "publish /cam/r"}
+    assert declared(derive(replace(each, parameters={"cameras": ()}))) == set()
+    assert len(derive(replace(each, parameters={})).problems) == 1
 
 
 def test_a_name_that_is_not_known_is_a_problem_with_its_place_and_remedy(node: NodeMaker) -> None:

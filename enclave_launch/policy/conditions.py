@@ -1,0 +1,29 @@
+"""Which conditions of the table of built-in interfaces a running node meets: parameters, role, manifest."""
+
+from __future__ import annotations
+
+from enclave_launch.policy.running_node import RunningNode
+from nodl.builtin_interfaces import Condition
+from nodl.node_interface import EndpointKind, NodeInterface
+
+
+def conditions_of(node: RunningNode) -> frozenset[Condition]:
+    met = {Condition.ALWAYS}
+    if node.parameters.get("use_sim_time") is True:
+        met.add(Condition.SIM_TIME)
+    if node.parameters.get("start_type_description_service") is not False:
+        met.add(Condition.TYPE_DESCRIPTION)
+    if node.role == "lifecycle_node" or node.interface.lifecycle:
+        met.add(Condition.LIFECYCLE)
+    if node.role == "container":
+        met.add(Condition.CONTAINER)
+    if _listens_to_tf(node.interface):
+        met.add(Condition.TF_LISTENER)
+    return frozenset(met)
+
+
+def _listens_to_tf(interface: NodeInterface) -> bool:
+    return any(
+        endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.parts == ("/tf",)
+        for endpoint in interface.endpoints
+    )

@@ -1,0 +1,132 @@
+"""The interfaces that every node has, without any manifest naming them: the one table of them.
+
+A missing permission for one of these is fatal inside the node's constructor, a needless one is a gift; so
+each row says for which client library and since which distribution it holds, under which condition, and
+where that is known from. A node of unknown library gets the rows of both. What is off unless a program
+asks for it (logger services, topic statistics, service introspection) is not here: a manifest has to name it.
+``ros_discovery_info`` is a matter of DDS permissions, not of ROS names, and has its place there.
+Pure; read by policy derivation and by the reports of inference.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import Enum
+from functools import lru_cache
+
+from nodl.node_interface import ClientLibrary, EndpointKind
+
+DISTROS = ("foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
+
+
+class Condition(Enum):
+    """What must hold for a row; the value is the text for a reader."""
+
+    ALWAYS = "every node"
+    SIM_TIME = "use_sim_time is true"
+    TYPE_DESCRIPTION = "unless start_type_description_service is false"
+    LIFECYCLE = "lifecycle node"
+    CONTAINER = "component container"
+    TF_LISTENER = "subscribes to /tf, as a TransformListener does"
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltIn:
+    """One interface under the name the client library uses; ``library`` ``None`` means all."""
+
+    kind: EndpointKind
+    name: str
+    type: str
+    source: str
+    condition: Condition = Condition.ALWAYS
+    library: ClientLibrary | None = None
+    since: str = DISTROS[0]
+
+    def __str__(self) -> str:
+        library = f"{self.library.value}, " if self.library else ""
+        since = f", since {self.since}" if self.since != DISTROS[0] else ""
+        return f"built-in ({library}{self.condition.value}{since}; {self.source})"
+
+
+_P, _S, _R = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER
+_PARAMETERS = "rclcpp parameter_service.cpp, rclpy parameter_service.py"
+_LIFECYCLE = "rcl_lifecycle com_interface.c"
+_CONTAINER = "rclcpp_components component_manager.cpp"
+_EVENT = "rcl_interfaces/msg/ParameterEvent"
+
+TABLE: tuple[BuiltIn, ...] = (
+    BuiltIn(_P, "/rosout", "rcl_interfaces/msg/Log", "rcl logging_rosout.c"),
+    BuiltIn(_P, "/parameter_events", _EVENT, "rclcpp node_parameters.cpp, rclpy node.py"),
+    BuiltIn(_S, "/parameter_events", _EVENT, "rclcpp time_source.cpp", library=ClientLibrary.RCLCPP),
+    *(
+        BuiltIn(_R, f"~/{name}", f"rcl_interfaces/srv/{type_name}", _PARAMETERS)
+        for name, type_name in (
+            ("describe_parameters", "DescribeParameters"),
+            ("get_parameter_types", "GetParameterTypes"),
+            ("get_parameters", "GetParameters"),
+            ("list_parameters", "ListParameters"),
+            ("set_parameters", "SetParameters"),
+            ("set_parameters_atomically", "SetParametersAtomically"),
+        )
+    ),
+    BuiltIn(
+        _R,
+        "~/get_type_description",
+        "type_description_interfaces/srv/GetTypeDescription",
+        "rcl node_type_description_service.c",
+        Condition.TYPE_DESCRIPTION,
+        since="iron",
+    ),
+    BuiltIn(
+        _S,
+        "/clock",
+        "rosgraph_msgs/msg/Clock",
+        "rclcpp time_source.cpp, rclpy time_source.py",
+        Condition.SIM_TIME,
+    ),
+    *(
+        BuiltIn(_R, f"~/{name}", f"lifecycle_msgs/srv/{type_name}", _LIFECYCLE, Condition.LIFECYCLE)
+        for name, type_name in (
+            ("change_state", "ChangeState"),
+            ("get_state", "GetState"),
+            ("get_available_states", "GetAvailableStates"),
+            ("get_available_transitions", "GetAvailableTransitions"),
+            ("get_transition_graph", "GetAvailableTransitions"),
+        )
+    ),
+    BuiltIn(_P, "~/transition_event", "lifecycle_msgs/msg/TransitionEvent", _LIFECYCLE, Condition.LIFECYCLE),
+    *(
+        BuiltIn(
+            _R,
+            f"~/_container/{name}",
+            f"composition_interfaces/srv/{type_name}",
+            _CONTAINER,
+            Condition.CONTAINER,
+        )
+        for name, type_name in (
+            ("load_node", "LoadNode"),
+            ("unload_node", "UnloadNode"),
+            ("list_nodes", "ListNodes"),
+        )
+    ),
+    BuiltIn(_S, "/tf_static", "tf2_msgs/msg/TFMessage", "tf2_ros transform_listener", Condition.TF_LISTENER),
+)
+
+
+@lru_cache(maxsize=256)
+def built_in_interfaces(
+    distro: str, library: ClientLibrary, conditions: frozenset[Condition] = frozenset({Condition.ALWAYS})
+) -> tuple[BuiltIn, ...]:
+    """The rows that hold under ``conditions``. Raises ``ValueError`` for a distribution we do not know."""
+    if distro not in DISTROS:
+        raise ValueError(f"unknown ROS distribution '{distro}'; known: {', '.join(DISTROS)}")
+    age = DISTROS.index(distro)
+    libraries: Iterable[ClientLibrary | None] = (None, library)
+    if library is ClientLibrary.UNKNOWN:
+        libraries = (None, *ClientLibrary)
+    return tuple(
+        row
+        for row in TABLE
+        if row.condition in conditions and row.library in libraries and DISTROS.index(row.since) <= age
+    )
