@@ -168,13 +168,18 @@ class EnclaveWriter:
                 domains=governance_domains(self._view),
                 rmw=self._options.rmw,
             )
-        old = state.facts.common_name if state.facts else None
         try:
             document = trusted_document(self._view, relative)
-            return redated(
-                document, subject_name(old or state.enclave), subject, validity, printable(relative)
-            )
+            return redated(document, _own_subjects(state), subject, validity, printable(relative))
         except KeystoreError as error:
             raise DamagedKeystore(
                 f"{error}. What it may do is not known then: give it with secure-keystore apply-policy"
             ) from None
+
+
+def _own_subjects(state: EnclaveState) -> set[str]:
+    """Every subject this enclave can have had: an interrupted renewal may have replaced only its certificate."""
+    names = {common_name(state.enclave, scheme) for scheme in SubjectScheme} | {state.enclave}
+    if state.facts is not None and state.facts.common_name is not None:
+        names.add(state.facts.common_name)
+    return {subject_name(cn) for cn in names}

@@ -5,6 +5,8 @@ Needed where no policy is at hand: the permissions an enclave has are the only r
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from lxml import etree
 
 from keystore.errors import DamagedKeystore
@@ -14,8 +16,10 @@ from keystore.validity import Validity
 _DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 
-def redated(document: bytes, old_subject: str, subject: str, validity: Validity, place: str) -> bytes:
-    """``document`` with the grant of ``old_subject`` given to ``subject`` for ``validity``.
+def redated(
+    document: bytes, old_subjects: Collection[str], subject: str, validity: Validity, place: str
+) -> bytes:
+    """``document`` with the grant of one of ``old_subjects`` given to ``subject`` for ``validity``.
 
     Only the first such grant stays: of several for one subject the implementations use only that one, and
     foreign grants have no place in a document every peer gets to see. Raises InvalidInput for what is no
@@ -23,9 +27,9 @@ def redated(document: bytes, old_subject: str, subject: str, validity: Validity,
     """
     root = check_permissions_schema(document, place)
     grants = list(root.iter("grant"))
-    mine = next((grant for grant in grants if _subject(grant) in (old_subject, subject)), None)
+    mine = next((grant for grant in grants if _subject(grant) in old_subjects), None)
     if mine is None:
-        raise DamagedKeystore(f"{place} has no grant for {old_subject}")
+        raise DamagedKeystore(f"{place} has no grant for {subject}")
     for grant in grants:
         parent = grant.getparent()
         if grant is not mine and parent is not None:

@@ -111,7 +111,7 @@ def _find(pkcs11: Any, attributes: Mapping[str, str], module: str, pin: str | No
     token = pkcs11.lib(module).get_token(
         token_label=attributes.get("token"), token_serial=_serial(attributes)
     )
-    session = token.open(user_pin=pin)
+    session = _session(pkcs11, token, pin)
     wanted: dict[Any, Any] = {}
     if "object" in attributes:
         wanted[pkcs11.Attribute.LABEL] = attributes["object"]
@@ -120,6 +120,14 @@ def _find(pkcs11: Any, attributes: Mapping[str, str], module: str, pin: str | No
     key = _single(session, pkcs11.ObjectClass.PRIVATE_KEY, wanted, pkcs11)
     public = _single(session, pkcs11.ObjectClass.PUBLIC_KEY, wanted, pkcs11)
     return key, _public_key(pkcs11, public)
+
+
+def _session(pkcs11: Any, token: Any, pin: str | None) -> Any:
+    """A login holds for all sessions of a process (PKCS#11 section 5.6): the second CA key needs none."""
+    try:
+        return token.open(user_pin=pin)
+    except pkcs11.exceptions.UserAlreadyLoggedIn:
+        return token.open()
 
 
 def _serial(attributes: Mapping[str, str]) -> bytes | None:

@@ -136,16 +136,15 @@ def bring_about(root: Path, wishes: Mapping[str, Wish], options: ProvisionOption
     """The engine: see the head of this module. ``root`` is resolved, the names are valid and in order."""
     now = options.now or utc_now()
     view = KeystoreView(root)
-    if view.is_complete and not _interrupted(root):
-        states = [inspect_wish(view, name, wish, options, now) for name, wish in wishes.items()]
-        if governance_stands(view, options.domains) and all(state.is_good for state in states):
+    if view.is_complete:
+        if not _interrupted(root) and _all_stand(view, wishes, options, now):
             return ProvisionReport(root, (), tuple(EnclaveReport(name, ()) for name in wishes))
     elif not options.create:
         raise NotAKeystore(
             f"{printable(root)} is not a complete keystore, and creating it was forbidden; "
             "make it with: secure-keystore create"
         )
-    elif not view.can_be_completed and not view.is_complete:
+    elif not view.can_be_completed:
         raise NotAKeystore(f"{printable(root)} exists and is no keystore; choose an empty or new directory")
     from keystore.provisioning_run import write_wishes  # brings cryptography: not on the warm path
 
@@ -154,6 +153,13 @@ def bring_about(root: Path, wishes: Mapping[str, Wish], options: ProvisionOption
 
 def _interrupted(root: Path) -> bool:
     return os.path.lexists(root / layout.INCOMING)
+
+
+def _all_stand(
+    view: KeystoreView, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
+) -> bool:
+    states = (inspect_wish(view, name, wish, options, now) for name, wish in wishes.items())
+    return governance_stands(view, options.domains) and all(state.is_good for state in states)
 
 
 def inspect_wish(

@@ -18,6 +18,7 @@ from pathlib import Path
 from keystore import certificate, layout, rollover, safe_files, store
 from keystore.authority import Role
 from keystore.certificate import CertificateFacts
+from keystore.creation import install_incoming
 from keystore.der import DerError
 from keystore.enclave_name import validate_enclave_name
 from keystore.enclave_state import Identity
@@ -59,6 +60,7 @@ def renew(
     named = None if enclaves is None else sorted({validate_enclave_name(name) for name in enclaves})
     _refuse_unknown(root, named)
     with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:
+        install_incoming(opened)
         repaired = _repair_keystore(opened, chosen, now)
         if renew_crl(opened, provisioning.access, now, chosen.within):
             repaired.append("CRL published again")

@@ -136,4 +136,6 @@ def _stray(root: Path, relative: str, why: str) -> Finding:
 
 
 def _command(verb: str, path: Path) -> str:
-    return f"{verb} {shlex.quote(str(path))}"
+    """Ready for a shell, unless the name holds something that would speak to the terminal instead."""
+    text = str(path)
+    return f"{verb} {shlex.quote(text) if text.isprintable() else ascii(text)}"

@@ -10,7 +10,14 @@ from hypothesis import strategies as st
 
 from keystore.domains import Domains
 from keystore.errors import InvalidInput
-from keystore.governance import DomainRule, Governance, Protection, TopicRule, governance_document, parse_governance
+from keystore.governance import (
+    DomainRule,
+    Governance,
+    Protection,
+    TopicRule,
+    governance_document,
+    parse_governance,
+)
 from keystore.governance_setting import GovernanceOptions, set_governance
 from keystore.governance_yaml import parse_governance_yaml
 from keystore.provisioning import provision

@@ -21,7 +21,19 @@ from keystore.trusted_documents import trusted_document
 from keystore.verification import Severity, verify
 from keystore.view import KeystoreView
 from tests.dds import sros2_style
-from tests.keystore.kit import ARTICLE, DAY, NOW, actions, contents, filled, mode, openssl, options, policy, snapshot
+from tests.keystore.kit import (
+    ARTICLE,
+    DAY,
+    NOW,
+    actions,
+    contents,
+    filled,
+    mode,
+    openssl,
+    options,
+    policy,
+    snapshot,
+)
 
 
 def codes(root: Path, **more: object) -> set[str]:
