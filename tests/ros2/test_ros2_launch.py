@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.ros2.conftest import Workspace, install_metadata
+from tests.ros2.conftest import Workspace
+from tests.ros2.upstream import install_metadata
 
 pytestmark = pytest.mark.real_launch
 
@@ -87,7 +88,9 @@ def test_every_process_finds_its_enclave_complete(demo: Workspace) -> None:
 
 def test_permissions_are_least_and_under_final_names(demo: Workspace) -> None:
     keystore = demo.directory / "ks"
-    status, screen = launch(demo, "--secure", "--keystore", str(keystore), "demo", "demo.launch.xml", "where:=arm")
+    status, screen = launch(
+        demo, "--secure", "--keystore", str(keystore), "demo", "demo.launch.xml", "where:=arm"
+    )
     assert status == 0, screen
     ears = (keystore / "enclaves/arm/permissions.xml").read_text()
     assert "<topic>rt/arm/news</topic>" in ears
@@ -126,7 +129,14 @@ def test_a_keystore_is_needed(demo: Workspace) -> None:
 def test_a_node_without_manifest_starts_nothing(demo: Workspace) -> None:
     (demo.prefix / "share/demo/demo.nodl.xml").unlink()
     status, screen = launch(
-        demo, "--secure", "--keystore", str(demo.directory / "ks"), "--missing-nodl", "error", "demo", "demo.launch.xml"
+        demo,
+        "--secure",
+        "--keystore",
+        str(demo.directory / "ks"),
+        "--missing-nodl",
+        "error",
+        "demo",
+        "demo.launch.xml",
     )
     assert status != 0
     assert "no NoDL manifest for demo/talker" in screen
@@ -151,7 +161,9 @@ def decide(context):
 
 
 @pytest.mark.parametrize("allowed", [False, True])
-def test_a_node_that_the_plan_did_not_foresee(allowed: bool, demo: Workspace, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_node_that_the_plan_did_not_foresee(
+    allowed: bool, demo: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
     seen = demo.directory / "seen"
     seen.mkdir()
     monkeypatch.setenv("SEEN", str(seen))
@@ -200,7 +212,9 @@ def test_beside_ros2launch_security_ours_wins(demo: Workspace) -> None:
             "launch_ros.node_action": ["security = other_security:SecurityNodeAction"],
         },
     )
-    status, screen = launch(demo, "--secure", "--keystore", str(demo.directory / "ks"), "demo", "demo.launch.xml")
+    status, screen = launch(
+        demo, "--secure", "--keystore", str(demo.directory / "ks"), "demo", "demo.launch.xml"
+    )
     assert status == 0, screen
     assert screen.count("enable=true strategy=Enforce") == 4
 

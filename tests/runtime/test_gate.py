@@ -63,7 +63,11 @@ class Keystore:
 
 def gate(*, allow_late: bool = False) -> tuple[PlannedGate, Keystore, list[str]]:
     keystore, said = Keystore(), list[str]()
-    return PlannedGate([TALKER], [CAMERA], keystore, allow_late=allow_late, say_late=said.append), keystore, said
+    return (
+        PlannedGate([TALKER], [CAMERA], keystore, allow_late=allow_late, say_late=said.append),
+        keystore,
+        said,
+    )
 
 
 @pytest.mark.parametrize(

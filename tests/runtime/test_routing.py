@@ -24,7 +24,9 @@ from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 class Outputs:
     """Screen and log directory of one run, read back after everything was written."""
 
-    def __init__(self, directory: Path, environment: dict[str, str] | None = None, debug: bool = False) -> None:
+    def __init__(
+        self, directory: Path, environment: dict[str, str] | None = None, debug: bool = False
+    ) -> None:
         self.directory = directory
         self.stream = io.StringIO()
         writer = SinkWriter(lambda: None, lambda: None)

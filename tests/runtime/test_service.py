@@ -44,7 +44,13 @@ class Launch:
     """A launch in a process of its own, with everything it writes in ``screen``."""
 
     def __init__(
-        self, directory: Path, actions: str, *, noninteractive: bool = False, debug: bool = False, prelude: str = ""
+        self,
+        directory: Path,
+        actions: str,
+        *,
+        noninteractive: bool = False,
+        debug: bool = False,
+        prelude: str = "",
     ) -> None:
         file = directory / "test.launch.py"
         file.write_text(
@@ -110,7 +116,9 @@ def test_launch_log_and_latest(tmp_path: Path) -> None:
     assert re.search(r"(?m)^\d+\.\d{7} \[a-1\] hello$", text)
 
 
-@pytest.mark.parametrize(("script", "status"), [("exit 0", 0), ("exit 1", 1), ("exit 77", 1), ("kill -SEGV $$", 1)])
+@pytest.mark.parametrize(
+    ("script", "status"), [("exit 0", 0), ("exit 1", 1), ("exit 77", 1), ("kill -SEGV $$", 1)]
+)
 def test_a_process_that_ends_badly_on_its_own_shows_in_the_exit_status(
     script: str, status: int, tmp_path: Path
 ) -> None:
@@ -160,7 +168,9 @@ def test_output_reaches_handlers(tmp_path: Path) -> None:
 
 
 def test_a_timer_fires_after_its_period(tmp_path: Path) -> None:
-    status, lines = finished(tmp_path, 'TimerAction(period=0.2, actions=[LogInfo(msg="late")]), LogInfo(msg="early")')
+    status, lines = finished(
+        tmp_path, 'TimerAction(period=0.2, actions=[LogInfo(msg="late")]), LogInfo(msg="early")'
+    )
     assert (status, lines) == (0, ["[INFO] [launch.user]: early", "[INFO] [launch.user]: late"])
 
 
@@ -238,7 +248,8 @@ def test_other_signals_shut_down_in_order_and_leave_nobody(number: signal.Signal
 def test_a_child_that_ignores_sigint_is_escalated(tmp_path: Path) -> None:
     launch = Launch(
         tmp_path,
-        "sh('trap \"\" INT TERM; echo up; while true; do sleep 0.05; done', sigterm_timeout='0.2', sigkill_timeout='0.2')",
+        "sh('trap \"\" INT TERM; echo up; while true; do sleep 0.05; done', "
+        "sigterm_timeout='0.2', sigkill_timeout='0.2')",
     )
     launch.until("[a-1] up")
     launch.process.send_signal(signal.SIGINT)
@@ -249,7 +260,9 @@ def test_a_child_that_ignores_sigint_is_escalated(tmp_path: Path) -> None:
 
 
 def test_killing_the_launcher_leaves_nobody(tmp_path: Path) -> None:
-    launch = Launch(tmp_path, f"sh('sleep 60 & echo $! > {tmp_path}/inner; echo $$ > {tmp_path}/outer; wait')")
+    launch = Launch(
+        tmp_path, f"sh('sleep 60 & echo $! > {tmp_path}/inner; echo $$ > {tmp_path}/outer; wait')"
+    )
     pids = [read_pid(tmp_path / name) for name in ("inner", "outer")]
     launch.process.kill()
     launch.process.wait()
@@ -296,7 +309,9 @@ def test_two_hundred_processes_in_one_launch(tmp_path: Path) -> None:
     status, lines = finished(tmp_path, '*[sh(f"echo {n}") for n in range(200)]')
     assert status == 0
     assert sum("process has finished cleanly" in line for line in lines) == 200
-    assert sorted(int(line.split()[-1]) for line in lines if re.match(r"\[a-\d+\] \d+$", line)) == list(range(200))
+    assert sorted(int(line.split()[-1]) for line in lines if re.match(r"\[a-\d+\] \d+$", line)) == list(
+        range(200)
+    )
 
 
 def test_fifty_megabytes_to_the_screen_and_the_log_without_loss(tmp_path: Path) -> None:

@@ -41,7 +41,9 @@ class Story:
         self.exits.append(returncode)
 
     def say(self, level: Level, message: str) -> None:
-        self.lines.append((level, re.sub(r"pid \[?\d+", lambda found: found[0].rstrip("0123456789") + "PID", message)))
+        self.lines.append(
+            (level, re.sub(r"pid \[?\d+", lambda found: found[0].rstrip("0123456789") + "PID", message))
+        )
 
     async def until(self, condition: Callable[[], bool]) -> None:
         deadline = time.monotonic() + 10
@@ -93,7 +95,9 @@ def test_a_program_that_cannot_be_started() -> None:
 
     async def main() -> Outcome:
         async with ProcessTree() as tree:
-            return await SupervisedProcess("a-1", prepare, tree, LifeRules(respawn=True), story, story.say).run()
+            return await SupervisedProcess(
+                "a-1", prepare, tree, LifeRules(respawn=True), story, story.say
+            ).run()
 
     assert asyncio.run(main()) == Outcome(None, asked_to_end=False)
     assert story.lines == [("ERROR", "cannot start process: No such file or directory: '/no/such/program'")]

@@ -1,0 +1,60 @@
+"""What colcon reads: package.xml, setup.py and the resource marker agree with pyproject.toml."""
+
+from __future__ import annotations
+
+import re
+import runpy
+from pathlib import Path
+from typing import Any
+from unittest import mock
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).parents[2]
+
+
+def setup_py() -> dict[str, Any]:
+    with mock.patch("setuptools.setup"):
+        return runpy.run_path(str(ROOT / "setup.py"))
+
+
+def pyproject(key: str) -> str:
+    found = re.search(rf'(?m)^{key} = "(.*)"$', (ROOT / "pyproject.toml").read_text())
+    assert found is not None
+    return found[1]
+
+
+def test_one_version_everywhere() -> None:
+    package = ElementTree.parse(ROOT / "package.xml").getroot()
+    assert package.findtext("version") == pyproject("version") == setup_py()["VERSION"]
+
+
+def test_package_xml_is_an_ament_python_package_of_our_name() -> None:
+    package = ElementTree.parse(ROOT / "package.xml").getroot()
+    assert package.findtext("name") == setup_py()["NAME"] == "enclave_launch"
+    assert package.findtext("export/build_type") == "ament_python"
+
+
+def test_the_index_gets_the_marker_and_the_manifest() -> None:
+    files = dict(setup_py()["DATA_FILES"])
+    assert files == {
+        "share/ament_index/resource_index/packages": ["resource/enclave_launch"],
+        "share/enclave_launch": ["package.xml"],
+    }
+    assert all((ROOT / file).is_file() for group in files.values() for file in group)
+
+
+def test_requirements_are_those_of_pyproject() -> None:
+    text = (ROOT / "pyproject.toml").read_text()
+    listed = re.search(r"(?ms)^dependencies = \[(.*?)\]", text)
+    assert listed is not None
+    assert re.findall(r'"(.*?)"', listed[1]) == setup_py()["REQUIRES"]
+
+
+def test_entry_points_are_those_of_pyproject() -> None:
+    text = (ROOT / "pyproject.toml").read_text()
+    for group, entries in setup_py()["ENTRY_POINTS"].items():
+        title = "project.scripts" if group == "console_scripts" else f'project.entry-points."{group}"'
+        section = re.search(rf"(?ms)^\[{re.escape(title)}\]\n(.*?)(?=^\[|\Z)", text)
+        assert section is not None, f"pyproject.toml has no [{title}]"
+        declared = re.findall(r'(?m)^([\w-]+) = "(.*)"$', section[1])
+        assert [f"{name} = {value}" for name, value in declared] == entries

@@ -1,0 +1,172 @@
+"""A process starts only once its enclave is complete; what cannot be secured is not started, with the reason."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.errors import ProvisionError, RuntimeFailure
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.runtime.gate import Grant
+from enclave_launch.runtime.service import RunOptions, run_launch, run_launch_async
+from tests.runtime.conftest import alive, read_pid
+
+pytestmark = pytest.mark.usefixtures("ros_log_dir")
+
+
+class SlowKeystore:
+    """Completes an enclave by writing a file, after a while. ``broken``: names of processes it fails for."""
+
+    def __init__(self, directory: Path, broken: Sequence[str] = ()) -> None:
+        self.directory = directory
+        self.broken = broken
+        self.order: list[str] = []
+        self.inside = threading.Lock()
+
+    def ensure(self, process: ResolvedProcess) -> Grant:
+        assert threading.current_thread() is not threading.main_thread(), (
+            "the event loop must go on meanwhile"
+        )
+        assert self.inside.acquire(blocking=False), "one process at a time"
+        with_label = process.process_name.rpartition("-")[0]
+        self.order.append(with_label)
+        try:
+            time.sleep(0.05)
+            if with_label in self.broken:
+                raise ProvisionError(f"keystore {self.directory}: read-only file system")
+            (self.directory / with_label).write_text("complete")
+        finally:
+            self.inside.release()
+        return Grant(("extra",), {"ENCLAVE_FILE": str(self.directory / with_label)})
+
+    def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
+        raise AssertionError("no components here")
+
+    def launcher(self) -> Grant | None:
+        return None
+
+
+def launch_file(directory: Path, *actions: str) -> Path:
+    file = directory / "test.launch.xml"
+    file.write_text(f"<launch>{''.join(actions)}</launch>")
+    return file
+
+
+def script(directory: Path, name: str, text: str, **attributes: str) -> str:
+    program = directory / f"{name}.sh"
+    program.write_text(f"#!/bin/sh\n{text}\n")
+    program.chmod(0o755)
+    extra = "".join(f' {key}="{value}"' for key, value in attributes.items())
+    return f'<executable cmd="{program}" name="{name}" output="screen"{extra}/>'
+
+
+def test_each_process_finds_its_enclave_complete_and_gets_what_the_gate_grants(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    say = 'echo "$1 $(cat $ENCLAVE_FILE)"'
+    actions = [script(tmp_path, name, say) for name in ("a", "b", "c")]
+    keystore = SlowKeystore(tmp_path)
+    assert run_launch(launch_file(tmp_path, *actions), gate=keystore) == 0
+    assert keystore.order == ["a", "b", "c"]
+    shown = capfd.readouterr().out
+    for number, name in enumerate("abc", start=1):
+        assert f"[{name}-{number}] extra complete" in shown
+
+
+def test_the_enclave_is_looked_at_again_before_each_respawn(tmp_path: Path) -> None:
+    keystore = SlowKeystore(tmp_path)
+    action = script(tmp_path, "a", "exit 0", respawn="true", respawn_max_retries="2")
+    assert run_launch(launch_file(tmp_path, action), gate=keystore) == 0
+    assert keystore.order == ["a", "a", "a"]
+
+
+def test_a_failure_to_provision_starts_nothing_more_and_shuts_down_with_the_reason(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    actions = [
+        script(tmp_path, "good", "exec sleep 60"),
+        script(tmp_path, "bad", "echo never"),
+        script(tmp_path, "later", "echo never"),
+    ]
+    start = time.monotonic()
+    assert run_launch(launch_file(tmp_path, *actions), gate=SlowKeystore(tmp_path, broken=["bad"])) == 1
+    assert time.monotonic() - start < 10
+    shown = capfd.readouterr().out
+    assert f"[CRITICAL] [launch]: keystore {tmp_path}: read-only file system" in shown
+    assert "never" not in shown
+    assert "[good-1]: sending signal 'SIGINT'" in shown
+
+
+def test_secrets_do_not_reach_the_children(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("CA_PASSPHRASE", "open sesame")
+    monkeypatch.setenv("HARMLESS", "yes")
+    file = launch_file(tmp_path, script(tmp_path, "a", 'echo "${CA_PASSPHRASE-absent} $HARMLESS"'))
+    assert run_launch(file, options=RunOptions(secrets=frozenset({"CA_PASSPHRASE"}))) == 0
+    assert "[a-1] absent yes" in capfd.readouterr().out
+    assert os.environ["CA_PASSPHRASE"] == "open sesame"
+
+
+def test_notices_are_said_at_the_start(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = launch_file(tmp_path, script(tmp_path, "a", "true"))
+    run_launch(file, options=RunOptions(notices=("/talker ends 2030-01-01",)))
+    lines = capfd.readouterr().out.splitlines()
+    assert lines.index("[WARNING] [launch]: /talker ends 2030-01-01") < lines.index(
+        next(line for line in lines if "process started" in line)
+    )
+
+
+def test_inside_a_running_loop_and_cancelled(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+    file = launch_file(tmp_path, script(tmp_path, "a", f"echo $$ > {tmp_path}/pid; exec sleep 60"))
+
+    async def main() -> str:
+        task = asyncio.create_task(run_launch_async(file))
+        pid = await asyncio.to_thread(read_pid, tmp_path / "pid")
+        task.cancel()
+        try:
+            await asyncio.wait_for(task, 10)
+        except asyncio.CancelledError:
+            return "cancelled" if not alive(pid) else "left it running"
+        return "returned"
+
+    assert asyncio.run(main()) == "cancelled"
+    assert "[a-1]: sending signal 'SIGINT'" in capfd.readouterr().out
+
+
+def test_two_launches_at_once_in_one_process_are_refused(tmp_path: Path) -> None:
+    file = launch_file(tmp_path, script(tmp_path, "a", f"echo $$ > {tmp_path}/pid; exec sleep 60"))
+
+    async def main() -> None:
+        first = asyncio.create_task(run_launch_async(file))
+        await asyncio.to_thread(read_pid, tmp_path / "pid")
+        with pytest.raises(RuntimeFailure, match="another launch is running in this process"):
+            await run_launch_async(file)
+        first.cancel()
+        with pytest.raises(asyncio.CancelledError):
+            await first
+        assert await run_launch_async(launch_file(tmp_path, script(tmp_path, "b", "true"))) == 0
+
+    asyncio.run(main())
+
+
+def test_a_launch_leaves_our_own_environment_as_it_was(tmp_path: Path) -> None:
+    file = tmp_path / "test.launch.xml"
+    file.write_text('<launch><set_env name="LAUNCHED" value="1"/></launch>')
+    assert run_launch(file) == 0
+    assert "LAUNCHED" not in os.environ
+
+
+def test_without_rclpy_what_needs_ros_services_is_an_error_before_anything_starts(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = launch_file(tmp_path, script(tmp_path, "a", "echo never"))
+    with pytest.raises(RuntimeFailure, match=r"rclpy is not importable .* ros2 launch --secure"):
+        run_launch(file, options=RunOptions(needs_ros_services=True))
+    assert "process started" not in capfd.readouterr().out
