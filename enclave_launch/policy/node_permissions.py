@@ -122,7 +122,8 @@ class _Collector:
             self._name(endpoint, template, note)
             return
         note = _parameter_note(template, self._node)
-        for filled in template.fill_each(self._node.parameters):
+        inputs = self._node.inputs
+        for filled in inputs.doubtful(template).fill_each({**inputs.values, **self._node.parameters}):
             if filled.is_literal:
                 self._name(endpoint, filled, note)
             else:
@@ -216,8 +217,9 @@ def _parameter_note(template: NameTemplate, node: RunningNode) -> str:
     notes = []
     for part in template.parts:
         if isinstance(part, ParameterPart):
-            origin = "set by launch" if part.name in node.parameters else "its default"
-            notes.append(f"parameter {part.name}, {origin}")
+            given = part.name in node.parameters or part.name in node.inputs.values
+            what = "input" if part.name[:1] in "-<$" else "parameter"
+            notes.append(f"{what} {part.name}, {'set by launch' if given else 'its default'}")
     return "; ".join(notes)
 
 

@@ -11,11 +11,12 @@ the container's command line (rclcpp_components/component_manager.cpp), unless `
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
+from enclave_launch.policy.program_inputs import ProgramInputs, program_inputs
 from enclave_launch.process import ParameterValue, RemapRule, ResolvedComponent, ResolvedProcess
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
@@ -38,6 +39,7 @@ class RunningNode:
     enclave: str
     location: SourceLocation
     role: Role = "node"
+    inputs: ProgramInputs = field(default_factory=ProgramInputs)
 
     @property
     def fqn(self) -> str:
@@ -51,7 +53,8 @@ def node_of_process(
     rules = RemapRules(
         process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location)
     )
-    return _named(interface, rules, process.parameters, enclave, process.location, role)
+    node = _named(interface, rules, process.parameters, enclave, process.location, role)
+    return replace(node, inputs=program_inputs(process))
 
 
 def node_of_component(

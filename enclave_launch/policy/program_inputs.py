@@ -1,0 +1,78 @@
+"""What launch tells a program besides ROS arguments: options, positional words, environment. Pure.
+
+Inference may find a topic name that is an input of the program: ``--topic`` of its command line,
+``<argument>``, ``$VARIABLE`` (see ``nodl.name_template.ParameterPart``). The value that launch passes
+counts; where it cannot be told, the default in the source must not be believed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import PurePath
+
+from enclave_launch.process import ResolvedProcess
+from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
+
+
+@dataclass(frozen=True, slots=True)
+class ProgramInputs:
+    """``values`` by input name (``--topic``, ``-t``, ``$VARIABLE``).
+
+    ``bare_words``: there are words that may be positional arguments; ``short_flags``: there are flags
+    with one dash, which may be another spelling of any option.
+    """
+
+    values: Mapping[str, str] = field(default_factory=dict)
+    bare_words: bool = False
+    short_flags: bool = False
+
+    def doubtful(self, template: NameTemplate) -> NameTemplate:
+        """``template`` with an unknown part for each input whose value the command line may set unseen."""
+        if not (self.bare_words or self.short_flags):
+            return template
+        return NameTemplate(tuple(self._doubted(part) for part in template.parts))
+
+    def _doubted(self, part: Part) -> Part:
+        if not isinstance(part, ParameterPart) or part.name in self.values:
+            return part
+        if (part.name[:1] == "<" and self.bare_words) or (part.name[:1] == "-" and self.short_flags):
+            return UnknownPart(f"the command line may set {part.name}")
+        return part
+
+
+def program_inputs(process: ResolvedProcess) -> ProgramInputs:
+    """The inputs of ``process``; an option's value follows ``=`` or is the next word without dash."""
+    values = {f"${name}": value for name, value in process.environment.items()}
+    words = _own_words(process)
+    for word, following in zip(words, (*words[1:], ""), strict=False):
+        if _is_flag(word):
+            name, equals, value = word.partition("=")
+            values[name] = value if equals or _is_flag(following) else following
+    return ProgramInputs(
+        values,
+        bare_words=any(not _is_flag(word) for word in words),
+        short_flags=any(_is_flag(word) and not word.startswith("--") for word in words),
+    )
+
+
+def _is_flag(word: str) -> bool:
+    return word.startswith("-") and word not in ("-", "--")
+
+
+def _own_words(process: ResolvedProcess) -> Sequence[str]:
+    """The words after the executable that are no ROS arguments."""
+    start = next(
+        (i for i, word in enumerate(process.cmd) if PurePath(word).name == PurePath(process.executable).name),
+        0,
+    )
+    words: list[str] = []
+    inside = False
+    for word in process.cmd[start + 1 :]:
+        if word == "--ros-args":
+            inside = True
+        elif inside:
+            inside = word != "--"
+        elif ":=" not in word:  # outside, a bare rule is a deprecated remap
+            words.append(word)
+    return words
