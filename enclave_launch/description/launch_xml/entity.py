@@ -64,10 +64,10 @@ class Entity(BaseEntity):
     def get_attr(
         self, name: str, *, data_type: Any = str, optional: bool = False, can_be_str: bool = True
     ) -> Any:
-        if data_type not in _VALUE_TYPES and check_is_list_entity(data_type):
-            return self._children_named(name, data_type, optional)
         attributes = self._element.attrib
         text = attributes.get(name)
+        if data_type not in _VALUE_TYPES and check_is_list_entity(data_type):
+            return self._children_named(name, data_type, optional)
         if text is None:
             if optional:
                 return None

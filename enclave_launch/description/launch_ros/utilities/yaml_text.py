@@ -65,4 +65,6 @@ def _entry(name: str, value: Any) -> str:
         return f"{name}: {str(value).lower()}"
     if type(value) is int or (type(value) is str and _PLAIN_TEXT.match(value)):
         return f"{name}: {value}"
+    if type(value) is float and (1e-4 <= abs(value) < 1e16 or value == 0):
+        return f"{name}: {value!r}"  # no exponent, for which PyYAML has a form of its own
     return ""
