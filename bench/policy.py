@@ -1,6 +1,6 @@
 """How long policies and permissions take: 1,000 nodes with 20 interfaces each, from values to bytes.
 
-    python bench/policy.py [nodes] [interfaces]
+    python -m bench.policy [nodes] [interfaces]
 
 Prints a table. The floor is the least that any implementation must do with the same names: put each
 once into a set per enclave and sort it. The peer is SROS2's stylesheet from policy to permissions, where
