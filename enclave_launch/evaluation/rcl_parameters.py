@@ -181,7 +181,7 @@ def _value(node: Any) -> ParameterValue | None:
     if node is None or node.id == "mapping":
         return None
     if node.id == "scalar":
-        return _scalar(node.value) if node.style is None else str(node.value)
+        return str(node.value) if node.style else _scalar(node.value)  # a plain scalar has no style
     items = [_value(item) for item in node.value]
     if any(item is None or isinstance(item, tuple) for item in items):
         return None

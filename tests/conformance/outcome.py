@@ -18,10 +18,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 # Messages that come from the parsing library or from Python, not from launch: the type is what counts.
-_TYPE_ONLY = frozenset(
-    ["UnexpectedCharacters", "UnexpectedEOF", "ParseError", "XMLSyntaxError", "ScannerError", "ParserError", "ConstructorError", "ComposerError", "SyntaxError", "AssertionError", "InvalidNodeNameException", "InvalidNamespaceException"]
-)
-
+_TYPE_ONLY = {
+    *("UnexpectedCharacters", "UnexpectedEOF", "ParseError", "SyntaxError", "XMLSyntaxError"),
+    *("ScannerError", "ParserError", "ConstructorError", "ComposerError"),
+    *("AssertionError", "InvalidNodeNameException", "InvalidNamespaceException"),
+}
 
 _SET = re.compile(r"\{('[^']*'(?:, '[^']*')+)\}")  # of names: its order is by chance
 

@@ -324,8 +324,8 @@ def run_forked(job: dict[str, Any]) -> dict[str, Any]:
     with os.fdopen(reader) as pipe:
         text = pipe.read()
     os.waitpid(child, 0)
-    answer: dict[str, Any] = json.loads(text) if text else {"crash": "no answer"}
-    return answer
+    result: dict[str, Any] = json.loads(text) if text else {"crash": "no answer"}
+    return result
 
 
 def main() -> None:

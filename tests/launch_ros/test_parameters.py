@@ -1,0 +1,154 @@
+"""The values that a node ends up with, and the files that launch writes for it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enclave_launch.description.launch_ros.utilities import yaml_text
+from enclave_launch.evaluation.rcl_parameters import as_rcl_reads, resolve_parameters
+from enclave_launch.evaluation.ros_arguments import ParameterFile, ParameterRule, parse_ros_arguments
+
+from .conftest import Evaluate
+
+
+def resolved(tmp_path: Path, line: str, fqn: str = "/ns/n", **files: str) -> dict[str, Any]:
+    """Merge ``line`` for the node ``fqn``; ``files``: ``a="..."`` is the text of ``a.yaml``."""
+    for name, text in files.items():
+        (tmp_path / f"{name}.yaml").write_text(text)
+    words = ["--ros-args", *(str(tmp_path / w) if w.endswith(".yaml") else w for w in line.split())]
+    tokens = [None if token == "?" else token for token in fqn.split("/") if token]
+    return resolve_parameters(tokens, parse_ros_arguments(words).parameters)
+
+
+EVERY = "/**: {ros__parameters: {%s}}"
+OWN = "/ns/n: {ros__parameters: {%s}}"
+
+
+def test_later_files_win(tmp_path: Path) -> None:
+    line = "--params-file a.yaml --params-file b.yaml"
+    assert resolved(tmp_path, line, a=EVERY % "x: 1, y: 1", b=EVERY % "x: 2") == {"x": 2, "y": 1}
+
+
+def test_rules_and_files_in_command_line_order(tmp_path: Path) -> None:
+    assert resolved(tmp_path, "-p x:=1 --params-file a.yaml", a=EVERY % "x: 2") == {"x": 2}
+    assert resolved(tmp_path, "--params-file a.yaml -p x:=1", a=EVERY % "x: 2") == {"x": 1}
+
+
+def test_sections_apply_in_the_order_in_which_they_first_appear(tmp_path: Path) -> None:
+    files = {"a": OWN % "x: 1", "b": EVERY % "x: 2", "c": OWN % "x: 3"}
+    line = "--params-file a.yaml --params-file b.yaml --params-file c.yaml"
+    assert resolved(tmp_path, line, **files) == {"x": 2}
+
+
+def test_another_type_in_the_same_section_does_not_override(tmp_path: Path) -> None:
+    assert resolved(tmp_path, "-p a:=1 -p a:=x") == {"a": 1}
+    assert resolved(tmp_path, "-p a:=x -p a:=1") == {"a": 1}
+    assert resolved(tmp_path, "-p a:=1.5 -p a:=true") == {"a": True}
+
+
+@pytest.mark.parametrize(
+    ("section", "applies"),
+    [
+        ("/**", True), ("/ns/n", True), ("ns/n", True), ("/*/n", True), ("/**/n", True), ("/ns/*", True),
+        ("/ns/**", True), ("/ns/n/**", True), ("/n", False), ("n", False), ("/*", False), ("/other/n", False),
+        ("/ns", False), ("/ns/n/m", False), ("/*/*/n", False),
+    ],
+)  # fmt: skip
+def test_section_names(tmp_path: Path, section: str, applies: bool) -> None:
+    found = resolved(tmp_path, "--params-file a.yaml", a=f"{section}: {{ros__parameters: {{x: 1}}}}")
+    assert found == ({"x": 1} if applies else {})
+
+
+def test_nested_sections_and_parameters(tmp_path: Path) -> None:
+    text = "ns:\n  n:\n    ros__parameters:\n      a: {b: {c: 1}}\n      l: [1, 2]\n"
+    assert resolved(tmp_path, "--params-file a.yaml", a=text) == {"a.b.c": 1, "l": (1, 2)}
+
+
+def test_only_wildcards_match_a_name_that_nobody_knows(tmp_path: Path) -> None:
+    text = f"{OWN % 'x: 1'}\n{EVERY % 'y: 1'}\n/ns/*: {{ros__parameters: {{z: 1}}}}"
+    assert resolved(tmp_path, "--params-file a.yaml", "/ns/?", a=text) == {"y": 1, "z": 1}
+
+
+def test_a_rule_for_a_node(tmp_path: Path) -> None:
+    assert resolved(tmp_path, "-p n:x:=1 -p y:=2", "/n") == {"x": 1, "y": 2}
+    assert resolved(tmp_path, "-p n:x:=1", "/ns/n") == {}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1", 1), ("-5", -5), ("0x10", 16), ("010", 8), ("08", 8.0), ("1.5", 1.5), ("1e3", 1000.0), (".5", 0.5),
+        ("5.", 5.0), ("true", True), ("y", True), ("Off", False), ("abc", "abc"), ("'1'", "1"), ('"true"', "true"),
+        ("null", "null"), ("~", "~"), ("[1, 2]", (1, 2)), ("[a, 'b']", ("a", "b")), ("(1, 2)", "(1, 2)"),
+        ("-.inf", float("-inf")), ("99999999999999999999", 1e20), ("1:30", "1:30"), ("2020-01-01", "2020-01-01"),
+        ("1_000", "1_000"),
+    ],
+)  # fmt: skip
+def test_scalars_by_rcls_rules(text: str, value: object) -> None:
+    found = resolve_parameters(["n"], [ParameterRule("p", text)])["p"]
+    assert (found, type(found)) == (value, type(value))
+
+
+@pytest.mark.parametrize("text", ["", "{a: 1}", "[", "[[1]]", "a: b"])
+def test_what_rcl_refuses_has_no_value(text: str) -> None:
+    assert resolve_parameters(["n"], [ParameterRule("p", text)]) == {}
+
+
+@pytest.mark.parametrize("text", ["", "- 1", "a: [", "just text", "\x00", "/**: {ros__parameters: 3}"])
+def test_files_that_are_no_parameter_files(tmp_path: Path, text: str) -> None:
+    assert resolved(tmp_path, "--params-file a.yaml", a=text) == {}
+    assert resolve_parameters(["n"], [ParameterFile(str(tmp_path / "nowhere"))]) == {}
+
+
+def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
+    assert resolved(tmp_path, "--params-file a.yaml", a=EVERY % "x: 1") == {"x": 1}
+    assert resolved(tmp_path, "--params-file a.yaml", a=EVERY % "x: 12") == {"x": 12}
+
+
+def test_of_a_launched_node(launched: Evaluate, tmp_path: Path) -> None:
+    (tmp_path / "f.yaml").write_text(EVERY % "use_sim_time: false, rate: 10")
+    text = """
+    <set_parameter name="use_sim_time" value="true"/><set_parameter name="l" value="[1, 2]"/>
+    <node pkg="pk" exec="e" name="n" namespace="ns" ros_args="-p late:=1 -p rate:=1">
+      <param from="$(dirname)/f.yaml"/><param name="s" value="1e3"/><param name="t" value="'1'"/>
+      <param name="deep"><param name="x" value="2.5"/></param>
+    </node>"""
+    (process,) = launched(text).processes
+    assert process.parameters == {
+        "late": 1, "rate": 10, "use_sim_time": False, "l": "(1, 2)", "s": 1000.0, "t": "1", "deep.x": 2.5,
+    }  # fmt: skip
+    assert [yaml.safe_load(text)["/ns/n"]["ros__parameters"] for text in process.parameter_files.values()] == [
+        {"s": "1e3"}, {"t": "1"}, {"deep.x": 2.5},
+    ]  # fmt: skip
+    assert set(process.parameter_files) <= set(process.cmd)
+
+
+def test_files_are_written_by_the_host_only(launched: Evaluate) -> None:
+    (process,) = launched('<node pkg="pk" exec="e"><param name="a" value="1"/></node>').processes
+    assert process.cmd[-2:] == ("--params-file", "<params:1>")
+    assert process.parameter_files == {"<params:1>": "/**:\n  ros__parameters:\n    a: 1\n"}
+
+
+scalars = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False), st.text(max_size=12))
+values = st.one_of(scalars, st.lists(st.integers(), min_size=1).map(tuple), st.lists(st.text(max_size=5)).map(tuple))
+
+
+@given(st.dictionaries(st.text(max_size=8), values, max_size=4), st.sampled_from(["/**", "/n", "/a/b_c", "/1"]))
+def test_a_written_file_is_what_pyyaml_writes(parameters: dict[str, Any], section: str) -> None:
+    expected = yaml.dump({section: {"ros__parameters": parameters}}, default_flow_style=False)
+    assert yaml_text.parameter_file(section, parameters) == expected
+
+
+@given(scalars)
+def test_what_is_written_is_read_back_as_rcl_reads_it(value: Any) -> None:
+    document = yaml_text.parameter_file("/**", {"p": value})
+    node = yaml.compose(document).value[0][1].value[0][1].value[0][1]
+    plain = node.value if node.style is None else None
+    found = as_rcl_reads(value)
+    assert found == (resolve_parameters([], [ParameterRule("p", plain)]).get("p") if plain else node.value)
