@@ -132,6 +132,10 @@ class _Collector:
     def _name(self, endpoint: Endpoint, template: NameTemplate, note: str) -> None:
         operation, place = _OPERATIONS[endpoint.kind], str(endpoint.source)
         written = endpoint.written or str(endpoint.name)
+        if "__" in template.text:
+            self._result.warnings.append(
+                f"{place}: node {self._fqn}: '{template.text}' contains '__', which no remap rule can name"
+            )
         try:
             for final_operation, resolved in self._resolve(operation, template.text, place):
                 reason = Reason(self._fqn, "declared", place, written, resolved.rules, note)

@@ -267,6 +267,12 @@ def test_bad_names_are_problems_and_grant_nothing(node: NodeMaker, name: str) ->
     assert len(found.problems) == 1 and found.problems[0].startswith("demo.nodl.xml:1: node /talker: ")
 
 
+def test_double_underscores_are_warned_of(node: NodeMaker) -> None:
+    found = derive(node("pub a__b"))
+    assert declared(found) == {"publish /a__b"}
+    assert "'a__b' contains '__'" in found.warnings[0]
+
+
 def test_a_wildcard_in_a_parameter_value_is_no_way_around(node: NodeMaker) -> None:
     found = derive(node(endpoint(ParameterPart("topic")), parameters={"topic": "/*"}))
     assert declared(found) == set() and len(found.problems) == 1
