@@ -142,6 +142,8 @@ def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: F
 
 
 def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Frame) -> Value:
+    if name == "__name__":
+        return (atom.path.rpartition(".")[2],)
     path = f"{atom.path}.{name}"
     module = imports.import_submodule(run, path, frame)
     if module is not None:

@@ -63,7 +63,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     _widen_parameters(run, summary, cells)
     if not summary.active:
         _run_recursive(run, function, summary, call)
-    return summary.result or unknown("the result of a recursion")
+    return summary.result  # nothing yet: this path ends in a call that has not come back so far
 
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
@@ -111,7 +111,7 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     run.context = previous
     if frame.yielded is not None:
         return run.sequence(node, "generator", Items(None, frame.yielded or ANY))
-    return frame.returned or ANY
+    return frame.returned  # nothing, if no path comes back
 
 
 def _run_recursive(run: Run, function: FunctionValue, summary: Summary, call: Call) -> None:
@@ -228,7 +228,9 @@ def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
 
 def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     """A new object: its constructor is the first one in the method resolution order."""
-    run.instantiated.setdefault(cls.node)
+    for base in linearized(cls):
+        if isinstance(base, ClassValue):
+            run.instantiated.setdefault(base.node)
     site = (call.frame.module.source.path, getattr(call.node, "lineno", 0))
     instance = run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
     value: Value = (instance,)

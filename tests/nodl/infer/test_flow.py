@@ -1,0 +1,181 @@
+"""How names flow through a program: each case is a body of ``__init__`` and the names it publishes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+NodeBody = Callable[..., list[str]]
+
+CASES: dict[str, tuple[str, list[str]]] = {
+    "constant": ("self.P('a')", ["a"]),
+    "variable": ("x = 'a'; x = x + '/b'; self.P(x)", ["a/b"]),
+    "f-string": ("x = 'a'; self.P(f'{x}/b{1}')", ["a/b1"]),
+    "f-string with a width": ("self.P(f'a{1:02d}')", ["a01"]),
+    "format": ("self.P('{}/{n}'.format('a', n='b'))", ["a/b"]),
+    "percent": ("self.P('%s_%02d' % ('a', 3))", ["a_03"]),
+    "percent with a mapping": ("self.P('%(x)s' % {'x': 'a'})", ["a"]),
+    "join": ("self.P('/'.join(['a', 'b']))", ["a/b"]),
+    "str and int": ("self.P('a' + str(1))", ["a1"]),
+    "methods of str": ("self.P('/A/'.strip('/').lower().replace('a', 'b'))", ["b"]),
+    "split": ("self.P('a/b'.split('/')[1])", ["b"]),
+    "conditional expression": ("self.P('a' if sys.argv else 'b')", ["a", "b"]),
+    "or": ("x = None or 'a'; self.P(x)", ["a"]),
+    "branches join": ("x = 'a' if sys.argv[1:] else 'b'\nself.P(x + '/c')", ["a/c", "b/c"]),
+    "if": ("x = 'a'\nif sys.argv[1] == 'x':\n    x = 'b'\nself.P(x)", ["a", "b"]),
+    "a certain condition": ("D = False\nif D:\n    self.P('a')\nelse:\n    self.P('b')", ["b"]),
+    "None is filled in": ("x = None\nif x is None:\n    x = 'a'\nself.P(x)", ["a"]),
+    "list": ("for x in ['a', 'b']:\n    self.P(x)", ["a", "b"]),
+    "pairs": ("for x, y in [('a', 1), ('b', 2)]:\n    self.P(f'{x}{y}')", ["a1", "b2"]),
+    "dictionary": ("for k, v in {'a': 'b', 'c': 'd'}.items():\n    self.P(k + v)", ["ab", "cd"]),
+    "dictionary item": ("t = {'x': 'a', 'y': 'b'}\nself.P(t['y'])", ["b"]),
+    "range": ("for i in range(3):\n    self.P('r%d' % i)", ["r0", "r1", "r2"]),
+    "enumerate and zip": (
+        "for i, (x, y) in enumerate(zip(['a', 'b'], 'cd')):\n    self.P(f'{i}{x}{y}')",
+        ["0ac", "1bd"],
+    ),
+    "comprehension": ("for x in [f'{y}_t' for y in ('a', 'b')]:\n    self.P(x)", ["a_t", "b_t"]),
+    "comprehension with effects": ("self.p = [self.P(x) for x in ('a', 'b')]", ["a", "b"]),
+    "dict comprehension": ("self.p = {x: self.P(x) for x in ('a', 'b')}", ["a", "b"]),
+    "map and lambda": ("list(map(lambda x: self.P(x + '/t'), ['a', 'b']))", ["a/t", "b/t"]),
+    "append": ("x = []\nx.append('a')\nx.append('b')\nfor y in x:\n    self.P(y)", ["a", "b"]),
+    "unpacking": ("first, *rest = ['a', 'b', 'c']\nfor y in rest:\n    self.P(y)", ["b", "c"]),
+    "arguments from containers": ("x = ['a']\ny = {'name': 'b'}\nself.P(*x)\nself.P(**y)", ["a", "b"]),
+    "while with break": ("i = 0\nwhile True:\n    i += 1\n    if i > 3: break\nself.P('a')", ["a"]),
+    "growing text is a pattern": ("x = 'a'\nwhile sys.argv[1]:\n    x += 'b'\nself.P(x)", ["a?"]),
+    "try": ("x = 'a'\ntry:\n    x = 'b'\n    int('c')\n    x = 'd'\nexcept ValueError:\n    pass\nself.P(x)",
+            ["a", "b", "d"]),
+    "finally": ("try:\n    x = 'a'\nfinally:\n    self.P('b')\nself.P(x)", ["a", "b"]),
+    "early return": ("def f():\n    if sys.argv[1]: return 'a'\n    return 'b'\nself.P(f())", ["a", "b"]),
+    "closure": ("x = 'a'\ndef f():\n    return x + '/b'\nself.P(f())", ["a/b"]),
+    "nonlocal": ("x = 'a'\ndef f():\n    nonlocal x\n    x = 'b'\nf()\nself.P(x)", ["b"]),
+    "default argument": ("def f(y='a'):\n    return y\nself.P(f())\nself.P(f('b'))", ["a", "b"]),
+    "recursion": ("def f(n):\n    return 'a' if n == 0 else f(n - 1)\nself.P(f(3))", ["a"]),
+    "generator": ("def f():\n    yield 'a'\n    yield 'b'\nfor x in f():\n    self.P(x)", ["a", "b"]),
+    "getattr": ("self.a = 'x'\nself.P(getattr(self, 'a'))", ["x"]),
+    "setattr": ("setattr(self, 'a', 'x')\nself.P(self.a)", ["x"]),
+    "walrus": ("if (x := 'a'):\n    self.P(x)", ["a"]),
+    "match": ("match sys.argv[1]:\n    case 'x':\n        self.P('a')\n    case _:\n        self.P('b')", ["a", "b"]),
+    "partial": ("import functools\nf = functools.partial(self.P, 'a')\nf()", ["a"]),
+    "path join": ("import os\nself.P(os.path.join('a', 'b'))", ["a/b"]),
+    "unknown": ("self.P(sys.argv[1])", ["?"]),
+    "prefix of unknown": ("self.P('a/' + sys.argv[1])", ["a/?"]),
+    "option of argparse": (
+        "import argparse\np = argparse.ArgumentParser()\np.add_argument('--topic', default='a')\n"
+        "self.P(p.parse_args().topic)",
+        ["param:--topic"],
+    ),
+    "environment": ("import os\nself.P(os.environ.get('TOPIC', 'a'))", ["param:$TOPIC"]),
+    "node name in a name": ("self.P(self.get_name() + '/a')", ["{node}/a"]),
+    "fully qualified name": ("self.P(self.get_fully_qualified_name() + '/a')", ["~/a"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_names_flow(case: str, node_body: NodeBody) -> None:
+    body, expected = CASES[case]
+    assert node_body(body) == expected
+
+
+def test_default_of_an_option_is_kept(infer: Callable[..., object], node_body: NodeBody) -> None:
+    """Filled with nothing, the symbolic name is its default."""
+    from nodl.infer import InferredSystem
+
+    system = infer(
+        """
+        import argparse, rclpy
+        from std_msgs.msg import String
+        parser = argparse.ArgumentParser()
+        parser.add_argument('--topic', default='a')
+        node = rclpy.create_node('n')
+        node.create_publisher(String, parser.parse_args().topic, 1)
+        """
+    )
+    assert isinstance(system, InferredSystem)
+    (endpoint,) = system.nodes[0].endpoints
+    assert endpoint.name.fill({}).text == "a"
+    assert endpoint.certainty.value == "from default"
+    assert endpoint.name.fill({"--topic": "b"}).text == "b"
+
+
+OUTSIDE: dict[str, tuple[str, str, str, list[str]]] = {
+    "module constant": ("TOPIC = 'a'", "self.P(TOPIC)", "", ["a"]),
+    "class attribute": ("", "self.P(self.topic)", "topic = 'a'", ["a"]),
+    "a field shadows the class attribute": ("", "self.topic = 'b'\nself.P(self.topic)", "topic = 'a'", ["b"]),
+    "a field that may shadow it": (
+        "", "if sys.argv[1]:\n    self.topic = 'b'\nself.P(self.topic)", "topic = 'a'", ["a", "b"],
+    ),
+    "property": ("", "self.P(self.topic)", "@property\ndef topic(self):\n    return 'a'", ["a"]),
+    "static method": ("", "self.P(self.f('a'))", "@staticmethod\ndef f(x):\n    return x + '/b'", ["a/b"]),
+    "class method": ("", "self.P(self.f())", "@classmethod\ndef f(cls):\n    return cls.T\nT = 'a'", ["a"]),
+    "dataclass": (
+        "from dataclasses import dataclass\n@dataclass\nclass C:\n    x: str\n    y: str = 'b'",
+        "c = C('a')\nself.P(c.x + c.y)", "", ["ab"],
+    ),
+    "enum": (
+        "from enum import Enum\nclass E(Enum):\n    X = 'a'\n    Y = 'b'",
+        "self.P(E.X.value)\nfor e in E:\n    self.P('all/' + e.value)", "", ["a", "all/a", "all/b"],
+    ),
+    "timer": ("", "self.create_timer(1.0, self.tick)", "def tick(self):\n    self.P('a')", ["a"]),
+    "field set by another callback": (
+        "", "self.x = 'a'\nself.create_timer(1.0, self.t1)\nself.create_timer(1.0, self.t2)",
+        "def t1(self):\n    self.P(self.x)\ndef t2(self):\n    self.x = 'b'", ["a", "b"],
+    ),
+    "late lambda": ("", "for x in ('a', 'b'):\n    self.create_timer(1.0, lambda x=x: self.P(x))", "", ["a", "b"]),
+    "thread": ("import threading", "threading.Thread(target=self.P, args=('a',)).start()", "", ["a"]),
+    "done callback": (
+        "", "c = self.create_client(String, 's')\nc.call_async(None).add_done_callback(self.done)",
+        "def done(self, future):\n    self.P('a')", ["a", "s"],
+    ),
+    "decorator": (
+        "def twice(f):\n    def g(self):\n        return f(self) + '/b'\n    return g",
+        "self.P(self.f())", "@twice\ndef f(self):\n    return 'a'", ["a/b"],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", OUTSIDE)
+def test_names_from_around_the_constructor(case: str, node_body: NodeBody) -> None:
+    before, body, after, expected = OUTSIDE[case]
+    assert node_body(body, before, after) == expected
+
+
+def test_inheritance_across_files(names: Callable[..., list[str]]) -> None:
+    base = """
+        from rclpy.node import Node
+        from std_msgs.msg import String
+        class Base(Node):
+            suffix = 'base'
+            def __init__(self, name, topic='d'):
+                super().__init__(name)
+                self.create_publisher(String, f'{topic}/{self.suffix}', 1)
+    """
+    main = """
+        import rclpy
+        from base import Base
+        class Child(Base):
+            suffix = 'child'
+            def __init__(self):
+                super().__init__('child', topic='a')
+        rclpy.init()
+        Child()
+    """
+    assert names(main, {"base.py": base}) == ["a/child"]
+
+
+def test_constants_of_a_package(names: Callable[..., list[str]]) -> None:
+    files = {
+        "pkg/__init__.py": "",
+        "pkg/topics.py": "CMD = 'cmd'\nclass T:\n    ODOM = 'odom'\n",
+        "pkg/node.py": """
+            import rclpy
+            from std_msgs.msg import String
+            from . import topics
+            from .topics import T
+            node = rclpy.create_node('n')
+            node.create_publisher(String, topics.CMD, 1)
+            node.create_publisher(String, T.ODOM, 1)
+        """,
+    }
+    assert names("", files) == ["cmd", "odom"]
