@@ -28,9 +28,17 @@ PLAIN = NODE.format("")
         ("nothing said", PLAIN, [(None, None)]),
         ("an attribute", NODE.format(' enclave="a"'), [("a", None)]),
         ("an absolute one", NODE.format(' enclave="/a/b"'), [("/a/b", None)]),
-        ("a substitution", '<arg name="x" default="1"/>' + NODE.format(' enclave="r$(var x)"'), [("r1", None)]),
+        (
+            "a substitution",
+            '<arg name="x" default="1"/>' + NODE.format(' enclave="r$(var x)"'),
+            [("r1", None)],
+        ),
         ("an executable", '<executable cmd="ls" enclave="a"/>', [("a", None)]),
-        ("the pushed namespace is the scope", '<push_ros_namespace namespace="ns"/>' + PLAIN, [(None, "/ns")]),
+        (
+            "the pushed namespace is the scope",
+            '<push_ros_namespace namespace="ns"/>' + PLAIN,
+            [(None, "/ns")],
+        ),
         ("a node's own namespace is not", NODE.format(' namespace="ns"'), [(None, None)]),
         (
             "pushed namespaces nest",
@@ -99,7 +107,9 @@ def test_requests(
 
 
 def test_an_enclave_does_not_change_the_namespace(launched: Evaluate) -> None:
-    result = launched('<push_ros_namespace namespace="foo" enclave="bar"/><push_ros_enclave enclave="baz"/>' + PLAIN)
+    result = launched(
+        '<push_ros_namespace namespace="foo" enclave="bar"/><push_ros_enclave enclave="baz"/>' + PLAIN
+    )
     (process,) = result.processes
     assert (process.namespace, process.enclave.scope) == ("/foo", "/bar/baz")
     assert "--enclave" not in process.cmd
@@ -129,7 +139,12 @@ def generate_launch_description():
         ExecuteProcess(cmd=["ls"], enclave="x"),
     ])
 """
-    assert requests(launched, text, syntax="py") == [("n", "/bar"), ("/abs", "/e1"), ("c", "/e1"), ("x", "/e1")]
+    assert requests(launched, text, syntax="py") == [
+        ("n", "/bar"),
+        ("/abs", "/e1"),
+        ("c", "/e1"),
+        ("x", "/e1"),
+    ]
 
 
 def test_in_yaml(launched: Evaluate) -> None:
@@ -144,7 +159,9 @@ launch:
 
 
 def test_the_users_own_enclave_is_the_last_one_given(launched: Evaluate) -> None:
-    result = launched('<node pkg="pk" exec="e" args="--ros-args -e /a --" ros_args="--enclave /b" enclave="c"/>')
+    result = launched(
+        '<node pkg="pk" exec="e" args="--ros-args -e /a --" ros_args="--enclave /b" enclave="c"/>'
+    )
     assert result.processes[0].enclave == EnclaveRequest("c", None, "/b")
 
 

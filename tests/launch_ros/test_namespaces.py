@@ -28,7 +28,9 @@ def test_an_absolute_namespace_drops_the_base(base: str, namespace: str) -> None
 
 
 @given(st.one_of(st.none(), anything), st.one_of(st.none(), anything))
-def test_the_result_never_ends_in_a_slash_unless_it_is_the_root(base: str | None, namespace: str | None) -> None:
+def test_the_result_never_ends_in_a_slash_unless_it_is_the_root(
+    base: str | None, namespace: str | None
+) -> None:
     joined = prefix_namespace(base, namespace)
     if base is None or namespace is not None:
         assert joined is None or joined == "/" or not joined.endswith("/")

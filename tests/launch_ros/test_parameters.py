@@ -136,10 +136,14 @@ def test_files_are_written_by_the_host_only(launched: Evaluate) -> None:
 
 
 scalars = st.one_of(st.booleans(), st.integers(), st.floats(allow_nan=False), st.text(max_size=12))
-values = st.one_of(scalars, st.lists(st.integers(), min_size=1).map(tuple), st.lists(st.text(max_size=5)).map(tuple))
+values = st.one_of(
+    scalars, st.lists(st.integers(), min_size=1).map(tuple), st.lists(st.text(max_size=5)).map(tuple)
+)
 
 
-@given(st.dictionaries(st.text(max_size=8), values, max_size=4), st.sampled_from(["/**", "/n", "/a/b_c", "/1"]))
+@given(
+    st.dictionaries(st.text(max_size=8), values, max_size=4), st.sampled_from(["/**", "/n", "/a/b_c", "/1"])
+)
 def test_a_written_file_is_what_pyyaml_writes(parameters: dict[str, Any], section: str) -> None:
     expected = yaml.dump({section: {"ros__parameters": parameters}}, default_flow_style=False)
     assert yaml_text.parameter_file(section, parameters) == expected

@@ -8,7 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.evaluation.ros_arguments import ParameterFile, ParameterRule, RosArguments, parse_ros_arguments
+from enclave_launch.evaluation.ros_arguments import (
+    ParameterFile,
+    ParameterRule,
+    RosArguments,
+    parse_ros_arguments,
+)
 
 
 @pytest.mark.parametrize(

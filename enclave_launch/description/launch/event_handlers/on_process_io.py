@@ -41,6 +41,8 @@ class OnProcessIO(OnActionEventBase):
                 return on_stdin(event)
             return None
 
+        # Whose code this runs: a dry run does not call the user's.
+        handle.__module__ = getattr(on_stdout or on_stderr or on_stdin, "__module__", __name__)
         super().__init__(
             action_matcher=target_action,
             on_event=handle,

@@ -20,6 +20,9 @@ class StateTransition(Event):
         self.__action = action
         self.__msg = msg
 
+    def subject(self) -> str:
+        return self.__action.node_name
+
     @property
     def action(self) -> LifecycleNode:
         return self.__action

@@ -1,0 +1,90 @@
+"""What a dry run cannot tell, and what the launcher itself must be allowed to do."""
+
+from __future__ import annotations
+
+import pytest
+
+from .conftest import Evaluate
+
+PRELUDE = """
+from launch import LaunchDescription
+from launch.actions import *
+from launch.event_handlers import *
+from launch_ros.actions import *
+from launch_ros.descriptions import *
+from launch_ros.event_handlers import OnStateTransition
+
+def generate_launch_description():
+"""
+
+
+def in_python(entities: str) -> str:
+    return f"{PRELUDE}    return LaunchDescription([{entities}])\n"
+
+
+def test_calls_of_the_launcher(launched: Evaluate) -> None:
+    text = in_python("""
+        LifecycleNode(package="pk", executable="e", name="n", namespace="ns"),
+        ComposableNodeContainer(package="rc", executable="cc", name="c", namespace="/k", composable_node_descriptions=[
+            ComposableNode(package="pk", plugin="P", name="a"), ComposableNode(package="pk", plugin="P", name="b")]),
+        LoadComposableNodes(target_container="other", composable_node_descriptions=[]),
+    """)
+    calls = [(call.service, call.type) for call in launched(text, syntax="py").launcher_calls]
+    assert calls == [
+        ("/ns/n/change_state", "lifecycle_msgs/srv/ChangeState"),
+        ("/k/c/_container/load_node", "composition_interfaces/srv/LoadNode"),
+        ("other/_container/load_node", "composition_interfaces/srv/LoadNode"),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("handler", "words"),
+    [
+        ("OnProcessExit(on_exit=lambda event, context: [ExecuteProcess(cmd=['x'])])", "OnProcessExit p-1"),
+        ("OnProcessIO(on_stdout=lambda event: [ExecuteProcess(cmd=['x'])])", "OnProcessIO p-1"),
+    ],
+)
+def test_what_a_callback_computes_is_reported(launched: Evaluate, handler: str, words: str) -> None:
+    result = launched(in_python(f"ExecuteProcess(cmd=['p']), RegisterEventHandler({handler})"), syntax="py")
+    assert [process.cmd for process in result.processes] == [("p",)]
+    (gap,) = result.unforeseeable
+    assert words in gap.what
+    assert gap.location.file.endswith("main.launch.py")
+
+
+def test_a_sequence_of_transitions_is_followed_and_leaves_no_gap(launched: Evaluate) -> None:
+    text = in_python("""
+        LifecycleNode(package="pk", executable="e", name="n", namespace=""),
+        LifecycleTransition(lifecycle_node_names=["/n"], transition_ids=[1, 3]),
+    """)
+    result = launched(text, syntax="py")
+    assert (len(result.processes), result.unforeseeable) == (1, ())
+
+
+def test_a_transition_of_a_node_that_never_starts_is_reported(launched: Evaluate) -> None:
+    text = in_python("""
+        RegisterEventHandler(OnStateTransition(goal_state="inactive", entities=[ExecuteProcess(cmd=["x"])]))
+    """)
+    result = launched(text, syntax="py")
+    assert result.processes == ()
+    assert "OnStateTransition" in result.unforeseeable[0].what
+
+
+def test_autostart_where_the_release_has_it(launched: Evaluate) -> None:
+    text = in_python('LifecycleNode(package="pk", executable="e", name="n", namespace="", autostart=True)')
+    (process,) = launched(text, syntax="py", distro="kilted").processes
+    assert process.kind == "lifecycle_node"
+    with pytest.raises(Exception, match="unexpected keyword argument 'autostart'"):
+        launched(text, syntax="py", distro="humble")
+
+
+def test_lifecycle_tags_where_the_release_has_them(launched: Evaluate) -> None:
+    text = """
+    <lifecycle_node pkg="pk" exec="e" name="n" namespace="" autostart="true"/>
+    <load_composable_node target="c"><composable_lifecycle_node pkg="pk" plugin="P" name="m" autostart="true"/>
+    </load_composable_node>"""
+    result = launched(text, distro="lyrical")
+    assert [process.kind for process in result.processes] == ["lifecycle_node"]
+    assert [component.fqn for component in result.components] == ["/m"]
+    with pytest.raises(Exception, match="Unrecognized entity of the type: lifecycle_node"):
+        launched(text, distro="jazzy")

@@ -1,0 +1,138 @@
+"""Nodes as values: kinds, remap rules with their places, packages that are not installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.errors import LaunchFileError
+from nodl.ament_index import PackageNotFoundError
+
+from .conftest import Evaluate
+
+
+def test_kinds_and_programs(launched: Evaluate) -> None:
+    text = """
+    <node pkg="pk" exec="e" name="n" namespace="ns"/>
+    <node_container pkg="rc" exec="cc" name="c" namespace=""/>
+    <executable cmd="/bin/ls -l"/>
+    <node exec="own_program"/>"""
+    found = [(p.kind, p.package, p.executable, p.name, p.namespace, p.fqn) for p in launched(text).processes]
+    unknown = ("<node_name_unspecified>", "<node_namespace_unspecified>")
+    assert found == [
+        ("node", "pk", "e", "n", "/ns", "/ns/n"),
+        ("container", "rc", "cc", "c", "/", "/c"),
+        ("executable", None, "/bin/ls", None, None, None),
+        ("node", None, "own_program", *unknown, f"{unknown[1]}/{unknown[0]}"),
+    ]
+
+
+def test_remap_rules_know_their_place(launched: Evaluate) -> None:
+    text = """<set_remap from="a" to="b"/>
+    <node pkg="pk" exec="e" args="--ros-args -r user:=first">
+      <remap from="c" to="d"/>
+      <remap from="e" to="f"/>
+    </node>
+    <load_composable_node target="c">
+      <composable_node pkg="pk" plugin="P" name="n"><remap from="g" to="h"/></composable_node>
+    </load_composable_node>"""
+    result = launched(text)
+    rules = [(r.source, r.target, r.location and r.location.line) for r in result.processes[0].remaps]
+    assert rules == [("user", "first", 3), ("a", "b", 2), ("c", "d", 4), ("e", "f", 5)]
+    component = result.components[0]
+    assert [(r.source, r.location and r.location.line) for r in component.remaps] == [("a", 2), ("g", 8)]
+    assert (component.location.line, component.location.element) == (8, "composable_node")
+
+
+@pytest.mark.parametrize(
+    ("attributes", "rules"),
+    [
+        ("", ["__node:=x", "__ns:=/y"]),
+        ('name="n"', ["__ns:=/y"]),
+        ('name="n" namespace="ns"', []),
+        ('name="n" args="--ros-args -r __node:=z"', ["__node:=z", "__ns:=/y"]),
+    ],
+)
+def test_rules_that_can_never_be_first_are_left_out(
+    launched: Evaluate, attributes: str, rules: list[str]
+) -> None:
+    text = f'<node pkg="pk" exec="e" {attributes}><remap from="__node" to="x"/><remap from="__ns" to="/y"/></node>'
+    (process,) = launched(text).processes
+    assert [f"{rule.source}:={rule.target}" for rule in process.remaps] == rules
+
+
+def test_a_prefix_is_not_taken_for_the_program(launched: Evaluate) -> None:
+    (process,) = launched(
+        '<node pkg="pk" exec="e" launch-prefix="nice -n 3" ros_args="--enclave /x -r a:=b"/>'
+    ).processes
+    assert process.cmd[:3] == ("nice", "-n", "3")
+    assert (process.executable, process.enclave.argument) == ("e", "/x")
+    assert [rule.source for rule in process.remaps] == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (
+            '<node pkg="nowhere_to_be_found" exec="e"/>',
+            "package 'nowhere_to_be_found' not found, searching: ['",
+        ),
+        ('<node pkg="pk" exec="nothing"/>', "executable 'nothing' not found on the libexec directory"),
+        (
+            '<executable cmd="$(find-pkg-share nowhere_to_be_found)"/>',
+            "package 'nowhere_to_be_found' not found",
+        ),
+    ],
+)
+def test_what_is_not_installed_is_an_error_with_its_place(launched: Evaluate, text: str, words: str) -> None:
+    with pytest.raises(LaunchFileError) as caught:
+        launched(f'<executable cmd="before"/>\n{text}')
+    assert words in str(caught.value)
+    assert caught.value.location is not None
+    assert caught.value.location.line == 3
+
+
+def test_the_error_is_the_one_that_callers_know(launched: Evaluate) -> None:
+    with pytest.raises(LaunchFileError) as caught:
+        launched('<node pkg="nowhere_to_be_found" exec="e"/>')
+    assert isinstance(caught.value.cause, PackageNotFoundError)
+    assert isinstance(caught.value.cause, KeyError)
+
+
+def test_missing_packages_can_be_allowed(launched: Evaluate) -> None:
+    text = """
+    <node pkg="gone_pkg" exec="e" name="n"/><node pkg="gone_pkg" exec="f"/>
+    <executable cmd="$(find-pkg-share other_gone_pkg)/x"/><node pkg="pk" exec="e"/>"""
+    result = launched(text, allow_missing_packages=True)
+    assert [process.cmd[0] for process in result.processes][:3] == [
+        "/missing/gone_pkg/lib/gone_pkg/e",
+        "/missing/gone_pkg/lib/gone_pkg/f",
+        "/missing/other_gone_pkg/share/other_gone_pkg/x",
+    ]
+    assert [warning for warning in result.warnings if "gone_pkg" in warning] == [
+        "package 'gone_pkg' is not installed; using /missing/gone_pkg in its place",
+        "package 'other_gone_pkg' is not installed; using /missing/other_gone_pkg in its place",
+    ]
+
+
+def test_an_installed_package_still_needs_its_program(launched: Evaluate) -> None:
+    with pytest.raises(LaunchFileError, match="executable 'nothing' not found"):
+        launched('<node pkg="pk" exec="nothing"/>', allow_missing_packages=True)
+
+
+def test_ten_nodes_of_one_name_are_warned_about(launched: Evaluate) -> None:
+    warnings = launched('<node pkg="pk" exec="e" name="n" namespace="/"/>' * 3).warnings
+    assert [warning.split(":")[0] for warning in warnings] == ["e-2", "e-3"]
+    assert "at least 3 nodes with the name /n" in warnings[1]
+
+
+def test_the_environment_is_left_alone(
+    launched: Evaluate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    import os
+
+    monkeypatch.setenv("ROS_LOG_DIR", "/logs")
+    launched('<set_ros_log_dir new_log_dir="x"/><set_env name="NEW" value="1"/><node pkg="pk" exec="e"/>')
+    assert os.environ["ROS_LOG_DIR"] == "/logs"
+    assert "NEW" not in os.environ
