@@ -6,11 +6,13 @@ with ``enclave_launch.enclave``.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
-from enclave_launch.process import EnclaveRequest
+from enclave_launch.process import EnclaveRequest, Evaluation
 
-from .conftest import Evaluate
+Evaluate = Callable[..., Evaluation]
 
 
 def requests(launched: Evaluate, text: str, **options: object) -> list[tuple[str | None, str | None]]:

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
-from .conftest import Evaluate
+from enclave_launch.process import Evaluation
+
+Evaluate = Callable[..., Evaluation]
 
 PRELUDE = """
 from launch import LaunchDescription

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from enclave_launch.errors import LaunchFileError
+from enclave_launch.process import Evaluation
 from nodl.ament_index import PackageNotFoundError
 
-from .conftest import Evaluate
+Evaluate = Callable[..., Evaluation]
 
 
 def test_kinds_and_programs(launched: Evaluate) -> None:

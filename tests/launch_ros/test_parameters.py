@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,9 @@ from hypothesis import strategies as st
 from enclave_launch.description.launch_ros.utilities import yaml_text
 from enclave_launch.evaluation.rcl_parameters import as_rcl_reads, resolve_parameters
 from enclave_launch.evaluation.ros_arguments import ParameterFile, ParameterRule, parse_ros_arguments
+from enclave_launch.process import Evaluation
 
-from .conftest import Evaluate
+Evaluate = Callable[..., Evaluation]
 
 
 def resolved(tmp_path: Path, line: str, fqn: str = "/ns/n", **files: str) -> dict[str, Any]:
@@ -152,7 +154,8 @@ def test_a_written_file_is_what_pyyaml_writes(parameters: dict[str, Any], sectio
 @given(scalars)
 def test_what_is_written_is_read_back_as_rcl_reads_it(value: Any) -> None:
     document = yaml_text.parameter_file("/**", {"p": value})
-    node = yaml.compose(document).value[0][1].value[0][1].value[0][1]
+    root: Any = yaml.compose(document)
+    node = root.value[0][1].value[0][1].value[0][1]
     plain = node.value if node.style is None else None
     found = as_rcl_reads(value)
     assert found == (resolve_parameters([], [ParameterRule("p", plain)]).get("p") if plain else node.value)
