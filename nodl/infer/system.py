@@ -12,11 +12,13 @@ from pathlib import Path
 
 from nodl.infer.analysis import analyse_rest, start
 from nodl.infer.interpreter.run import Run
-from nodl.infer.packages import EntryPoint, Package, find_package
+from nodl.infer.packages import EntryPoint, Package, find_package, read_package
 from nodl.infer.program import Program
 from nodl.infer.results import Origin, interfaces_of
 from nodl.node_interface import Gap, NodeInterface
+from nodl.source_ref import SourceRef
 
+CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".hpp", ".hh", ".hxx", ".h")
 _SKIPPED_FOLDERS = frozenset({"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"})
 _NOT_PROGRAMS = re.compile(r"(?:setup|conf|conftest)\.py\Z|.*launch\.py\Z")
 
@@ -31,11 +33,12 @@ class InferredSystem:
 
 
 def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
-    """All nodes that the Python files in ``paths`` (files, or folders with everything below) may create.
+    """All nodes that the Python and C++ files in ``paths`` (files, or folders with everything below) may create.
 
     Raises ``FileNotFoundError`` for a path that does not exist. A file that cannot be parsed is a gap.
     """
-    files = list(dict.fromkeys(file for path in paths for file in _python_files(Path(path))))
+    found = list(dict.fromkeys(file for path in paths for file in _source_files(Path(path))))
+    files = [file for file in found if file.endswith(".py") or not file.endswith(CPP_SUFFIXES)]
     program = Program()
     for file in files:
         program.add_root(program.top_folder(file))
@@ -47,7 +50,32 @@ def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
             analyse_rest(run, called, instantiated)
         nodes = [node for run, origin in runs for node in interfaces_of(run.findings, origin)]
     gaps = dict.fromkeys(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)
-    return InferredSystem(_distinct(nodes), tuple(gaps), tuple(files))
+    cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
+    return InferredSystem(_distinct([*nodes, *cpp_nodes]), (*gaps, *cpp_gaps), tuple(found))
+
+
+def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
+    """C++ sources, package by package. Without the extra ``cpp`` each package is a gap."""
+    packages: dict[str | None, list[str]] = {}
+    for file in files:
+        package = find_package(file)
+        packages.setdefault(package.folder if package else None, []).append(file)
+    nodes: list[NodeInterface] = []
+    gaps: list[Gap] = []
+    for folder, sources in packages.items():
+        from nodl.infer.cpp.cmake import read_build
+        from nodl.infer.cpp.nodes import nodes_of_unit
+        from nodl.infer.cpp.source import CppSupportMissing, read_unit
+
+        try:
+            unit = read_unit(sources)
+        except CppSupportMissing as error:
+            gaps.append(Gap(SourceRef(sources[0]), str(error)))
+            continue
+        found, open_questions = nodes_of_unit(unit, read_build(folder), read_package(folder).name if folder else None)
+        nodes.extend(found)
+        gaps.extend(open_questions)
+    return nodes, gaps
 
 
 def _distinct(nodes: list[NodeInterface]) -> tuple[NodeInterface, ...]:
@@ -71,7 +99,7 @@ def _executable(entries: list[EntryPoint], file: str, package: Package | None) -
     return name if package is not None and name in package.installed_programs else None
 
 
-def _python_files(path: Path) -> Iterator[str]:
+def _source_files(path: Path) -> Iterator[str]:
     if path.is_file():
         yield os.path.abspath(path)
         return
@@ -80,7 +108,7 @@ def _python_files(path: Path) -> Iterator[str]:
     for folder, folders, names in os.walk(path):
         folders[:] = sorted(f for f in folders if f not in _SKIPPED_FOLDERS and not f.startswith("."))
         for name in sorted(names):
-            if name.endswith(".py") and not _NOT_PROGRAMS.match(name):
+            if name.endswith(CPP_SUFFIXES) or (name.endswith(".py") and not _NOT_PROGRAMS.match(name)):
                 yield os.path.abspath(os.path.join(folder, name))
 
 
