@@ -23,12 +23,18 @@ _PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 wit
 
 
 class PackageNotFoundError(KeyError):
-    """No searched prefix holds the package. ``package`` and ``prefixes`` say which and where."""
+    """No searched prefix holds the package. ``package`` and ``prefixes`` say which and where.
 
-    def __init__(self, package: str, prefixes: Sequence[str]):
+    With one argument, as third-party code raises upstream's class of this name, it is the message.
+    """
+
+    def __init__(self, package: str, prefixes: Sequence[str] | None = None):
         self.package = package
-        self.prefixes = tuple(prefixes)
-        super().__init__(f"package '{package}' not found, searching: {list(prefixes)}")
+        self.prefixes = tuple(prefixes or ())
+        known = prefixes is not None
+        super().__init__(
+            f"package '{package}' not found, searching: {list(self.prefixes)}" if known else package
+        )
 
     def __str__(self) -> str:
         return str(self.args[0])  # a KeyError would show the repr

@@ -8,10 +8,12 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from . import case_files, real_launch
+from . import case_files, public_api, real_launch
 
 
 def main(groups: list[str]) -> None:
+    if groups == ["api"]:
+        return record_api()
     for path in sorted(case_files.CASES.glob("*.txt")):
         if not groups or path.stem in groups:
             record(path)
@@ -37,6 +39,20 @@ def record(path: Path) -> None:
         number += 1
     path.write_text("\n=== ".join(blocks).lstrip("\n"), encoding="utf-8")
     print(f"{path.stem}: {len(cases)} cases")
+
+
+def record_api() -> None:
+    """Write ``public_api.txt``: one line for each name, with the distributions that have it so."""
+    lines: dict[str, list[str]] = {}
+    for distro in case_files.DISTROS:
+        for name, parameters in real_launch.api(distro).items():
+            lines.setdefault(public_api.line(name, parameters), []).append(distro)
+    everywhere = list(case_files.DISTROS)
+    text = "".join(
+        f"{line}{'' if distros == everywhere else '  @ ' + ' '.join(distros)}\n"
+        for line, distros in sorted(lines.items())
+    )
+    public_api.RECORDED.write_text(text, encoding="utf-8")
 
 
 def _with_expectations(block: str, answers: dict[str, str]) -> str:

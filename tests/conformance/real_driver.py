@@ -24,6 +24,9 @@ import types
 from enum import Enum
 from typing import Any
 
+sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
+import public_api
+
 
 class NameValidationException(ValueError):
     pass
@@ -346,6 +349,9 @@ def main() -> None:
         for name in ("launch_ros.actions", "launch_xml", "launch_yaml"):
             importlib.import_module(name)  # once; every child inherits it
 
+        if jobs == "api":
+            print(json.dumps(public_api.describe()))
+            return
         for job in jobs:
             print(json.dumps(run_forked(job)), flush=True)
 

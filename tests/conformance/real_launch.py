@@ -28,34 +28,42 @@ def sources(distro: str) -> str | None:
     return os.environ.get(name) or None
 
 
+def api(distro: str) -> dict[str, list[str]]:
+    """The public names of real launch's packages (see ``public_api``)."""
+    with tempfile.TemporaryDirectory() as temporary:
+        answer = _drive("api", sources(distro), Path(temporary))
+    return json.loads(answer)  # type: ignore[no-any-return]
+
+
 def run_all(cases: Sequence[Case], distro: str) -> list[str]:
     """What real launch does with each case, rendered. Raises ``RuntimeError`` without sources."""
-    path = sources(distro)
-    if path is None:
-        raise RuntimeError(f"no sources of real launch for {distro}")
     with tempfile.TemporaryDirectory(prefix="conformance_") as temporary:
         root = Path(temporary).resolve()
         prefix = root / "prefix"
         case_files.install_packages(prefix)
         jobs = [_job(case, root / f"case{number}") for number, case in enumerate(cases)]
-        environment = {
-            "PATH": os.environ["PATH"],
-            "HOME": os.environ.get("HOME", "/"),
-            "PYTHONPATH": path,
-            "AMENT_PREFIX_PATH": str(prefix),
-            "PYTHONDONTWRITEBYTECODE": "1",
-        }
-        answer = subprocess.run(
-            [sys.executable, "-W", "ignore", str(DRIVER)],
-            input=json.dumps(jobs), capture_output=True, text=True, env=environment, check=False,
-        )  # fmt: skip
-        if answer.returncode != 0:
-            raise RuntimeError(answer.stderr[-4000:])
+        lines = _drive(jobs, sources(distro), prefix).splitlines()
         folders = [{job["folder"]: "DIR", str(prefix): "PREFIX"} for job in jobs]
-        return [
-            _render(json.loads(line), names)
-            for line, names in zip(answer.stdout.splitlines(), folders, strict=True)
-        ]
+        return [_render(json.loads(line), names) for line, names in zip(lines, folders, strict=True)]
+
+
+def _drive(jobs: object, path: str | None, prefix: Path) -> str:
+    if path is None:
+        raise RuntimeError("no sources of real launch given")
+    environment = {
+        "PATH": os.environ["PATH"],
+        "HOME": os.environ.get("HOME", "/"),
+        "PYTHONPATH": path,
+        "AMENT_PREFIX_PATH": str(prefix),
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    command = [sys.executable, "-W", "ignore", str(DRIVER)]
+    answer = subprocess.run(
+        command, input=json.dumps(jobs), capture_output=True, text=True, env=environment, check=False
+    )
+    if answer.returncode != 0:
+        raise RuntimeError(answer.stderr[-4000:])
+    return answer.stdout
 
 
 def _job(case: Case, folder: Path) -> dict[str, Any]:
