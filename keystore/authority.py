@@ -159,7 +159,8 @@ class IdentityIssuer:
         ca = x509.load_der_x509_certificate(authority.facts.der)
         self._authority = authority
         self._issuer = ca.subject
-        self._name_oid = NameOID.COMMON_NAME
+        self._x509 = x509
+        self._common_name = NameOID.COMMON_NAME
         self._constraints = x509.BasicConstraints(ca=False, path_length=None)
         self._usage = _leaf_key_usage()
         self._extended = x509.ExtendedKeyUsage(
@@ -167,11 +168,15 @@ class IdentityIssuer:
         )
         self._authority_key = _authority_key_id(ca)
 
-    def issue(self, common_name: str, key: PublicKey, validity: Validity) -> bytes:
-        """DER certificate for an already valid common name; it never outlives the CA."""
-        from cryptography import x509
+    @property
+    def validity(self) -> Validity:
+        """Of the CA: no certificate outlives it."""
+        return self._authority.validity
 
-        name = x509.Name([x509.NameAttribute(self._name_oid, common_name)])
+    def issue(self, common_name: str, key: PublicKey, validity: Validity) -> bytes:
+        """DER certificate for an already valid common name."""
+        x509 = self._x509
+        name = x509.Name([x509.NameAttribute(self._common_name, common_name)])
         builder = (
             _builder(name, self._issuer, validity.within(self._authority.validity), key)
             .add_extension(self._constraints, critical=True)

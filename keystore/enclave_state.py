@@ -68,7 +68,9 @@ def inspect(
     Raises UnsafeKeystore for links, owners and modes that let others in.
     """
     directory = layout.enclave_directory(enclave)
-    _refuse_link(view, directory)
+    if not _is_there(view, directory):
+        links = tuple(_wanted_links(view, enclave))
+        return EnclaveState(enclave, Identity.PAIR, None, True, links, False, (NEW,))
     reasons: list[str] = []
     lax = _key_mode(view, directory)
     identity, facts = _identity(view, enclave, directory, now, due, reasons)
@@ -85,7 +87,8 @@ def inspect(
     return EnclaveState(enclave, identity, facts, permissions, links, lax is True, tuple(reasons))
 
 
-def _refuse_link(view: KeystoreView, directory: str) -> None:
+def _is_there(view: KeystoreView, directory: str) -> bool:
+    """Whether the enclave's directory exists; raises UnsafeKeystore when it or one above is a link."""
     path = f"{view.root}/{layout.ENCLAVES}"
     for part in directory.split("/")[1:]:
         path = f"{path}/{part}"
@@ -95,7 +98,8 @@ def _refuse_link(view: KeystoreView, directory: str) -> None:
                     f"{path!r} is a link; an enclave must be a real directory. Remove it: rm {path}"
                 )
         except FileNotFoundError:
-            return
+            return False
+    return True
 
 
 def _key_mode(view: KeystoreView, directory: str) -> bool | None:

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from keystore import layout, safe_files, store
 from keystore.authority import Authority, IdentityIssuer, Role
-from keystore.certificate import CertificateFacts
 from keystore.creation import sign_document
 from keystore.enclave_state import EnclaveState, Identity, PermissionsSource
 from keystore.errors import DamagedKeystore, InvalidInput, KeystoreError, printable
@@ -91,12 +90,12 @@ class EnclaveWriter:
         permissions, so that a process never finds permissions without an identity."""
         entries: dict[str, Content | Link] = {}
         actions: list[str] = []
-        facts = self._identity(state, entries, actions)
+        named = self._identity(state, entries, actions)
         links = layout.enclave_links(state.enclave) | {layout.ENCLAVE_CRL: layout.crl_link(state.enclave)}
         for name in state.links:
             entries[name] = Link(links[name], layout.link_source(name))
         if state.permissions:
-            self._permissions(state, facts, permissions, entries)
+            self._permissions(state, *named, permissions, entries)
         self._name_actions(state, actions)
         if state.lax_key and layout.KEY not in entries:
             self._opened.set_mode(
@@ -118,9 +117,10 @@ class EnclaveWriter:
 
     def _identity(
         self, state: EnclaveState, entries: dict[str, Content | Link], actions: list[str]
-    ) -> CertificateFacts:
+    ) -> tuple[str, Validity]:
+        """Subject and validity of the certificate the enclave will have."""
         if state.identity is Identity.GOOD and state.facts is not None:
-            return state.facts
+            return subject_name(state.facts.common_name or ""), state.facts.validity
         cn = common_name(state.enclave, self._scheme)
         if state.identity is Identity.PAIR:
             made = new_identity(self._issuer, cn, self._validity, self._view.settings.curve)
@@ -134,17 +134,17 @@ class EnclaveWriter:
         if made.key is not None:
             entries[layout.KEY] = Content(made.key, store.PRIVATE_MODE)
         entries[layout.CERT] = Content(made.cert)
-        return made.facts
+        return subject_name(made.common_name), made.validity
 
     def _permissions(
         self,
         state: EnclaveState,
-        facts: CertificateFacts,
+        subject: str,
+        validity: Validity,
         source: PermissionsSource,
         entries: dict[str, Content | Link],
     ) -> None:
-        subject = subject_name(facts.common_name or "")
-        document = source(subject, facts.validity) or self._kept(state, subject, facts.validity)
+        document = source(subject, validity) or self._kept(state, subject, validity)
         signed = sign_document(document, self._permissions_ca, self._now)
         if len(signed) >= WARN_BYTES:
             self.warnings.append(

@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from keystore import certificate
 from keystore.authority import Curve, IdentityIssuer, key_pem, new_key, pem_certificate
-from keystore.certificate import CertificateFacts
 from keystore.signer import FileSigner, load_private_key
 from keystore.validity import Validity
 
@@ -17,9 +15,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The files ``cert.pem`` and ``key.pem``; ``key`` is None when an existing key was certified anew."""
+    """The files ``cert.pem`` and ``key.pem``; ``key`` is None when an existing key was certified anew.
 
-    facts: CertificateFacts
+    ``validity`` is what the certificate got: its CA may have cut what was asked for.
+    """
+
+    common_name: str
+    validity: Validity
     cert: bytes
     key: bytes | None = field(repr=False)
 
@@ -39,8 +41,9 @@ def certify(
     key: bytes | None = None,
 ) -> Identity:
     """A certificate for a key that exists already, as ``renew`` and interrupted runs need it."""
-    facts = certificate.read_der(issuer.issue(common_name, public_key, validity))
-    return Identity(facts, pem_certificate(facts.der), key)
+    granted = validity.within(issuer.validity)
+    cert = pem_certificate(issuer.issue(common_name, public_key, granted))
+    return Identity(common_name, granted, cert, key)
 
 
 def public_half(pem: bytes, place: str) -> PublicKey:

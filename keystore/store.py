@@ -81,7 +81,7 @@ class Store:
 
     def is_directory(self, relative: str) -> bool:
         try:
-            return stat.S_ISDIR(os.lstat(self.root / relative).st_mode)
+            return stat.S_ISDIR(os.lstat(f"{self.root}/{relative}").st_mode)
         except FileNotFoundError:
             return False
 
@@ -130,10 +130,10 @@ class Batch:
 
     def __init__(self, store: Store):
         self._store = store
-        self._staging = store.root / layout.STAGING
-        self._moves: list[tuple[Path, str]] = []
-        self._written: list[Path] = []
-        self._staged_directories: list[Path] = []
+        self._staging = f"{store.root}/{layout.STAGING}"
+        self._moves: list[tuple[str, str]] = []
+        self._written: list[str] = []
+        self._staged_directories: list[str] = []
 
     def file(self, target: str, data: bytes, mode: int = PUBLIC_MODE) -> None:
         """Replace or create one file."""
@@ -159,16 +159,17 @@ class Batch:
         os.mkdir(place, mode)
         os.chmod(place, mode)
         for name, entry in entries.items():
-            self._write(place / name, entry)
+            self._write(f"{place}/{name}", entry)
         self._staged_directories.append(place)
         self._moves.append((place, target))
 
-    def _place(self) -> Path:
+    def _place(self) -> str:
+        """A name in the staging area; text, not ``Path``, because there are thousands."""
         if not self._moves:
             os.mkdir(self._staging, 0o700)
-        return self._staging / str(len(self._moves))
+        return f"{self._staging}/{len(self._moves)}"
 
-    def _write(self, place: Path, entry: Content | Link) -> None:
+    def _write(self, place: str, entry: Content | Link) -> None:
         if isinstance(entry, Link):
             if _try_link(entry.target, place):
                 return
@@ -192,14 +193,14 @@ class Batch:
         for place, target in self._moves:
             parent = target.rpartition("/")[0]
             self._store.ensure_directory(parent)
-            os.rename(place, self._store.root / target)
+            os.rename(place, f"{self._store.root}/{target}")
             changed.add(parent)
         self._store.sync_directories(changed)
 
     def _make_durable(self) -> None:
         if not self._store._durable:
             return
-        if len(self._written) > _SYNC_EACH and _sync_file_system(self._staging):
+        if len(self._written) > _SYNC_EACH and _sync_file_system(Path(self._staging)):
             return
         for path in (*self._written, *self._staged_directories):
             _fsync_path(path)
@@ -256,7 +257,7 @@ def _clear_staging(root: Path) -> None:
         raise StorageError.of(error, "clearing what an interrupted run left in") from None
 
 
-def _try_link(target: str, place: Path) -> bool:
+def _try_link(target: str, place: str) -> bool:
     """False where the file system has no symbolic links (FAT, some network shares)."""
     try:
         os.symlink(target, place)
@@ -267,7 +268,7 @@ def _try_link(target: str, place: Path) -> bool:
     return True
 
 
-def _fsync_path(path: Path) -> None:
+def _fsync_path(path: Path | str) -> None:
     descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
     try:
         os.fsync(descriptor)

@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore import authority, smime
+from keystore import authority, certificate, smime
 from keystore.authority import Authority, Curve, IdentityIssuer, Role
 from keystore.errors import DamagedKeystore, InvalidInput
 from keystore.identity import new_identity
@@ -119,7 +119,7 @@ def test_another_ca_is_refused() -> None:
 def test_a_certificate_below_the_ca_is_refused() -> None:
     """CVE-2023-24010 and -24011: it chains to the CA, and that is not enough."""
     made = new_identity(IdentityIssuer(CA), "ros.a", VALIDITY)
-    enclave = Authority(made.facts, FileSigner(load_private_key(made.key or b"", None, "key")))
+    enclave = Authority(certificate.read_pem(made.cert), FileSigner(load_private_key(made.key or b"", None, "key")))
     with pytest.raises(DamagedKeystore, match="not the permissions CA"):
         check(sign(DOCUMENT, enclave))
 
