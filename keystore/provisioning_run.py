@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -9,6 +10,7 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore import store
+from keystore.authority import Role
 from keystore.creation import CreateOptions, complete, renew_governance
 from keystore.enclave_name import check_distinct
 from keystore.enclave_state import EnclaveState
@@ -36,6 +38,7 @@ def write_wishes(
     with _locked(root, options) as opened:
         done, warnings = _complete_keystore(opened, options, now)
         view = KeystoreView(root)
+        warnings += _exposures(view)
         check_distinct(dict.fromkeys((*view.enclaves(), *wishes)))
         writer = EnclaveWriter(opened, view, options, now)
         states = [inspect_wish(view, name, wish, options, now) for name, wish in wishes.items()]
@@ -65,6 +68,20 @@ def _complete_keystore(
     if renew_governance(opened, domains, options.access, now):
         done.append(f"governance signed for domains {domains}")
     return done, list(report.warnings)
+
+
+def _exposures(view: KeystoreView) -> list[str]:
+    """What SROS2 leaves behind; it works, so it is said and not refused."""
+    said = []
+    if view.shares_one_ca:
+        said.append(
+            "this keystore has one CA for identities and permissions (CVE-2023-24010, CVE-2023-24011); "
+            "secure-keystore renew separates them"
+        )
+    files = [name for role in Role if (name := view.key_file(role)) is not None]
+    if any(os.stat(view.root / name).st_mode & 0o077 for name in files):
+        said.append("the CA keys can be read by others; secure-keystore renew closes them")
+    return said
 
 
 def _write_all(

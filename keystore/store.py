@@ -218,8 +218,11 @@ def opened(root: Path, *, timeout: float = lock.DEFAULT_TIMEOUT, durable: bool =
     Raises KeystoreBusy, UnsafeKeystore (its directory or the one above is open to others) or StorageError.
     ``durable`` False skips every fsync: for tests and for keystores that can be thrown away.
     """
-    safe_files.refuse_unsafe_parent(root)
-    safe_files.refuse_unsafe_directory(root)
+    try:
+        safe_files.refuse_unsafe_parent(root)
+        safe_files.refuse_unsafe_directory(root)
+    except OSError as error:
+        raise StorageError.of(error, "opening the keystore") from None
     with lock.exclusive(root, timeout):
         store = Store(root, durable)
         _clear_staging(root)

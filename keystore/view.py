@@ -14,7 +14,14 @@ from keystore import layout, safe_files
 from keystore.authority import Authority, Role, authority_of, read_certificates
 from keystore.certificate import CertificateFacts
 from keystore.enclave_name import validate_enclave_name
-from keystore.errors import DamagedKeystore, InvalidEnclaveName, NotAKeystore, SigningUnavailable, printable
+from keystore.errors import (
+    DamagedKeystore,
+    InvalidEnclaveName,
+    NotAKeystore,
+    SigningUnavailable,
+    StorageError,
+    printable,
+)
 from keystore.settings import Settings
 from keystore.signer import CaAccess, open_signer
 
@@ -105,7 +112,10 @@ class KeystoreView:
     def enclaves(self) -> list[str]:
         """Names of all enclaves (directories with a key or a certificate), sorted; links are not followed."""
         found: list[str] = []
-        _collect(self.root / layout.ENCLAVES, "", found)
+        try:
+            _collect(self.root / layout.ENCLAVES, "", found)
+        except OSError as error:
+            raise StorageError.of(error, "reading the keystore") from None
         return sorted(found)
 
 

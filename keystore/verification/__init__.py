@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from keystore.errors import KeystoreError
+from keystore.errors import KeystoreError, StorageError
 from keystore.signer import CaAccess
 from keystore.validity import utc_now
 from keystore.verification.authorities import check_authorities
@@ -42,10 +42,11 @@ def verify(
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     order = list(Severity)
-    found = sorted(
-        _findings(view, access or CaAccess(), now or utc_now()),
-        key=lambda finding: (order.index(finding.severity), finding.place, finding.code),
-    )
+    try:
+        found = list(_findings(view, access or CaAccess(), now or utc_now()))
+    except OSError as error:
+        raise StorageError.of(error, "checking the keystore") from None
+    found.sort(key=lambda finding: (order.index(finding.severity), finding.place, finding.code))
     return VerifyReport(view.root, len(view.enclaves()), tuple(found))
 
 

@@ -69,7 +69,11 @@ def test_an_sros2_keystore_is_reported_as_exposed(sros2: Path) -> None:
 
 def test_an_sros2_keystore_is_extended_in_place(sros2: Path) -> None:
     before = contents(sros2)
-    provision(sros2, [policy("/new")], options=options())
+    report = provision(sros2, [policy("/new")], options=options())
+    assert [warning.split(";")[0] for warning in report.warnings] == [
+        "this keystore has one CA for identities and permissions (CVE-2023-24010, CVE-2023-24011)",
+        "the CA keys can be read by others",
+    ]
     after = contents(sros2)
     assert {name for name in after if before.get(name) != after[name]} == {
         f"enclaves/new/{name}" for name in layout.ENCLAVE_FILES - {"crl.pem"}

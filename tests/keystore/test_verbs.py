@@ -148,7 +148,9 @@ def test_the_progress_bar_is_for_terminals_that_wait(monkeypatch: pytest.MonkeyP
         slow(1, 2)
         slow(2, 2)
         terminal.flush()
-        shown = os.read(parent, 4096).decode()
+        shown = ""
+        while not shown.endswith("\x1b[K"):
+            shown += os.read(parent, 4096).decode()
     os.close(parent)
     assert shown.count("1/2 enclaves") == 1, "nothing within the first second"
     assert shown.endswith("\r\x1b[K"), "and no trace when done"
