@@ -15,7 +15,7 @@ from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Frame, R
 from nodl.infer.interpreter.tables import new_run
 from nodl.infer.models.foreign import is_node_class
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.values import ANY, ClassValue, External, FunctionValue, ModuleValue, unknown
+from nodl.infer.values import ANY, ClassValue, External, FunctionValue, Instance, ModuleValue, unknown
 from nodl.source_ref import SourceRef
 
 MAX_ROUNDS = 12
@@ -84,22 +84,26 @@ def _analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) ->
                 _expect_methods(run, value)
     for value in list(main.cells.values()):
         for atom in value:
-            if isinstance(atom, FunctionValue) and atom.module is main and atom.node not in called:
-                if not isinstance(atom.node, ast.Lambda) and _creates(run, atom.node, None):
-                    found = True
-                    called.add(atom.node)
-                    _call(run, main, atom, Arguments(more=missing))
+            if not isinstance(atom, FunctionValue) or atom.module is not main or atom.node in called:
+                continue
+            if not isinstance(atom.node, ast.Lambda) and _creates(run, atom.node, None):
+                found = True
+                called.add(atom.node)
+                _call(run, main, atom, Arguments(more=missing))
     if found:
         settle(run)
 
 
 def _expect_methods(run: Run, value: Iterable[object]) -> None:
     for instance in value:
-        cls = getattr(instance, "cls", None)
-        for base in linearized(cls) if isinstance(cls, ClassValue) else ():
-            for name in list(base.cells) if isinstance(base, ClassValue) else ():
+        if not isinstance(instance, Instance) or not isinstance(instance.cls, ClassValue):
+            continue
+        frame = Frame(instance.cls.module, {}, None, 0)
+        for base in linearized(instance.cls):
+            if not isinstance(base, ClassValue):
+                continue
+            for name in list(base.cells):
                 if isinstance(name, str) and not name.startswith(("__", "[")):
-                    frame = Frame(cls.module, {}, None, 0)
                     run.register_callback(run.attribute((instance,), name, base.node, frame), None)
 
 

@@ -41,7 +41,7 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) 
     rules, gaps = _rules(record, findings)
     endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found, record)))
     gaps.extend(Gap(source, why) for source, why in record.gaps)
-    names = _plain_texts(record.names) or [None]
+    names: list[str | None] = [*_plain_texts(record.names)] or [None]
     if not record.created:
         gaps.append(Gap(record.source, "the node that these interfaces belong to is not known"))
     elif names == [None]:
@@ -78,9 +78,9 @@ def _namespaces(record: NodeRecord) -> list[str | None]:
     return list(dict.fromkeys(texts)) or [None]
 
 
-def _plain_texts(value: Value) -> list[str | None]:
+def _plain_texts(value: Value) -> list[str]:
     """The texts of ``value`` with defaults filled in; what stays unknown is left out."""
-    texts: list[str | None] = []
+    texts: list[str] = []
     for atom in value:
         for template in templates(atom):
             filled = template.fill({})

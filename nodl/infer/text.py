@@ -7,7 +7,6 @@ common prefix and suffix around a hole; a text that is only a hole says no more 
 
 from __future__ import annotations
 
-import os.path
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -116,12 +115,19 @@ def common_text(texts: Sequence[TextAtom], why: str) -> Text:
     """The common literal prefix and suffix of ``texts`` around a hole."""
     heads = [_literal_end(text, 0) for text in texts]
     tails = [_literal_end(text, -1)[::-1] for text in texts]
-    prefix = os.path.commonprefix(heads)
+    prefix = _common_prefix(heads)
     shortest = min((len(text) for text in texts if isinstance(text, str)), default=len(prefix) + 1_000)
-    suffix = os.path.commonprefix(tails)[: max(0, shortest - len(prefix))][::-1]
+    suffix = _common_prefix(tails)[: max(0, shortest - len(prefix))][::-1]
     text = text_of((prefix, Hole(why), suffix))
     assert isinstance(text, Text)
     return text
+
+
+def _common_prefix(texts: Sequence[str]) -> str:
+    """Character by character; the least and the greatest text differ first."""
+    low, high = min(texts), max(texts)
+    length = next((i for i, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low))
+    return low[:length]
 
 
 def _literal_end(text: TextAtom, index: int) -> str:

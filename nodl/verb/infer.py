@@ -105,7 +105,7 @@ def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
     from nodl.ament_index import PackageNotFoundError, package_prefix
     from nodl.infer.executable import infer_executable
     from nodl.infer.system import InferredSystem
-    from nodl.node_interface import Gap
+    from nodl.node_interface import Gap, NodeInterface
     from nodl.source_ref import SourceRef
 
     try:
@@ -113,7 +113,8 @@ def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
     except (PackageNotFoundError, ValueError) as error:
         raise LookupError(f"'{package}' is neither a file or folder nor an installed package: {error}") from None
     files = sorted(p for p in folder.glob("*") if p.is_file() and os.access(p, os.X_OK))
-    nodes, gaps = [], []
+    nodes: list[NodeInterface] = []
+    gaps: list[Gap] = []
     for path in files:
         inferred = infer_executable(package, path.name, prefixes=prefixes)
         nodes.extend(inferred.interfaces)

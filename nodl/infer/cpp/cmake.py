@@ -5,6 +5,7 @@ Only literal calls and ``set(VARIABLE ...)`` lists are understood; nothing is ru
 
 from __future__ import annotations
 
+import itertools
 import os
 import re
 from dataclasses import dataclass, field
@@ -47,6 +48,6 @@ def read_build(folder: str | None) -> Build:
 
 
 def _register(build: Build, words: list[str]) -> None:
-    options = dict(zip(words, words[1:], strict=False))
+    options = dict(itertools.pairwise(words))
     if "PLUGIN" in options:
         build.plugins[options["PLUGIN"]] = options.get("EXECUTABLE")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -39,12 +40,12 @@ def evaluate(node: Node | None, scope: Scope) -> list[Parts]:
     if node is None:
         return unknown("a value that is not given")
     handler = _HANDLERS.get(node.type)
-    found = handler(node, scope) if handler else unknown(f"the C++ expression {text(node)[:60]}")
+    found: list[Parts] = handler(node, scope) if handler else unknown(f"the C++ expression {text(node)[:60]}")
     return list(dict.fromkeys(found))[:MAX_ALTERNATIVES]
 
 
 def template(parts: Parts) -> NameTemplate:
-    return NameTemplate((*parts,)).fill_each({})[0] if not parts else NameTemplate(_melted(parts))
+    return NameTemplate(_melted(parts))
 
 
 def _melted(parts: Parts) -> Parts:
@@ -198,7 +199,7 @@ def _is_text(parts: Parts) -> bool:
     return bool(parts) and all(isinstance(part, str) for part in parts)
 
 
-_HANDLERS = {
+_HANDLERS: dict[str, Callable[[Node, Scope], list[Parts]]] = {
     "string_literal": _literal,
     "raw_string_literal": lambda node, scope: [(text(node).partition("(")[2].rpartition(")")[0],)],
     "concatenated_string": _literals,

@@ -159,9 +159,9 @@ def _construction_sites(cls: CppClass, unit: CppUnit) -> Iterator[tuple[list[Nod
         if given is not None and owner is not cls:
             yield list(given.named_children), scope
         for call in walk(function.node):
-            if call.type == "call_expression" and called_name(call) in ("make_shared", "make_unique"):
-                if _template_argument(call).rpartition("::")[2] == cls.name:
-                    yield arguments_of(call), scope
+            made = call.type == "call_expression" and called_name(call) in ("make_shared", "make_unique")
+            if made and _template_argument(call).rpartition("::")[2] == cls.name:
+                yield arguments_of(call), scope
 
 
 # --- endpoints ----------------------------------------------------------------------------------------------
@@ -234,7 +234,7 @@ def _member_initialiser(node: Node, scope: Scope, found: _Found) -> None:
         return
     member = text(node.named_children[0])
     for declared in _member_types(scope.cls, member):
-        arguments = [child for child in node.named_children[-1].named_children]
+        arguments = list(node.named_children[-1].named_children)
         source = SourceRef(_file(scope), line_of(node))
         _library_object(declared, arguments, source, scope, found)
 
@@ -309,10 +309,12 @@ def _local_nodes(function: Function, unit: CppUnit, gaps: list[Gap]) -> Iterator
             _endpoints(function.node, scope, found, {name, f"(*{name})"})
             yield found
     for call in walk(function.node):
-        if call.type == "call_expression" and called_name(call) in _CREATES and receiver_of(call):
-            if receiver_of(call) not in known and _template_argument(call):
-                source = SourceRef(function.file, line_of(call))
-                gaps.append(Gap(source, f"the node {receiver_of(call)} of this endpoint is not known"))
+        if call.type != "call_expression" or called_name(call) not in _CREATES:
+            continue
+        receiver = receiver_of(call)
+        if receiver and receiver not in known and _template_argument(call):
+            source = SourceRef(function.file, line_of(call))
+            gaps.append(Gap(source, f"the node {receiver} of this endpoint is not known"))
 
 
 def _makes_node(call: Node) -> bool:

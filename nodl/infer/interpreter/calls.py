@@ -63,7 +63,8 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     _widen_parameters(run, summary, cells)
     if not summary.active:
         _run_recursive(run, function, summary, call)
-    return summary.result  # nothing yet: this path ends in a call that has not come back so far
+    result: Value = summary.result
+    return result  # nothing yet: this path ends in a call that has not come back so far
 
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:

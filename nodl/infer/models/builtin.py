@@ -62,7 +62,7 @@ def _int(run: Run, call: Call) -> Value:
 
 def _float(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
-    return (float(atom),) if type(atom) in (int, float) else ANY  # type: ignore[arg-type]
+    return (float(atom),) if isinstance(atom, int | float) else ANY
 
 
 def _bool(run: Run, call: Call) -> Value:
@@ -84,11 +84,9 @@ def _len(run: Run, call: Call) -> Value:
 
 def _range(run: Run, call: Call) -> Value:
     bounds = [sole(value) for value in call.args.positional]
-    if bounds and all(type(bound) is int for bound in bounds):
-        try:
-            numbers = range(*bounds)  # type: ignore[arg-type]
-        except (TypeError, ValueError):
-            return ANY
+    integers = [bound for bound in bounds if isinstance(bound, int)]
+    if len(integers) == len(bounds) and (len(bounds) in (1, 2) or (len(bounds) == 3 and integers[2])):
+        numbers = range(*integers)
         if len(numbers) <= MAX_RANGE:
             return run.sequence(call.node, "tuple", Items(tuple((number,) for number in numbers)))
     return run.sequence(call.node, "tuple", Items(None, unknown("a number of a loop")))

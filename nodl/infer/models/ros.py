@@ -142,9 +142,7 @@ def names_of(value: Value) -> list[object]:
     """The names that ``value`` may be: texts and unknowns; other values are errors in the program."""
     names: list[object] = []
     for atom in value:
-        if isinstance(atom, str | Text):
-            names.append(atom)
-        elif isinstance(atom, Unknown):
+        if isinstance(atom, str | Text | Unknown):
             names.append(atom)
         elif isinstance(atom, Instance) and "_value_" in atom.cells:
             names.extend(as_texts((atom,)))

@@ -77,14 +77,16 @@ NODE_ENDPOINTS: dict[str, EndpointCall] = {
 }
 
 _NODE = Argument(0, "node")
-_ACTION = {"type": Argument(1, "action_type"), "name": Argument(2, "action_name"), "node": _NODE}
+_ACTION_TYPE, _ACTION_NAME = Argument(1, "action_type"), Argument(2, "action_name")
 
 # Keyed by (top package, last name): ``rclpy.action.ActionClient`` and ``rclpy.action.client.ActionClient``.
 ENDPOINT_CALLS: dict[tuple[str, str], EndpointCall] = {
-    ("rclpy", "ActionClient"): EndpointCall(ACTION_CLIENT, **_ACTION),
+    ("rclpy", "ActionClient"): EndpointCall(ACTION_CLIENT, _ACTION_TYPE, _ACTION_NAME, _NODE),
     ("rclpy", "ActionServer"): EndpointCall(
         ACTION_SERVER,
-        **_ACTION,
+        _ACTION_TYPE,
+        _ACTION_NAME,
+        _NODE,
         callbacks=(
             Callback(Argument(3, "execute_callback"), 1),
             Callback(Argument(-1, "goal_callback"), 1),

@@ -12,7 +12,7 @@ import re
 import sys
 import types
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -257,11 +257,8 @@ def programs(draw: st.DrawFn) -> str:
 
 def executed(program: str, seed: int) -> set[tuple[str, str]]:
     recorder = Recorder(seed)
-    with installed(stand_in(recorder)):
-        try:
-            exec(compile(program, "program.py", "exec"), {"__name__": "__main__"})
-        except OutOfTosses:
-            pass  # what it created before its end still counts
+    with installed(stand_in(recorder)), suppress(OutOfTosses):  # what it created before its end still counts
+        exec(compile(program, "program.py", "exec"), {"__name__": "__main__"})
     return recorder.seen
 
 

@@ -1,0 +1,234 @@
+"""Every call of rclpy and its companions that makes an endpoint, with positional and keyword arguments."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from nodl.infer import InferredSystem
+from nodl.node_interface import NodeInterface
+
+Infer = Callable[..., InferredSystem]
+
+HEAD = """
+import rclpy
+from rclpy.node import Node
+from rclpy.action import ActionClient, ActionServer
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+from nav2_msgs.action import NavigateToPose
+import tf2_ros, message_filters, diagnostic_updater
+rclpy.init()
+node = rclpy.create_node('n')
+"""
+
+CALLS = {
+    "node.create_publisher(String, 't', 10)": [("publisher", "t", "std_msgs/msg/String")],
+    "node.create_publisher(msg_type=String, topic='t', qos_profile=10)": [
+        ("publisher", "t", "std_msgs/msg/String")
+    ],
+    "node.create_subscription(String, 't', print, 10)": [("subscription", "t", "std_msgs/msg/String")],
+    "node.create_service(Empty, 's', print)": [("service_server", "s", "std_srvs/srv/Empty")],
+    "node.create_client(Empty, 's')": [("service_client", "s", "std_srvs/srv/Empty")],
+    "ActionServer(node, NavigateToPose, 'a', print)": [
+        ("action_server", "a", "nav2_msgs/action/NavigateToPose")
+    ],
+    "ActionClient(node, action_type=NavigateToPose, action_name='a')": [
+        ("action_client", "a", "nav2_msgs/action/NavigateToPose")
+    ],
+    "tf2_ros.TransformBroadcaster(node)": [("publisher", "/tf", "tf2_msgs/msg/TFMessage")],
+    "tf2_ros.StaticTransformBroadcaster(node)": [("publisher", "/tf_static", "tf2_msgs/msg/TFMessage")],
+    "tf2_ros.TransformListener(tf2_ros.Buffer(), node)": [
+        ("subscription", "/tf", "tf2_msgs/msg/TFMessage"),
+        ("subscription", "/tf_static", "tf2_msgs/msg/TFMessage"),
+    ],
+    "tf2_ros.TransformListener(tf2_ros.Buffer(), node, static_only=True)": [
+        ("subscription", "/tf_static", "tf2_msgs/msg/TFMessage"),
+    ],
+    "message_filters.Subscriber(node, String, 't')": [("subscription", "t", "std_msgs/msg/String")],
+    "diagnostic_updater.Updater(node)": [
+        ("publisher", "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+    ],
+    "from rclpy.wait_for_message import wait_for_message\nwait_for_message(String, node, 't')": [
+        ("subscription", "t", "std_msgs/msg/String")
+    ],
+    "node.destroy_publisher(node.create_publisher(String, 't', 1))": [
+        ("publisher", "t", "std_msgs/msg/String")
+    ],
+    "from rosidl_runtime_py.utilities import get_message\n"
+    "node.create_publisher(get_message('std_msgs/msg/String'), 't', 1)": [
+        ("publisher", "t", "std_msgs/msg/String")
+    ],
+}
+
+
+def endpoints(node: NodeInterface) -> list[tuple[str, str, str]]:
+    return sorted((e.kind.value, str(e.name), e.type) for e in node.endpoints)
+
+
+@pytest.mark.parametrize("call", CALLS)
+def test_calls_that_make_endpoints(call: str, infer: Infer) -> None:
+    system = infer(HEAD + call + "\n")
+    assert endpoints(system.nodes[0]) == CALLS[call]
+    assert not system.gaps
+    assert not system.nodes[0].gaps
+
+
+def test_each_node_has_its_own(infer: Infer) -> None:
+    """Two objects of one class, told apart by where they are made."""
+    system = infer(
+        """
+        import rclpy
+        from rclpy.node import Node
+        from std_msgs.msg import String
+        class Robot(Node):
+            def __init__(self, name):
+                super().__init__(name, namespace='fleet')
+                self.create_publisher(String, f'{name}/pose', 1)
+        rclpy.init()
+        executor = rclpy.executors.MultiThreadedExecutor()
+        for i in range(2):
+            executor.add_node(Robot(f'r{i}'))
+        executor.spin()
+        """
+    )
+    found = {(n.namespace, n.name, str(n.endpoints[0].name)) for n in system.nodes}
+    assert found == {("/fleet", "r0", "r0/pose"), ("/fleet", "r1", "r1/pose")}
+
+
+def test_the_same_class_in_unknown_number(infer: Infer) -> None:
+    """A loop of unknown length still names what is known."""
+    system = infer(
+        """
+        import rclpy, sys
+        from std_msgs.msg import String
+        for arg in sys.argv:
+            node = rclpy.create_node('n')
+            node.create_publisher(String, 'all/' + arg, 1)
+        """
+    )
+    (node,) = system.nodes
+    assert node.name == "n"
+    assert [(str(e.name), e.certainty.value) for e in node.endpoints] == [("all/?", "pattern")]
+
+
+def test_lifecycle_node_and_its_transitions(infer: Infer) -> None:
+    system = infer(
+        """
+        import rclpy
+        from rclpy.lifecycle import LifecycleNode
+        from std_msgs.msg import String
+        class L(LifecycleNode):
+            def __init__(self):
+                super().__init__('l')
+            def on_configure(self, state):
+                self.pub = self.create_lifecycle_publisher(String, 'late', 1)
+        rclpy.spin(L())
+        """
+    )
+    (node,) = system.nodes
+    assert node.lifecycle
+    assert endpoints(node) == [("publisher", "late", "std_msgs/msg/String")]
+
+
+PARAMETERS = {
+    "self.declare_parameter('t', 'd'); n = self.get_parameter('t').value": "param:t",
+    "n = self.declare_parameter('t', 'd').value": "param:t",
+    "self.declare_parameter('t', 'd'); n = self.get_parameter('t').get_parameter_value().string_value": "param:t",
+    "self.declare_parameters('', [('t', 'd')]); n = self.get_parameter('t').value": "param:t",
+    "self.declare_parameters('p', [('t', 'd')]); n = self.get_parameter('p.t').value": "param:p.t",
+    "self.declare_parameter('t', 'd'); (p,) = self.get_parameters(['t']); n = p.value": "param:t",
+    "n = self.get_parameter_or('t', Parameter('t', Parameter.Type.STRING, 'd')).value": "param:t",
+}
+
+
+@pytest.mark.parametrize("body", PARAMETERS)
+def test_names_from_parameters(body: str, infer: Infer) -> None:
+    system = infer(
+        f"""
+        import rclpy
+        from rclpy.node import Node
+        from rclpy.parameter import Parameter
+        from std_msgs.msg import String
+        class N(Node):
+            def __init__(self):
+                super().__init__('n')
+                {body}
+                self.create_publisher(String, n + '/x', 1)
+        rclpy.spin(N())
+        """
+    )
+    (endpoint,) = system.nodes[0].endpoints
+    name = PARAMETERS[body].removeprefix("param:")
+    assert str(endpoint.name) == PARAMETERS[body] + "/x"
+    assert endpoint.certainty.value == "from default"
+    assert endpoint.name.fill({}).text == "d/x"
+    assert endpoint.name.fill({name: "given"}).text == "given/x"
+
+
+def test_a_list_parameter_gives_one_name_per_element(infer: Infer) -> None:
+    system = infer(
+        """
+        import rclpy
+        from std_msgs.msg import String
+        node = rclpy.create_node('n')
+        node.declare_parameter('robots', ['a', 'b'])
+        for robot in node.get_parameter('robots').value:
+            node.create_publisher(String, f'{robot.strip("/")}/cmd', 1)
+        """
+    )
+    templates = [endpoint.name for endpoint in system.nodes[0].endpoints]
+    assert [template.fill({}).text for template in templates] == ["a/cmd", "b/cmd"]
+    filled = {name.text for template in templates for name in template.fill_each({"robots": ["/x/", "y"]})}
+    assert filled == {"x/cmd", "y/cmd"}
+
+
+def test_remap_rules_in_code(infer: Infer) -> None:
+    system = infer(
+        """
+        import rclpy
+        from std_msgs.msg import String
+        rclpy.init()
+        rules = ['--ros-args', '-r', '__ns:=/m', '-r', '__node:=other', '-r', 'a:=/b']
+        node = rclpy.create_node('n', cli_args=rules, use_global_arguments=False)
+        node.create_publisher(String, 'a', 1)
+        node.create_publisher(String, 'c', 1)
+        """
+    )
+    (node,) = system.nodes
+    assert (node.namespace, node.name) == ("/m", "other")
+    assert [str(e.name) for e in node.endpoints] == ["/b", "c"]
+
+
+def test_what_is_unknown_is_said(infer: Infer) -> None:
+    system = infer(
+        """
+        import rclpy
+        from rclpy.node import Node
+        from elsewhere import Helper, Base
+        class N(Node):
+            def __init__(self):
+                super().__init__('n')
+                Helper(self)
+        class M(Base):
+            def __init__(self):
+                super().__init__('m')
+                self.create_publisher(object, 'x', 1)
+        N()
+        M()
+        """
+    )
+    whys = [gap.why for node in system.nodes for gap in node.gaps]
+    assert any("handed to elsewhere.Helper" in why for why in whys)
+    assert any("elsewhere.Base" in why for why in whys)
+
+
+def test_code_made_at_run_time_is_a_gap(infer: Infer) -> None:
+    system = infer("import rclpy\nnode = rclpy.create_node('n')\nexec(open('x').read())\n")
+    assert any("eval, exec" in gap.why for gap in system.gaps)
+
+
+def test_a_file_that_does_not_parse_is_a_gap(infer: Infer) -> None:
+    system = infer("print 'python 2'\n")
+    assert [gap.source.line for gap in system.gaps] == [1]
