@@ -104,8 +104,15 @@ def _show_file(target: Target, options: argparse.Namespace) -> int:
 
 
 def _show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
-    sys.stdout.write(_plan_text(plan, options, keystore))
+    text = _plan_text(plan, options, keystore)
+    machine_readable = options.dump_params or (options.format != "tree" and not options.explain)
+    sys.stdout.write(text if machine_readable else _with_short_paths(text))
     return 0
+
+
+def _with_short_paths(text: str) -> str:
+    """Files below the working directory by the name a person would type."""
+    return text.replace(os.path.join(os.getcwd(), ""), "")
 
 
 def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> str:
