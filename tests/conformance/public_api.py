@@ -80,7 +80,7 @@ def parameters(value: object) -> list[str]:
         parameters = inspect.signature(value).parameters.values()  # type: ignore[arg-type]
     except (TypeError, ValueError):
         return []
-    marks = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
+    marks: dict[object, str] = {inspect.Parameter.VAR_POSITIONAL: "*", inspect.Parameter.VAR_KEYWORD: "**"}
     keyword_only = inspect.Parameter.KEYWORD_ONLY
     return [
         f"{marks.get(item.kind, '')}{item.name}{'=' if item.default is not item.empty else ''}"

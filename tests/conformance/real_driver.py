@@ -24,9 +24,6 @@ import types
 from enum import Enum
 from typing import Any
 
-sys.path.insert(0, os.path.dirname(os.path.abspath(__file__)))
-import public_api
-
 
 class NameValidationException(ValueError):
     pass
@@ -348,8 +345,11 @@ def main() -> None:
         os.environ["ROS_LOG_DIR"] = f"{own}/log"
         for name in ("launch_ros.actions", "launch_xml", "launch_yaml"):
             importlib.import_module(name)  # once; every child inherits it
+        importlib.import_module("launch.frontend.parse_substitution").parse_substitution("$(env X)")
 
         if jobs == "api":
+            public_api = importlib.import_module("public_api")  # beside this script
+
             print(json.dumps(public_api.describe()))
             return
         for job in jobs:
