@@ -57,7 +57,7 @@ def resolve_parameters(
                 slots.setdefault(name, {})[_slot(value)] = value
     resolved: dict[str, ParameterValue] = {}
     for section, parameters in sections.items():
-        if _applies(section, fqn_tokens):
+        if section_applies(section, fqn_tokens):
             resolved.update({name: slots[min(slots)] for name, slots in parameters.items()})
     return resolved
 
@@ -77,7 +77,8 @@ def _slot(value: ParameterValue) -> int:
     return 5 if isinstance(value, bytes) else _KINDS.index(type(value))
 
 
-def _applies(section: str, fqn_tokens: Sequence[str | None]) -> bool:
+def section_applies(section: str, fqn_tokens: Sequence[str | None]) -> bool:
+    """Whether a section of a parameter file is for the node with these name tokens."""
     if section == EVERY_NODE:
         return True
     return _matches([token for token in section.split("/") if token], fqn_tokens)

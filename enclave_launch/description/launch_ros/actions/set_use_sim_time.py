@@ -7,13 +7,19 @@ from typing import Any
 from enclave_launch.description.launch.action import Action
 from enclave_launch.description.launch.frontend import Entity, Parser, expose_action
 from enclave_launch.description.launch.launch_context import LaunchContext
+from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
+from enclave_launch.description.launch.utilities.type_utils import (
+    normalize_typed_substitution,
+    perform_typed_substitution,
+)
+from enclave_launch.evaluation.distro import Feature
 
 
 @expose_action("set_use_sim_time")
 class SetUseSimTime(Action):
-    """Only ``True`` succeeds; launched nodes get ``use_sim_time`` through ``SetParameter``."""
+    """Launched nodes get ``use_sim_time`` through ``SetParameter`` instead."""
 
-    def __init__(self, value: bool, **kwargs: Any):
+    def __init__(self, value: bool | SomeSubstitutionsType, **kwargs: Any):
         super().__init__(**kwargs)
         self.__value = value
 
@@ -24,12 +30,19 @@ class SetUseSimTime(Action):
         return cls, kwargs
 
     @property
-    def value(self) -> bool:
+    def value(self) -> bool | SomeSubstitutionsType:
         return self.__value
 
     def execute(self, context: LaunchContext) -> None:
-        """Raises ``ValueError`` for anything but a bool (the front ends pass text unevaluated)."""
-        if not isinstance(self.__value, bool):
-            raise ValueError(f"Type 'Type.BOOL' and value '{self.__value}' do not agree")
-        if not self.__value:
+        """Older releases pass the text of the front ends on unevaluated, and refuse to switch it off.
+
+        Raises ``ValueError`` for what is no bool, ``RuntimeError`` for ``False``.
+        """
+        value = self.__value
+        if context.host.release.has(Feature.SIM_TIME_IN_FRONTENDS):
+            perform_typed_substitution(context, normalize_typed_substitution(value, bool), bool)
+            return
+        if not isinstance(value, bool):
+            raise ValueError(f"Type 'Type.BOOL' and value '{value}' do not agree")
+        if not value:
             raise RuntimeError("Failed to set use_sim_time parameter")

@@ -10,13 +10,14 @@ from enclave_launch.description.launch.frontend import expose_substitution
 from enclave_launch.description.launch.launch_context import LaunchContext
 from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
 from enclave_launch.description.launch.substitution import Substitution
+from enclave_launch.description.launch.substitutions.path_operator import PathOperator
 from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
 
 
-class FindPackage(Substitution):
+class FindPackage(PathOperator, Substitution):
     """A directory that belongs to a package; subclasses say which in ``find``."""
 
     def __init__(self, package: SomeSubstitutionsType):

@@ -18,6 +18,9 @@ from enclave_launch.description.launch_ros.parameters_type import EvaluatedParam
 from enclave_launch.description.launch_ros.utilities import yaml_text
 from enclave_launch.description.launch_ros.utilities.evaluate_parameters import evaluate_parameter_dict
 from enclave_launch.description.launch_ros.utilities.normalize_parameters import normalize_parameter_dict
+from enclave_launch.evaluation.distro import Feature
+from enclave_launch.evaluation.host import current_release
+from enclave_launch.evaluation.rcl_parameters import section_applies
 
 _NO_NAME = "node name not provided to launch; parameter files will not apply"
 
@@ -78,7 +81,16 @@ def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:
     sections = dict(_sections(document, ()))
     if not sections:
         return document, False
-    return {**(sections.get("**") or {}), **(sections.get(section) or {})}, True
+    names = ["**", *_matching_patterns(sections, section), section]
+    return {key: value for name in names for key, value in (sections.get(name) or {}).items()}, True
+
+
+def _matching_patterns(sections: Mapping[str, Any], section: str) -> list[str]:
+    """Sections with wildcards that match, in the order of the file. Older releases do not look at them."""
+    if not current_release().has(Feature.WILDCARD_SECTIONS):
+        return []
+    tokens = section.split("/")
+    return [name for name in sections if name != "**" and "*" in name and section_applies(name, tokens)]
 
 
 def _sections(mapping: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
