@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import binascii
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from keystore import der
 from keystore.validity import Validity
@@ -23,9 +24,10 @@ _EXTENSIONS = 0xA3
 _BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class CertificateFacts:
-    """``issuer``, ``subject`` and ``public_key`` are DER; key identifiers are None where absent."""
+    """``issuer``, ``subject`` and ``public_key`` are DER. Extensions are read when first asked for: most
+    questions before a launch do not concern them."""
 
     der: bytes = field(repr=False)
     serial: int
@@ -35,17 +37,48 @@ class CertificateFacts:
     name_parts: int
     validity: Validity
     public_key: bytes = field(repr=False)
-    subject_key_id: bytes | None = field(repr=False)
-    authority_key_id: bytes | None = field(repr=False)
-    can_sign_mail: bool
-    """Whether OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
+    extensions: bytes = field(repr=False)
+    """DER of the Extensions sequence, empty without any."""
+
+    @cached_property
+    def _by_oid(self) -> dict[bytes, bytes]:
+        """Unreadable extensions count as absent: the cautious reading, a certificate that may do anything."""
+        try:
+            return _extensions(self.extensions)
+        except der.DerError:
+            return {}
+
+    @cached_property
+    def subject_key_id(self) -> bytes | None:
+        try:
+            return der.parse(self._by_oid[_SUBJECT_KEY_ID]).content
+        except (KeyError, der.DerError):
+            return None
+
+    @cached_property
+    def authority_key_id(self) -> bytes | None:
+        """The keyIdentifier [0] of AuthorityKeyIdentifier."""
+        try:
+            parts = der.parse(self._by_oid[_AUTHORITY_KEY_ID]).children()
+        except (KeyError, der.DerError):
+            return None
+        return next((part.content for part in parts if part.tag == 0x80), None)
+
+    @cached_property
+    def can_sign_mail(self) -> bool:
+        """Whether OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
+        try:
+            return _can_sign_mail(self._by_oid)
+        except der.DerError:
+            return True
 
     def names_issuer(self, ca: CertificateFacts) -> bool:
         """Whether this certificate says that ``ca`` issued it (names and, where present, key identifiers)."""
         if self.issuer != ca.subject:
             return False
-        both = self.authority_key_id and ca.subject_key_id
-        return not both or self.authority_key_id == ca.subject_key_id
+        if ca.subject_key_id is None or ca.subject_key_id in self.extensions:
+            return True  # the quick look: 160 bits do not occur by accident
+        return self.authority_key_id in (None, ca.subject_key_id)
 
 
 def pem_blocks(pem: bytes) -> list[bytes]:
@@ -81,9 +114,9 @@ def read_der(data: bytes) -> CertificateFacts:
 def _read(data: bytes) -> CertificateFacts:
     fields = der.parse(data).expect(der.SEQUENCE).children()[0].children()
     _, serial, _, issuer, validity, subject, public_key, *rest = fields
-    not_before, not_after = (der.time_value(moment) for moment in validity.children())
-    extensions = _extensions(rest)
+    not_before, not_after = validity.children()
     names = [part for group in subject.children() for part in group.children()]
+    holder = next((part for part in rest if part.tag == _EXTENSIONS), None)
     return CertificateFacts(
         der=data,
         serial=int.from_bytes(serial.content, "big"),
@@ -91,37 +124,24 @@ def _read(data: bytes) -> CertificateFacts:
         subject=subject.whole,
         common_name=_common_name(names),
         name_parts=len(names),
-        validity=Validity(not_before, not_after),
+        validity=Validity(der.time_value(not_before), der.time_value(not_after)),
         public_key=public_key.whole,
-        subject_key_id=_key_id(extensions.get(_SUBJECT_KEY_ID)),
-        authority_key_id=_authority(extensions.get(_AUTHORITY_KEY_ID)),
-        can_sign_mail=_can_sign_mail(extensions),
+        extensions=holder.content if holder is not None else b"",
     )
 
 
-def _extensions(rest: list[der.Element]) -> dict[bytes, bytes]:
-    """OID -> content of the extension's OCTET STRING."""
-    holder = next((part for part in rest if part.tag == _EXTENSIONS), None)
-    if holder is None:
+def _extensions(sequence: bytes) -> dict[bytes, bytes]:
+    """OID -> content of the extension's OCTET STRING; raises DerError."""
+    if not sequence:
         return {}
-    entries = (entry.children() for entry in holder.children()[0].children())
-    return {entry[0].whole: entry[-1].content for entry in entries}
+    entries = (entry.children() for entry in der.parse(sequence).children())
+    return {entry[0].whole: entry[-1].expect(der.OCTET_STRING).content for entry in entries if entry}
 
 
 def _common_name(names: list[der.Element]) -> str | None:
     values = [name.children() for name in names]
     found = [value.content.decode("utf-8", "replace") for oid, value in values if oid.whole == _COMMON_NAME]
     return found[0] if len(found) == 1 else None
-
-
-def _key_id(extension: bytes | None) -> bytes | None:
-    return der.parse(extension).content if extension else None
-
-
-def _authority(extension: bytes | None) -> bytes | None:
-    """The keyIdentifier [0] of AuthorityKeyIdentifier."""
-    parts = der.parse(extension).children() if extension else []
-    return next((part.content for part in parts if part.tag == 0x80), None)
 
 
 def _can_sign_mail(extensions: dict[bytes, bytes]) -> bool:
@@ -132,5 +152,5 @@ def _can_sign_mail(extensions: dict[bytes, bytes]) -> bool:
         if not allowed & {_EMAIL_PROTECTION, _ANY_USAGE}:
             return False
     bits = extensions.get(_KEY_USAGE)
-    # digitalSignature and nonRepudiation are the two highest bits of the first byte.
-    return bits is None or bool(der.parse(bits).content[1] & 0xC0)
+    # After the count of unused bits: digitalSignature and nonRepudiation are the two highest of the first byte.
+    return bits is None or bool(der.parse(bits).content[1:2] >= b"\x40")

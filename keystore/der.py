@@ -110,10 +110,9 @@ def time_value(element: Element) -> datetime:
         raise DerError("not a time")
     if len(text) != 15 or text[14] != "Z" or not text[:14].isdigit():
         raise DerError("a time that is not in UTC")
+    year, month, day = int(text[:4]), int(text[4:6]), int(text[6:8])
     try:
-        year, *rest = (int(part) for part in (text[:4], *(text[at : at + 2] for at in range(4, 14, 2))))
-        month, day, hour, minute, second = rest
-        return datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
+        return datetime(year, month, day, int(text[8:10]), int(text[10:12]), int(text[12:14]), tzinfo=timezone.utc)
     except ValueError as error:
         raise DerError("an impossible time") from error
 
