@@ -25,11 +25,15 @@ import time
 from collections.abc import Callable, Iterable
 from dataclasses import astuple, dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "ros2"))
 
-import upstream  # noqa: E402
+if TYPE_CHECKING:
+    from tests.ros2 import upstream
+else:
+    import upstream
 
 RUNS = int(os.environ.get("BENCH_RUNS", "5"))
 NODES = 50

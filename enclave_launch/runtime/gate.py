@@ -107,7 +107,9 @@ class PlannedGate:
             return self._provider.ensure_late(process)  # no ROS process by the launch file: nothing to sign
         if not self._allow_late:
             raise LateProcess(_refusal(f"{_named(process)} at {process.location}"))
-        self._say_late(f"{_named(process)} at {process.location} was not foreseen: provisioned now (--allow-late)")
+        self._say_late(
+            f"{_named(process)} at {process.location} was not foreseen: provisioned now (--allow-late)"
+        )
         grant = self._provider.ensure_late(process)
         self._processes.add(identity(process))
         return grant
@@ -133,4 +135,6 @@ def _named(process: ResolvedProcess) -> str:
 
 
 def _refusal(what: str, remedy: str = "--allow-late provisions it when it appears") -> str:
-    return f"refused: {what} only exists at run time and goes beyond the permissions that were signed; {remedy}"
+    return (
+        f"refused: {what} only exists at run time and goes beyond the permissions that were signed; {remedy}"
+    )

@@ -64,7 +64,9 @@ def captured_logging(log: LaunchLog) -> Iterator[None]:
 
     class Forward(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            level: Level = next((name for name in reversed(LEVELS) if record.levelno >= LEVELS[name]), "DEBUG")
+            level: Level = next(
+                (name for name in reversed(LEVELS) if record.levelno >= LEVELS[name]), "DEBUG"
+            )
             log.log(level, record.name, record.getMessage())
 
     root, handler = logging.getLogger(), Forward()

@@ -93,7 +93,9 @@ class LiveHost(BaseHost):
             return
         if self._gate is not None:
             self._gate.ensure_components(components)
-        assert self._services is not None  # the service refuses to start without, where the plan has components
+        assert (
+            self._services is not None
+        )  # the service refuses to start without, where the plan has components
         context.add_completion_future(self._services.load(components))
 
     def launcher_call(self, call: LauncherCall) -> None:
@@ -145,7 +147,9 @@ class LiveHost(BaseHost):
             if not completed.done():
                 completed.set_result(None)
 
-    async def _prepare(self, process: ResolvedProcess, base: Mapping[str, str], emulate_tty: bool) -> ProcessSpec:
+    async def _prepare(
+        self, process: ResolvedProcess, base: Mapping[str, str], emulate_tty: bool
+    ) -> ProcessSpec:
         grant = await self._granted(process)
         environment = {name: value for name, value in base.items() if name not in self._secrets}
         return ProcessSpec(

@@ -127,7 +127,9 @@ class LiveProcess:
         self._end(quiet=event.due_to_sigint and not context.noninteractive)
 
     def _end(self, *, quiet: bool) -> None:
-        patience = Patience(self._seconds(self._action.sigterm_timeout), self._seconds(self._action.sigkill_timeout))
+        patience = Patience(
+            self._seconds(self._action.sigterm_timeout), self._seconds(self._action.sigkill_timeout)
+        )
         self._supervised.end(patience, quiet=quiet)
 
     def _seconds(self, substitutions: Any) -> float:

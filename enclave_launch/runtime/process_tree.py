@@ -48,7 +48,9 @@ class ProcessSpec:
 class OutputPump:
     """Reads one stream of a child whenever there is something, unless paused; ``closed`` at its end."""
 
-    def __init__(self, descriptor: int, receive: Callable[[bytes], None], loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(
+        self, descriptor: int, receive: Callable[[bytes], None], loop: asyncio.AbstractEventLoop
+    ) -> None:
         os.set_blocking(descriptor, False)
         self._descriptor = descriptor
         self._receive = receive
@@ -174,7 +176,9 @@ class ProcessTree:
                 )
             except OSError as error:
                 ours.close()
-                raise RuntimeFailure(f"cannot start the warden with {sys.executable!r}: {error.strerror}") from error
+                raise RuntimeFailure(
+                    f"cannot start the warden with {sys.executable!r}: {error.strerror}"
+                ) from error
         self._channel = WardenChannel(ours, self._on_message, self._on_lost)
         self._children: dict[int, Child] = {}
         self._count = 0
@@ -213,7 +217,9 @@ class ProcessTree:
         theirs = [stdin, *(descriptor for _, descriptor in opened)]
         environment = {os.fsencode(name): os.fsencode(value) for name, value in spec.environment.items()}
         argv = [os.fsencode(word) for word in spec.argv]
-        self.send("spawn", self._count, argv, environment, os.fsencode(spec.cwd or os.getcwd()), descriptors=theirs)
+        self.send(
+            "spawn", self._count, argv, environment, os.fsencode(spec.cwd or os.getcwd()), descriptors=theirs
+        )
         try:
             await asyncio.shield(child.started)
         except BaseException:  # cancelled: whatever may have started has no owner

@@ -47,11 +47,14 @@ class RosServices:
         self._say = say
         self._loop = asyncio.get_running_loop()
         self._closing = threading.Event()
+        self._closed = False
         grant = grant or Grant()
         with _environment(grant.environment):
             self._ros = rclpy.Context()
             rclpy.init(args=["--ros-args", *_without_marker(grant.arguments)], context=self._ros)
-            self._node = rclpy.create_node(LAUNCHER_NODE, context=self._ros)  # the name its permissions are for
+            self._node = rclpy.create_node(
+                LAUNCHER_NODE, context=self._ros
+            )  # the name its permissions are for
         self._executor = rclpy.executors.SingleThreadedExecutor(context=self._ros)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="ros-services", daemon=True)
@@ -80,24 +83,31 @@ class RosServices:
             10,
         )
 
+    def abandon(self) -> None:
+        """The launch is ending: calls that wait for a service that never comes give up."""
+        self._closing.set()
+
     def close(self) -> None:
         import rclpy
 
-        self._closing.set()
+        self.abandon()
+        self._closed = True
         self._executor.shutdown()
         self._thread.join(5.0)
         self._node.destroy_node()
         rclpy.shutdown(context=self._ros)
 
     def _spin(self) -> None:
-        while not self._closing.is_set():
+        while not self._closed:
             self._executor.spin_once(timeout_sec=0.1)
 
     def _load_all(self, components: tuple[ResolvedComponent, ...]) -> None:
         from composition_interfaces.srv import LoadNode
 
         for component in components:
-            response = self._call(LoadNode, f"{component.container}/_container/load_node", _load_request(component))
+            response = self._call(
+                LoadNode, f"{component.container}/_container/load_node", _load_request(component)
+            )
             if response is None:
                 return
             self._report_load(component, response)
@@ -127,16 +137,18 @@ class RosServices:
         """The response; None when the launch ended first."""
         client = self._node.create_client(kind, service)
         try:
-            while not client.wait_for_service(timeout_sec=0.5):
+            while not client.wait_for_service(timeout_sec=0.2):
                 if self._closing.is_set():
                     self._tell("WARNING", f"Abandoning wait for the '{service}' service, due to shutdown.")
                     return None
             answered = threading.Event()
             future = client.call_async(request)
             future.add_done_callback(lambda _: answered.set())
-            while not answered.wait(0.5):
+            while not answered.wait(0.2):
                 if self._closing.is_set():
-                    self._tell("WARNING", f"Abandoning wait for the '{service}' service response, due to shutdown.")
+                    self._tell(
+                        "WARNING", f"Abandoning wait for the '{service}' service response, due to shutdown."
+                    )
                     return None
             return future.result()
         finally:

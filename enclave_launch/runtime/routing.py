@@ -36,7 +36,9 @@ def output_routes(setting: OutputSetting) -> Routes:
     """:raises ValueError: an alias, source or destination that launch does not know."""
     if isinstance(setting, str):
         if setting not in ALIASES:
-            raise ValueError(f'{setting} is not a valid standard output config i.e. "screen", "log" or "both"')
+            raise ValueError(
+                f'{setting} is not a valid standard output config i.e. "screen", "log" or "both"'
+            )
         named: Mapping[str, Iterable[str]] = dict(ALIASES[setting].items())
     else:
         named = {source: {to} if isinstance(to, str) else set(to) for source, to in setting.items()}
@@ -45,7 +47,9 @@ def output_routes(setting: OutputSetting) -> Routes:
             raise ValueError(f'{source} is not a valid output source i.e. "stdout", "stderr" or "both"')
         for destination in destinations:
             if destination not in DESTINATIONS:
-                raise ValueError(f'{destination} is not a valid output destination i.e. "screen", "log" or "own_log"')
+                raise ValueError(
+                    f'{destination} is not a valid output destination i.e. "screen", "log" or "own_log"'
+                )
     return {source: frozenset(named.get(source, ())) for source in SOURCES}
 
 
@@ -104,15 +108,14 @@ class OutputRouter:
             return
         if not lines.isascii():
             lines = lines.decode(errors="replace").encode()
-        shown = self._render(lines)
         for sink, timed in self._sinks[stream]:
-            self._log.writer.write(sink, prefixed(shown, f"{time.time():.7f} ".encode()) if timed else shown)
+            self._log.writer.write(sink, self._render(lines, f"{time.time():.7f} " if timed else ""))
 
-    def _render(self, lines: bytes) -> bytes:
+    def _render(self, lines: bytes, time_stamp: str) -> bytes:
         if self._render_line is None:
-            return prefixed(lines, self._prefix)
+            return prefixed(lines, time_stamp.encode() + self._prefix)
         rendered = (self._render_line(line) for line in lines[:-1].decode().split("\n"))
-        return "".join(f"{line}\n" for line in rendered).encode(errors="replace")
+        return "".join(f"{time_stamp}{line}\n" for line in rendered).encode(errors="replace")
 
 
 def prefixed(lines: bytes, prefix: bytes) -> bytes:

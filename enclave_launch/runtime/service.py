@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import resource
 import socket
 import sys
 import threading
@@ -88,7 +89,9 @@ async def run_launch_async(
     return await LaunchService(launch_file, arguments, gate=gate, options=options or RunOptions()).run()
 
 
-_running = threading.Lock()  # one at a time: launch files change the environment, which belongs to the process
+_running = (
+    threading.Lock()
+)  # one at a time: launch files change the environment, which belongs to the process
 
 
 class LaunchService:
@@ -111,6 +114,7 @@ class LaunchService:
         self._shutting_down = False
         self._interrupted = False
         self._failed = False
+        self._services: RosServices | None = None
         self._log: LaunchLog
         self._host: LiveHost
         self._context: LaunchContext
@@ -118,14 +122,17 @@ class LaunchService:
     async def run(self) -> int:
         """:raises RuntimeFailure: before anything was started."""
         if not _running.acquire(blocking=False):
-            raise RuntimeFailure("another launch is running in this process; run each in a process of its own")
+            raise RuntimeFailure(
+                "another launch is running in this process; run each in a process of its own"
+            )
         async with AsyncExitStack() as stack:
             stack.callback(_running.release)
             tree = ProcessTree()  # first: the warden starts up while we go on
             await stack.enter_async_context(tree)
-            services = self._ros_services()
-            if services is not None:
-                stack.callback(services.close)
+            _allow_many_descriptors()
+            self._services = self._ros_services()
+            if self._services is not None:
+                stack.callback(self._services.close)
             self._log = self._open_log(tree)
             stack.callback(self._log.close)
             stack.enter_context(captured_logging(self._log))
@@ -135,7 +142,7 @@ class LaunchService:
                 self._gate,
                 secrets=self._options.secrets,
                 fail=self._on_failure,
-                services=services,
+                services=self._services,
                 **self._options.host_options,
             )
             stack.push_async_callback(self._host.close)
@@ -146,8 +153,7 @@ class LaunchService:
         """Queue the ``Shutdown`` event, once; nothing new is started from here on."""
         if not self._shutting_down:
             self._context.emit_event_sync(Shutdown(reason=reason, due_to_sigint=due_to_sigint))
-        self._shutting_down = True
-        self._context._set_is_shutdown(True)
+        self._enter_shutdown()
 
     def on_signal(self, number: Signals) -> None:
         if number is not SIGINT:
@@ -193,8 +199,11 @@ class LaunchService:
         self._context._event_queue.wake = self._wake.set
         self._context.register_event_handler(OnIncludeLaunchDescription())
         self._context.register_event_handler(OnShutdown(on_shutdown=self._on_shutdown_event))
-        description = top_description(self._launch_file, self._arguments)
-        self._context.emit_event_sync(IncludeLaunchDescription(description))
+        self._context.emit_event_sync(IncludeLaunchDescription(self.description()))
+
+    def description(self) -> Any:
+        """What is launched: the file, as ``ros2 launch`` includes it."""
+        return top_description(self._launch_file, self._arguments)
 
     async def _turn(self) -> None:
         """Handle one event, or wait for something to happen. Raises ``_Over`` when there is nothing more."""
@@ -232,8 +241,13 @@ class LaunchService:
             waker.cancel()
 
     def _on_shutdown_event(self, event: Shutdown, context: LaunchContext) -> None:
+        self._enter_shutdown()
+
+    def _enter_shutdown(self) -> None:
         self._shutting_down = True
         self._context._set_is_shutdown(True)
+        if self._services is not None:
+            self._services.abandon()
 
     def _on_error(self, error: Exception) -> None:
         """As launch does, with the place in the launch file where evaluation knows it."""
@@ -286,6 +300,13 @@ class LaunchService:
 
     def _say(self, level: Level, message: str) -> None:
         self._log.log(level, "launch", message)
+
+
+def _allow_many_descriptors() -> None:
+    """Each process costs us three. The warden runs already: its children keep the limit we were given."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    if soft != hard:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
 class _Over(Exception):

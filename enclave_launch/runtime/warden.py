@@ -242,7 +242,8 @@ def become(
 def move_above(streams: list[int]) -> list[int]:
     """Descriptors 0 to 2 are about to be overwritten: copy any that sit there."""
     return [
-        fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3) if descriptor < 3 else descriptor for descriptor in streams
+        fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3) if descriptor < 3 else descriptor
+        for descriptor in streams
     ]
 
 

@@ -8,8 +8,12 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
-import stand_ins
+if TYPE_CHECKING:
+    from tests.ros2 import stand_ins
+else:
+    import stand_ins
 
 
 def main() -> int | str | None:
