@@ -87,10 +87,11 @@ class Answers:
 
 @dataclass(frozen=True)
 class Probe:
-    """One DDS implementation."""
+    """One DDS implementation. ``crowd``: how many talkers beside an honest one it authenticates promptly."""
 
     name: str
     command: tuple[str, ...]
+    crowd: int
 
     def try_endpoints(self, domain: int, participants: Iterable[Participant]) -> Answers:
         """Create everything, talk to nobody."""

@@ -173,12 +173,15 @@ LAUNCHES = {
 }
 
 
-def test_launch_files_become_exactly_their_permissions(dds: Probe, domain_id: int, tmp_path: Path) -> None:
+@pytest.mark.parametrize("distro", ["humble", "rolling"])
+def test_launch_files_become_exactly_their_permissions(
+    dds: Probe, domain_id: int, tmp_path: Path, distro: str
+) -> None:
     """The whole flow, several launches into one keystore."""
     security = SecurityOptions(keystore=ProvisionOptions(domains=Domains.single(domain_id), durable=False))
     for name in LAUNCHES:
         launch_file = LAUNCH_FILES / f"{name}.launch.xml"
-        plan = resolve(launch_file, options=ResolveOptions(prefixes=(DEMO_WS,), distro="humble"))
+        plan = resolve(launch_file, options=ResolveOptions(prefixes=(DEMO_WS,), distro=distro))
         provision_launch(plan, tmp_path / "ks", options=security)
     together = {enclave: names for expected in LAUNCHES.values() for enclave, names in expected.items()}
     check(dds, domain_id, tmp_path / "ks", together)
