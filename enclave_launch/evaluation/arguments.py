@@ -75,8 +75,9 @@ def _known(names: list[str | None]) -> list[str]:
 
 
 def _summarize(description: LaunchDescription) -> Summary:
-    if getattr(description, "argument_summary", None) is not None:
-        return description.argument_summary
+    known: Summary | None = getattr(description, "argument_summary", None)
+    if known is not None:
+        return known
     summary = Summary()
     for entity, conditional in _walk(description.describe_sub_entities(), False):
         if isinstance(entity, DeclareLaunchArgument):

@@ -12,13 +12,12 @@ from enclave_launch.description.launch.launch_description import LaunchDescripti
 if TYPE_CHECKING:
     from enclave_launch.description.launch.event import Event
     from enclave_launch.runtime.service import LaunchService as Runtime
-    from enclave_launch.runtime.service import RunOptions
 
 
 class LaunchService:
     """Include descriptions, emit events, then run: what was asked before is done first, in order.
 
-    One run per object. ``shutdown`` works while ``run_async`` does; ``run`` takes the signals instead.
+    One run per object. ``shutdown`` works while ``run_async`` does.
     """
 
     def __init__(
@@ -43,32 +42,53 @@ class LaunchService:
         self.__description.add_action(EmitEvent(event=event))
 
     def run(self, *, shutdown_when_idle: bool = True) -> int:
-        """Block until all is over. Gives 0, or 1 when something failed."""
-        from enclave_launch.runtime.service import run_launch
+        """Block until all is over; SIGINT shuts down in order. Gives 0, or 1 when something failed."""
+        import asyncio
 
-        return run_launch(self.__description, options=self.__options(shutdown_when_idle))
+        return asyncio.run(self.__run(shutdown_when_idle, handle_interrupt=True))
 
     async def run_async(self, *, shutdown_when_idle: bool = True) -> int:
         """As ``run``, inside a running loop, and without touching signals."""
-        from enclave_launch.runtime.service import LaunchService as Runtime
-
-        self.__running = Runtime(self.__description, gate=None, options=self.__options(shutdown_when_idle))
-        try:
-            return await self.__running.run()
-        finally:
-            self.__running = None
+        return await self.__run(shutdown_when_idle, handle_interrupt=False)
 
     def shutdown(self, force_sync: bool = False) -> None:
         """End the run in progress, in order; nothing happens without one."""
         if self.__running is not None:
             self.__running.shut_down("LaunchService.shutdown() called")
 
-    def __options(self, shutdown_when_idle: bool) -> RunOptions:
+    async def __run(self, shutdown_when_idle: bool, *, handle_interrupt: bool) -> int:
+        from enclave_launch.runtime.service import LaunchService as Runtime
         from enclave_launch.runtime.service import RunOptions
 
-        return RunOptions(
-            noninteractive=self.__noninteractive,
-            debug=self.__debug,
-            shutdown_when_idle=shutdown_when_idle,
-            arguments=self.__argv,
+        description = self.__description
+
+        class InMemory(Runtime):
+            """The runtime, launching a description instead of a file."""
+
+            def description(self) -> LaunchDescription:
+                return description
+
+        options = RunOptions(
+            noninteractive=self.__noninteractive, debug=self.__debug, shutdown_when_idle=shutdown_when_idle
         )
+        self.__running = InMemory("<script>", (), gate=None, options=options)
+        try:
+            if not handle_interrupt:
+                return await self.__running.run()
+            return await self.__run_with_signals(self.__running)
+        finally:
+            self.__running = None
+
+    @staticmethod
+    async def __run_with_signals(service: Runtime) -> int:
+        import asyncio
+        from signal import SIGINT, SIGTERM
+
+        loop = asyncio.get_running_loop()
+        for number in (SIGINT, SIGTERM):
+            loop.add_signal_handler(number, service.on_signal, number)
+        try:
+            return await service.run()
+        finally:
+            for number in (SIGINT, SIGTERM):
+                loop.remove_signal_handler(number)
