@@ -26,7 +26,8 @@ from enclave_launch.process import (
     EnclaveRequest,
     ResolvedProcess,
 )
-from keystore.enclave_name import InvalidEnclaveName, validate_enclave_name
+from keystore.enclave_name import validate_enclave_name
+from keystore.errors import InvalidEnclaveName
 
 
 class EnclaveScope(str, Enum):

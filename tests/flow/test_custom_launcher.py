@@ -35,7 +35,7 @@ def own_log_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_the_custom_launcher_of_twenty_lines_runs_a_secured_talker_and_listener(tmp_path: Path) -> None:
     pytest.importorskip("cyclonedds") if os.environ.get("CI") != "true" else None
     launcher = DEMO.parent / "custom_launcher.py"
-    command = [sys.executable, launcher, TALKER_LISTENER, tmp_path / "ks", "--prefix", DEMO]
+    command = [sys.executable, str(launcher), str(TALKER_LISTENER), f"{tmp_path}/ks", "--prefix", str(DEMO)]
     run = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False, cwd=tmp_path)
     assert run.returncode == 0, run.stdout + run.stderr
     assert "talker-1 runs in /" in run.stdout
