@@ -57,8 +57,10 @@ class Hole:
 Piece = str | Input | NodePart | Hole
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Text:
+    """Made by ``make_text`` only, so that equal texts are one object and compare at once."""
+
     pieces: tuple[Piece, ...]
 
     @property
@@ -67,6 +69,21 @@ class Text:
 
 
 TextAtom = str | Text
+
+_texts: dict[tuple[Piece, ...], Text] = {}
+
+
+def make_text(pieces: tuple[Piece, ...]) -> Text:
+    """The one ``Text`` of these pieces (which are not empty, and not a single literal)."""
+    text = _texts.get(pieces)
+    if text is None:
+        text = _texts[pieces] = Text(pieces)
+    return text
+
+
+def forget_texts() -> None:
+    """Let go of all texts; between analyses, since they hold on to what owns their inputs."""
+    _texts.clear()
 
 
 def text_of(pieces: Iterable[Piece]) -> TextAtom:
@@ -86,7 +103,7 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
         return merged[0]
     if len(merged) > MAX_PARTS:
         merged = [merged[0], Hole("a very long text"), merged[-1]]
-    return Text(tuple(merged))
+    return make_text(tuple(merged))
 
 
 def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
@@ -162,5 +179,5 @@ def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | No
 
 def _edited_input(piece: Piece, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
     if isinstance(piece, Input) and len(piece.edits) < 6:
-        return Text((Input(piece.name, piece.owner, piece.item, (*piece.edits, (method, arguments))),))
+        return make_text((Input(piece.name, piece.owner, piece.item, (*piece.edits, (method, arguments))),))
     return None

@@ -23,8 +23,9 @@ Value: TypeAlias = tuple[object, ...]
 Cells: TypeAlias = dict[object, Value]
 
 # More different strings than this in one value become a pattern; more objects become unknown.
-MAX_STRINGS = 48
-MAX_ATOMS = 96
+MAX_STRINGS = 32
+MAX_ATOMS = 64
+TOO_MANY = "too many possible values"
 
 NONE: Value = (None,)
 BOTTOM: Value = ()
@@ -253,13 +254,24 @@ class NativeMethod:
     name: str
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class ForeignMethod:
     """Method ``name`` that ``receiver`` inherits from the foreign class ``path``."""
 
     path: str
     receiver: object
     name: str
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, ForeignMethod)
+            and other.receiver is self.receiver
+            and other.name == self.name
+            and other.path == self.path
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.path, id(self.receiver), self.name))
 
 
 @dataclass(frozen=True, slots=True)
@@ -331,7 +343,7 @@ def _limited(value: Value) -> Value:
     if len(texts) > MAX_STRINGS:
         return (*others, widened_texts(texts))
     if len(value) > MAX_ATOMS:
-        return unknown("too many possible values")
+        return unknown(TOO_MANY)
     return value
 
 
@@ -356,6 +368,8 @@ def widen(old: Value, new: Value, texts_too: bool) -> Value:
     joined = join(old, new)
     if joined is old:
         return old
+    if isinstance(joined[0], Items) and old and isinstance(old[0], Items):
+        return (_widen_items(old[0], joined[0], texts_too),)
     kept: list[object] = []
     texts: list[str | Text] = []
     for atom in joined:
@@ -367,9 +381,14 @@ def widen(old: Value, new: Value, texts_too: bool) -> Value:
             kept.append(atom)
     if texts_too and len(texts) > 1 and any(not contains(old, text) for text in texts):
         return (*kept, widened_texts(texts))
-    if texts_too and len(kept) == 1 and isinstance(kept[0], Items) and kept[0].exact is not None:
-        return (Items(None, kept[0].any_element()),)
     return joined
+
+
+def _widen_items(old: Items, new: Items, texts_too: bool) -> Items:
+    """Elements widen one by one while the length stays; later, and when it changes, all together."""
+    if old.exact is not None and new.exact is not None and not texts_too:
+        return Items(tuple(widen(a, b, texts_too) for a, b in zip(old.exact, new.exact, strict=True)))
+    return Items(None, widen(old.any_element(), new.any_element(), texts_too))
 
 
 def without_unknown(value: Value) -> Value:

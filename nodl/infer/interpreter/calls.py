@@ -13,6 +13,7 @@ from nodl.infer.values import (
     BOTTOM,
     NONE,
     OTHER,
+    TOO_MANY,
     BoundMethod,
     ClassMethod,
     ClassValue,
@@ -223,6 +224,8 @@ def _call_class_method(run: Run, method: ClassMethod, call: Call) -> Value:
 
 
 def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
+    if atom.why == TOO_MANY:
+        run.gap(call.node, call.frame, "one of too many functions is called here")
     run.escape(call.args)
     return (atom,)
 

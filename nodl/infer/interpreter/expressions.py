@@ -12,7 +12,7 @@ from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.iterate import elements, values_of
 from nodl.infer.interpreter.operators import binary, f_string
 from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
-from nodl.infer.text import Input, Text
+from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
     ANY,
     BOOLEAN,
@@ -213,7 +213,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         piece = atom.pieces[0]
         index = key[0] if len(key) == 1 else None
         if len(atom.pieces) == 1 and isinstance(piece, Input) and piece.item is None and type(index) is int:
-            return (Text((Input(piece.name, piece.owner, index, piece.edits),)),)
+            return (make_text((Input(piece.name, piece.owner, index, piece.edits),)),)
         return unknown("a part of a text that is not known")
     if isinstance(atom, Instance):
         getter = run.attribute((atom,), "__getitem__", node, frame)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter.run import Arguments, Frame, Run
-from nodl.infer.text import Input, Text
+from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -67,7 +67,7 @@ def input_items(text: Text) -> Value:
     """Each element of a parameter that holds a list."""
     piece = text.pieces[0]
     if len(text.pieces) == 1 and isinstance(piece, Input) and piece.item is None and not piece.edits:
-        return (Text((Input(piece.name, piece.owner, "each"),)),)
+        return (make_text((Input(piece.name, piece.owner, "each"),)),)
     return unknown("the characters of a text that is not known")
 
 

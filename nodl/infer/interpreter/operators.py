@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Sequences
 
 from nodl.infer.interpreter.run import Arguments, Frame, Run
-from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations
+from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -112,7 +112,7 @@ def _text_side(value: Value) -> list[TextAtom]:
         if isinstance(atom, str | Text):
             found.append(atom)
         elif isinstance(atom, Unknown):
-            found.append(Text((Hole(atom.why),)))
+            found.append(make_text((Hole(atom.why),)))
     return found or as_texts(value)
 
 
@@ -139,7 +139,7 @@ def as_texts(value: Value, convert: bool = True) -> list[TextAtom]:
     """The texts that formatting ``value`` may give."""
     texts = list(dict.fromkeys(_text_of_atom(atom) for atom in value))
     if not texts:
-        return [Text((Hole("a value that is never set"),))]
+        return [make_text((Hole("a value that is never set"),))]
     return texts if len(texts) <= 32 else [common_text(texts, "too many possible values")]
 
 
@@ -149,14 +149,14 @@ def _text_of_atom(atom: object) -> TextAtom:
     if isinstance(atom, int | float | type(None)):
         return str(atom)
     if isinstance(atom, Unknown):
-        return Text((Hole(atom.why),))
+        return make_text((Hole(atom.why),))
     if isinstance(atom, External):
-        return Text((Hole(f"{atom.path} of a library"),))
+        return make_text((Hole(f"{atom.path} of a library"),))
     if isinstance(atom, Instance) and "_value_" in atom.cells:
         value = sole(atom.cells["_value_"])
         if isinstance(value, str):
             return value
-    return Text((Hole("the text of an object"),))
+    return make_text((Hole("the text of an object"),))
 
 
 def text_value(texts: Iterable[TextAtom]) -> Value:
@@ -185,7 +185,7 @@ def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
 def _formatted(run: Run, part: ast.FormattedValue, frame: Frame) -> list[TextAtom]:
     value = run.evaluate(part.value, frame)
     if part.conversion not in (-1, 115):  # !r and !a quote their argument
-        return [Text((Hole("text made with !r"),))]
+        return [make_text((Hole("text made with !r"),))]
     if part.format_spec is None:
         return as_texts(value)
     spec = sole(run.evaluate(part.format_spec, frame))
@@ -204,8 +204,8 @@ def formatted(value: Value, spec: str | None) -> list[TextAtom]:
                 continue
             except (ValueError, TypeError, OverflowError):
                 continue  # an error at run time, no text
-        texts.append(Text((Hole("formatted text"),)))
-    return texts or [Text((Hole("formatted text"),))]
+        texts.append(make_text((Hole("formatted text"),)))
+    return texts or [make_text((Hole("formatted text"),))]
 
 
 def percent(left: Value, right: Value) -> Value:
@@ -215,7 +215,7 @@ def percent(left: Value, right: Value) -> Value:
         if isinstance(atom, str):
             results.extend(_percent_one(atom, right))
         elif isinstance(atom, Text):
-            results.append(Text((Hole("a format that is not known"),)))
+            results.append(make_text((Hole("a format that is not known"),)))
     return text_value(results) or ANY
 
 
@@ -258,8 +258,8 @@ def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
                 continue
             except (TypeError, ValueError, OverflowError):
                 continue
-        texts.append(Text((Hole("formatted text"),)))
-    return texts or [Text((Hole("formatted text"),))]
+        texts.append(make_text((Hole("formatted text"),)))
+    return texts or [make_text((Hole("formatted text"),))]
 
 
 def _mapping_item(atom: object, key: str) -> Value:
@@ -269,13 +269,13 @@ def _mapping_item(atom: object, key: str) -> Value:
 def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
     """``template.format(...)``."""
     if not isinstance(template, str):
-        return [Text((Hole("a format that is not known"),))]
+        return [make_text((Hole("a format that is not known"),))]
     operands: list[Sequences[TextAtom]] = []
     automatic = 0
     try:
         fields = list(string.Formatter().parse(template))
     except ValueError:
-        return [Text((Hole("an invalid format"),))]
+        return [make_text((Hole("an invalid format"),))]
     for literal, name, spec, conversion in fields:
         operands.append([literal])
         if name is None:
@@ -286,7 +286,7 @@ def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
         value = _format_argument(name, args)
         operands.append(
             formatted(value, spec or "") if not conversion and "{" not in (spec or "")
-            else [Text((Hole("formatted text"),))]
+            else [make_text((Hole("formatted text"),))]
         )
     return concatenations(operands)
 
@@ -301,7 +301,7 @@ def joined(separators: Value, items: Items) -> list[TextAtom]:
     """``separator.join(items)``."""
     separator_texts = [atom for atom in separators if isinstance(atom, str | Text)]
     if items.exact is None or len(items.exact) > 32 or not separator_texts:
-        return [Text((Hole("joined texts"),))]
+        return [make_text((Hole("joined texts"),))]
     results: list[TextAtom] = []
     for separator in separator_texts:
         operands: list[Sequences[TextAtom]] = []

@@ -37,6 +37,7 @@ from nodl.source_ref import SourceRef
 
 MAX_STEPS = 60_000  # statements analysed in one run, and cells touched to join branches over 32
 MAX_DEPTH = 48  # analysed calls inside calls
+MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
 
 class BudgetExceeded(Exception):
@@ -215,7 +216,11 @@ class Run:
     def call(self, callee: Value, args: Arguments, node: ast.AST, frame: Frame) -> Value:
         """Call every callable that ``callee`` may be; the results are joined."""
         call = Call(args, node, frame)
-        if len(callee) == 1:
+        if len(callee) > MAX_RECEIVERS:
+            callee, merged = self._merge_receivers(callee, call)
+        else:
+            merged = BOTTOM
+        if len(callee) == 1 and not merged:
             return self.call_atom(callee[0], call)
         results: list[Value] = []
 
@@ -227,10 +232,34 @@ class Run:
             return run
 
         self.state.branches([alternative(atom) for atom in callee if atom is not None])
-        joined = BOTTOM
+        joined = merged
         for result in results:
             joined = join(joined, result)
         return joined or ANY
+
+    def _merge_receivers(self, callee: Value, call: Call) -> tuple[Value, Value]:
+        """One call for a method of many objects, ``self`` being any of them; returns what is left to call."""
+        receivers: dict[FunctionValue, list[object]] = {}
+        for atom in callee:
+            if isinstance(atom, BoundMethod):
+                receivers.setdefault(atom.function, []).append(atom.receiver)
+        merged = BOTTOM
+        done = [function for function, objects in receivers.items() if len(objects) > 1]
+        for function in done:
+            shifted = Call(call.args.preceded(tuple(receivers[function])), call.node, call.frame)
+            merged = join(merged, self._maybe_called(function, shifted))
+        left = tuple(a for a in callee if not (isinstance(a, BoundMethod) and a.function in done))
+        return left, merged
+
+    def _maybe_called(self, function: FunctionValue, call: Call) -> Value:
+        results: list[Value] = []
+
+        def run() -> bool:
+            results.append(self.call_atom(function, call))
+            return True
+
+        self.state.maybe(run)
+        return results[0]
 
     def call_atom(self, atom: object, call: Call) -> Value:
         handler = self.tables.callables.get(type(atom))

@@ -8,7 +8,7 @@ from nodl.infer.interpreter.iterate import elements, keys_of, values_of
 from nodl.infer.interpreter.loops import store_item
 from nodl.infer.interpreter.operators import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.text import Hole, Text, TextAtom, edited
+from nodl.infer.text import Hole, Text, TextAtom, edited, make_text
 from nodl.infer.values import (
     ANY,
     BOOLEAN,
@@ -68,7 +68,7 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
     symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
     if symbolic is not None:
         return (symbolic,)
-    hole = Text((Hole(f"the result of str.{name}()"),))
+    hole = make_text((Hole(f"the result of str.{name}()"),))
     return text_value([hole])
 
 

@@ -19,7 +19,7 @@ from nodl.infer.models.signatures import (
     EndpointCall,
     Helper,
 )
-from nodl.infer.text import Input, NodePart, Text, concatenate
+from nodl.infer.text import Input, NodePart, Text, concatenate, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -202,7 +202,7 @@ def _callback_method(name: str) -> NodeMethod:
 
 
 def _own_name(what: str) -> NodeMethod:
-    return lambda run, record, call: (Text((NodePart(what),)),)
+    return lambda run, record, call: (make_text((NodePart(what),)),)
 
 
 def _resolved_name(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -240,7 +240,7 @@ def _default_value(default: Value | None) -> Value:
 def _inputs(record: NodeRecord, names: list[str]) -> Value:
     if not names:
         return unknown("a parameter whose name is not known")
-    return tuple(Text((Input(name, record),)) for name in names)
+    return tuple(make_text((Input(name, record),)) for name in names)
 
 
 def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:

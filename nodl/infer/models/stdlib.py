@@ -9,7 +9,7 @@ from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import as_texts, text_value
 from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.models import builtin
-from nodl.infer.text import Input, Text, concatenations
+from nodl.infer.text import Input, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -60,7 +60,7 @@ def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     if isinstance(dest, str):
         owner = parser.cells.get("parser", (parser,))[0]
         assert isinstance(owner, Instance)
-        run.state.store(owner, "dest " + dest, (Text((Input(name, run.options),)),))
+        run.state.store(owner, "dest " + dest, (make_text((Input(name, run.options),)),))
     return ANY
 
 
@@ -103,7 +103,7 @@ def _environment(run: Run, call: Call) -> Value:
     result: Value = BOTTOM
     for name in constant_strings(call.args.at(0) or ANY):
         run.options.declare("$" + name, tuple(atom for atom in default if atom is not None))
-        result = join(result, (Text((Input("$" + name, run.options),)),))
+        result = join(result, (make_text((Input("$" + name, run.options),)),))
     return result or unknown("an environment variable")
 
 
