@@ -27,7 +27,9 @@ from enclave_launch.security_environment import OVERRIDE
 ATTRIBUTE = "_enclave_launch_enclave"
 WRAPPED = "_enclave_launch_wrapped"
 # Renamed after humble; the old name stays as an alias.
-PushNamespace: Any = getattr(launch_ros.actions, "PushROSNamespace", None) or launch_ros.actions.PushRosNamespace
+PushNamespace: Any = (
+    getattr(launch_ros.actions, "PushROSNamespace", None) or launch_ros.actions.PushRosNamespace
+)
 
 
 class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
@@ -149,7 +151,9 @@ def _pushing_enclave_scope(execute: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(execute)
     def wrapped(self: Any, context: Any) -> Any:
         enclave = enclave_attribute(self, context)
-        push_enclave_scope(context.launch_configurations, enclave, perform_substitutions(context, self.namespace))
+        push_enclave_scope(
+            context.launch_configurations, enclave, perform_substitutions(context, self.namespace)
+        )
         return execute(self, context)
 
     return wrapped

@@ -50,7 +50,9 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
         remaps=tuple(RemapRule(source, target) for source, target in action.expanded_remapping_rules or ()),
         parameters=resolve_parameters(_fqn_tokens(fqn), arguments.parameters),
         environment={},
-        enclave=EnclaveRequest(enclave_attribute(action, context), scope_in_force(context), arguments.enclave),
+        enclave=EnclaveRequest(
+            enclave_attribute(action, context), scope_in_force(context), arguments.enclave
+        ),
         location=location_in(context, type(action).__name__),
     )
 
@@ -114,7 +116,9 @@ def next_process_name(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[
 
 def location_in(context: Any, element: str) -> SourceLocation:
     """Real launch keeps the file, no lines."""
-    return SourceLocation(context.get_locals_as_dict().get("current_launch_file_path", "<program>"), 0, element)
+    return SourceLocation(
+        context.get_locals_as_dict().get("current_launch_file_path", "<program>"), 0, element
+    )
 
 
 def _kind(action: Any) -> ProcessKind:
@@ -124,7 +128,9 @@ def _kind(action: Any) -> ProcessKind:
 
 
 def _text(context: Any, value: Any) -> str | None:
-    return None if value is None else perform_substitutions(context, normalize_to_list_of_substitutions(value))
+    return (
+        None if value is None else perform_substitutions(context, normalize_to_list_of_substitutions(value))
+    )
 
 
 def _fqn_tokens(fqn: str) -> list[str | None]:

@@ -22,7 +22,7 @@ from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Pyth
 from enclave_launch.ros2.secured import check_installed, enclosed
 from enclave_launch.ros2.session import EnclaveSession, PlannedDoor
 from enclave_launch.runtime.gate import PlannedGate
-from enclave_launch.verb.options import add_policy_options, add_security_options
+from enclave_launch.verb.options import add_policy_options, add_security_options, build_parser
 
 SECURE = "secure_enclaves"
 
@@ -35,9 +35,8 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         for action in group._group_actions:
             if "--secure" in action.option_strings:
                 action.dest = SECURE
-        # What ros2launch_security reads: not asked for. And what our own command line has beyond ros2's.
+        # What ros2launch_security reads: not asked for.
         parser.set_defaults(**{SECURE: False, "secure": None, "create_keystore": True})
-        parser.set_defaults(distro=None, allow_missing_packages=False, no_python=False)
 
     def prelaunch(self, launch_description: Any, args: argparse.Namespace) -> tuple[Any, ...]:
         """:raises RuntimeError: what ros2 shows as a message, without traceback."""
@@ -59,8 +58,9 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
         raise UsageError("--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE")
     check_installed()
     path, arguments = target_of(args)
-    plan = resolve(path, arguments, options=resolve_options(args))
-    launch = provision(plan, args.keystore, options=security_options(args))
+    options = _with_our_defaults(args)
+    plan = resolve(path, arguments, options=resolve_options(options))
+    launch = provision(plan, args.keystore, options=security_options(options))
     _say(*plan.warnings, *launch.report.warnings, *expiry_notices(str(args.keystore), plan, args.warn_expiry))
     gate = PlannedGate(
         plan.evaluation.processes,
@@ -70,6 +70,11 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
         say_late=_say,
     )
     return enclosed(description, EnclaveSession(PlannedDoor(gate)), launch)
+
+
+def _with_our_defaults(args: argparse.Namespace) -> argparse.Namespace:
+    """Options of ``secure-launch`` that ``ros2 launch`` does not have, or has in its own way, at their defaults."""
+    return argparse.Namespace(**{**vars(build_parser().parse_args([])), **vars(args)})
 
 
 def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...]]:
@@ -82,7 +87,9 @@ def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...
         path = args.package_name
         words[:0] = [args.launch_file_name] if args.launch_file_name is not None else []
     else:
-        path = get_share_file_path_from_package(package_name=args.package_name, file_name=args.launch_file_name)
+        path = get_share_file_path_from_package(
+            package_name=args.package_name, file_name=args.launch_file_name
+        )
     return path, tuple(parse_launch_arguments(words))
 
 

@@ -54,7 +54,9 @@ def secured(
     return enclosed(description, EnclaveSession(OpenDoor(launch)), launch)
 
 
-def enclosed(description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch) -> LaunchDescription:
+def enclosed(
+    description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch
+) -> LaunchDescription:
     """``description`` behind the actions that begin ``session`` and point every process at the keystore."""
     actions: list[Any] = [
         SetEnvironmentVariable(name, value) for name, value in security_variables(launch.settings).items()

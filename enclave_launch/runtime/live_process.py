@@ -70,10 +70,19 @@ class LiveProcess:
             self,
             self._say,
         )
-        for handler in self._handlers():
+        self._registered = self._handlers()
+        for handler in self._registered:
             context.register_event_handler(handler)
 
     async def run(self) -> Outcome:
+        """To its last exit; afterwards no handler of it is left, however often a launch starts something new."""
+        try:
+            return await self._run()
+        finally:
+            for handler in self._registered:
+                self._context.unregister_event_handler(handler)
+
+    async def _run(self) -> Outcome:
         if self._action.log_cmd:
             command = " ".join(word for word in self.process.cmd if word.strip())
             self._say("INFO", f"process details: cmd='{command}', cwd='{self.process.cwd}', custom_env?=True")

@@ -314,6 +314,24 @@ def test_two_hundred_processes_in_one_launch(tmp_path: Path) -> None:
     )
 
 
+def test_two_hundred_respawns_leak_neither_descriptors_nor_memory_nor_handlers(tmp_path: Path) -> None:
+    prelude = """
+        import os
+        def measure(context):
+            pages = int(open("/proc/self/statm").read().split()[1])
+            handlers = len(context._event_handlers.all())
+            print("MEASURED", len(os.listdir("/proc/self/fd")), handlers, pages * 4, flush=True)
+    """
+    action = 'sh("true", respawn=True, respawn_max_retries=200, on_exit=[OpaqueFunction(function=measure)])'
+    status, lines = finished(tmp_path, action, prelude=prelude)
+    measured = [[int(word) for word in line.split()[1:]] for line in lines if line.startswith("MEASURED")]
+    assert status == 0
+    assert len(measured) == 201
+    early, late = measured[20], measured[180]
+    assert early[:2] == late[:2]
+    assert late[2] - early[2] < 2048, "kilobytes in 160 processes"
+
+
 def test_fifty_megabytes_to_the_screen_and_the_log_without_loss(tmp_path: Path) -> None:
     launch = Launch(tmp_path, "sh('seq 1 6500000', output='both')")
     assert launch.wait(30) == 0
