@@ -131,6 +131,9 @@ class Items:
     def __hash__(self) -> int:
         return hash((self.exact, self.rest))
 
+    def __repr__(self) -> str:
+        return f"Items({self.exact}, {self.rest})"
+
     def any_element(self) -> Value:
         return self.rest if self.exact is None else join_all(self.exact)
 
@@ -379,6 +382,9 @@ def widen(old: Value, new: Value, texts_too: bool) -> Value:
             texts.append(atom)
         else:
             kept.append(atom)
+    if texts_too and any(isinstance(atom, Sequence) and not contains(old, atom) for atom in kept):
+        kept = [atom for atom in kept if not isinstance(atom, Sequence)]
+        return join((*kept, *texts), unknown(TOO_MANY))  # containers in containers, without end
     if texts_too and len(texts) > 1 and any(not contains(old, text) for text in texts):
         return (*kept, widened_texts(texts))
     return joined

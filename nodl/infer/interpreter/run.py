@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import itertools
+import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -36,6 +37,7 @@ from nodl.infer.values import (
 from nodl.source_ref import SourceRef
 
 MAX_STEPS = 60_000  # statements analysed in one run, and cells touched to join branches over 32
+MAX_SECONDS = 4  # of processor time, a last resort: which statement it hits depends on the machine
 MAX_DEPTH = 48  # analysed calls inside calls
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
@@ -161,6 +163,7 @@ class Run:
         self.unstable = False  # a recursion learned something new since its outermost call asked
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
+        self._deadline = time.process_time() + MAX_SECONDS
         self.context = 0
         self._contexts: dict[tuple[int, object], int] = {}
         self._context_ids = itertools.count(1)
@@ -179,6 +182,8 @@ class Run:
         self.steps += len(body)
         if self.steps + (self.state.work >> 5) > MAX_STEPS:
             raise BudgetExceeded(f"more than {MAX_STEPS} statements to analyse")
+        if time.process_time() > self._deadline:
+            raise BudgetExceeded(f"it takes more than {MAX_SECONDS} s")
         statements = self._statements
         for statement in body:
             handler = statements.get(type(statement))
