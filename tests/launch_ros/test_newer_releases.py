@@ -44,3 +44,13 @@ def generate_launch_description():
     return LaunchDescription([ExecuteProcess(cmd=[FindPackageShare("pk") / "launch" / "x.py"])])
 """
     assert launched(text, syntax="py").processes[0].cmd == (f"{prefix}/share/pk/launch/x.py",)
+
+
+def test_text_parameters_are_quoted(launched: Evaluate) -> None:
+    text = """<node pkg="pk" exec="e"><param name="s" value="1e3" type="str"/><param name="n" value="[a, b]"/>
+    <param name="i" value="1"/></node>"""
+    (old,) = launched(text, distro="jazzy").processes
+    (new,) = launched(text, distro="kilted").processes
+    assert (old.parameters["s"], new.parameters["s"]) == (1000.0, "1e3")
+    assert (new.parameters["n"], new.parameters["i"]) == (("a", "b"), 1)
+    assert "s: '1e3'" in next(iter(new.parameter_files.values()))

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch_ros.parameter_descriptions import Parameter
 from enclave_launch.description.launch_ros.utilities import yaml_text
 from enclave_launch.description.launch_ros.utilities.evaluate_parameters import evaluate_parameters
+from enclave_launch.evaluation.distro import Feature
 from enclave_launch.evaluation.rcl_parameters import Section, as_rcl_reads, resolve_parameters
 from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import ParameterValue
@@ -43,9 +44,15 @@ class NodeParameters:
                 context.host.warn(f"Parameter file path is not a file: {path}")
                 return ()
             return ("--params-file", path)
-        path = context.host.write_parameter_file(yaml_text.parameter_file(section, item))
-        self.__written[path] = {section: {name: as_rcl_reads(value) for name, value in item.items()}}
-        return ("--params-file", path)
+        return ("--params-file", self.__write_file(context, section, item))
+
+    def __write_file(self, context: LaunchContext, section: str, values: Mapping[str, Any]) -> str:
+        quoted = context.host.release.has(Feature.QUOTED_TEXT_PARAMETERS)
+        write = yaml_text.quoted_parameter_file if quoted else yaml_text.parameter_file
+        path = context.host.write_parameter_file(write(section, values))
+        read = _as_written if quoted else as_rcl_reads
+        self.__written[path] = {section: {name: read(value) for name, value in values.items()}}
+        return path
 
     def resolve(
         self, context: LaunchContext, name_tokens: Sequence[str | None], words: Sequence[str]
@@ -56,6 +63,10 @@ class NodeParameters:
     def written_files(self, context: LaunchContext) -> dict[str, str]:
         """Path to text of the files that were generated for this node."""
         return {path: context.host.parameter_file(path) or "" for path in self.__written}
+
+
+def _as_written(value: Any) -> ParameterValue:
+    return tuple(value) if isinstance(value, list) else value  # type: ignore[no-any-return]
 
 
 def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:

@@ -47,6 +47,28 @@ def dump(value: Any) -> str:
     return str(yaml.dump(value, default_flow_style=False))
 
 
+def quoted_parameter_file(section: str, parameters: Mapping[str, Any]) -> str:
+    """As ``parameter_file``, but every text value is in quotes, so that rcl cannot take it for a number."""
+    import yaml
+
+    class Dumper(yaml.Dumper):
+        pass
+
+    class Quoted(str):
+        pass
+
+    def quoted(value: Any) -> Any:
+        if isinstance(value, (list, tuple)):
+            return type(value)(quoted(item) for item in value)
+        return Quoted(value) if isinstance(value, str) else value
+
+    Dumper.add_representer(
+        Quoted, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style="'")
+    )
+    values = {name: quoted(value) for name, value in parameters.items()}
+    return str(yaml.dump({section: {"ros__parameters": values}}, Dumper=Dumper, default_flow_style=False))
+
+
 def parameter_file(section: str, parameters: Mapping[str, Any]) -> str:
     """The parameter file launch writes for one dict: ``section`` is a node's full name or ``/**``."""
     if not parameters:
