@@ -1,0 +1,140 @@
+"""The parts: environment stack, handler table, virtual clock, table of releases."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from enclave_launch.description.launch.event import Event
+from enclave_launch.description.launch.event_handler import EventHandler
+from enclave_launch.evaluation.distro import Distro, Feature, choose_release, release_of
+from enclave_launch.evaluation.environment import Environment, environment_untouched
+from enclave_launch.evaluation.events import HandlerTable, chain
+from enclave_launch.evaluation.virtual_loop import VirtualLoop
+
+NAMES = st.text("ABC", min_size=1, max_size=2).map(lambda name: f"ENCLAVE_LAUNCH_TEST_{name}")
+
+
+@given(st.lists(st.tuples(NAMES, st.none() | st.text("xyz", max_size=3)), max_size=12))
+def test_pop_restores_what_push_saw(changes: list[tuple[str, str | None]]) -> None:
+    with environment_untouched():
+        environment = Environment()
+        before = dict(os.environ)
+        environment.push()
+        for name, value in changes:
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value
+        assert environment.snapshot() == dict(os.environ)
+        environment.pop()
+        assert dict(os.environ) == before
+
+
+def test_snapshots_are_shared_only_while_nothing_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    environment = Environment()
+    first = environment.snapshot()
+    assert environment.snapshot() is first
+    monkeypatch.setenv("ENCLAVE_LAUNCH_TEST", "1")
+    assert environment.snapshot()["ENCLAVE_LAUNCH_TEST"] == "1"
+    assert environment.changes() == {"ENCLAVE_LAUNCH_TEST": "1"}
+
+
+def test_popping_an_empty_stack() -> None:
+    with pytest.raises(RuntimeError, match="environment stack unexpectedly empty"):
+        Environment().pop()
+
+
+def handler() -> EventHandler:
+    return EventHandler(matcher=lambda event: True)
+
+
+def test_the_newest_handler_is_first_and_an_appended_one_last() -> None:
+    table = HandlerTable()
+    old, new, last = handler(), handler(), handler()
+    table.register(old)
+    table.register(last, append=True)
+    table.register(new)
+    assert list(table.matching(Event())) == [new, old, last]
+    assert table.all() == [last, old, new]
+
+
+def test_a_registration_is_taken_back_once() -> None:
+    table, one = HandlerTable(), handler()
+    table.register(one)
+    table.register(one)
+    table.unregister(one)
+    assert table.all() == [one]
+    table.unregister(one)
+    with pytest.raises(ValueError, match="not in deque"):
+        table.unregister(one)
+
+
+def test_awaits_counts_handlers_of_any_event() -> None:
+    table, one = HandlerTable(), handler()
+    assert not table.awaits("launch.events.ExecutionComplete")
+    table.register(one)
+    saved = table.save()
+    assert table.awaits("launch.events.ExecutionComplete")
+    table.unregister(one)
+    assert not table.awaits("launch.events.ExecutionComplete")
+    table.restore(saved)
+    assert table.awaits("launch.events.ExecutionComplete")
+
+
+@pytest.mark.parametrize(
+    ("outer", "inner", "whole"),
+    [(None, "timer 2", "timer 2"), ("a", None, "a"), (None, None, None), ("a", "b", "a, then b")],
+)
+def test_marks_chain(outer: str | None, inner: str | None, whole: str | None) -> None:
+    assert chain(outer, inner) == whole
+
+
+@given(st.lists(st.floats(0, 10), max_size=20))
+def test_the_virtual_clock_fires_by_due_time_then_creation(delays: list[float]) -> None:
+    loop, fired = VirtualLoop(), []
+    for number, delay in enumerate(delays):
+        loop.call_later(delay, fired.append, number)
+    while loop.fire_next():
+        pass
+    assert fired == sorted(range(len(delays)), key=lambda number: (delays[number], number))
+
+
+def test_cancelled_timers_do_not_fire_and_a_saved_clock_comes_back() -> None:
+    loop, fired = VirtualLoop(), []
+    loop.call_later(1, fired.append, "cancelled").cancel()
+    loop.call_later(2, fired.append, "kept")
+    saved = loop.save()
+    assert loop.fire_next()
+    assert loop.time() == 2
+    loop.restore(saved)
+    assert (loop.time(), loop.fire_next(), fired) == (0, True, ["kept", "kept"])
+
+
+def test_the_distribution_is_asked_for_else_the_environments_else_the_newest() -> None:
+    assert choose_release("humble", "jazzy").distro is Distro.HUMBLE
+    assert choose_release(None, "jazzy").distro is Distro.JAZZY
+    assert choose_release(None, "iron").distro is Distro.ROLLING
+    with pytest.raises(ValueError, match="noetic"):
+        choose_release("noetic", None)
+
+
+def test_an_installed_launch_of_the_same_series_decides_the_version(tmp_path: Path) -> None:
+    for package, version in (("launch", "1.0.14"), ("launch_ros", "0.19.13")):
+        folder = tmp_path / "share" / package
+        folder.mkdir(parents=True)
+        (folder / "package.xml").write_text(f"<package><version>{version}</version></package>")
+    assert not choose_release("humble", None).has(Feature.EQUALS_IF)
+    assert choose_release("humble", None, [str(tmp_path)]).has(Feature.EQUALS_IF)
+    assert choose_release("jazzy", None, [str(tmp_path)]) == release_of(Distro.JAZZY)
+
+
+@pytest.mark.parametrize("feature", list(Feature))
+def test_later_releases_of_a_series_lose_nothing(feature: Feature) -> None:
+    for distro in Distro:
+        old, new = release_of(distro), release_of(distro, (99,), (99,))
+        assert new.has(feature) or not old.has(feature)
