@@ -21,7 +21,8 @@ from nodl.infer.values import (
     join,
 )
 
-MAX_UNROLLED = 64
+MAX_UNROLLED = 64  # turns, those of the loops around multiplied
+MAX_UNROLLED_NUMBERS = 16  # in callbacks, where loops over numbers compute rather than name
 MAX_ROUNDS = 8
 WIDEN_TEXTS_FROM = 3
 
@@ -30,8 +31,10 @@ def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
     items = elements(run, run.evaluate(node.iter, frame), node, frame)
     before = frame.unsettled
     frame.unsettled = False
-    if items.exact is not None and len(items.exact) <= MAX_UNROLLED:
+    if items.exact is not None and len(items.exact) * run.unrolled <= _limit(run, items.exact):
+        run.unrolled *= len(items.exact) or 1
         passes = _unrolled(run, node, items.exact, frame)
+        run.unrolled //= len(items.exact) or 1
     else:
         element = items.any_element()
         passes = True
@@ -41,6 +44,11 @@ def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
     if passes and node.orelse:
         run.execute(node.orelse, frame)
     return passes
+
+
+def _limit(run: Run, exact: tuple[Value, ...]) -> int:
+    numbers = run.repeated and all(len(element) == 1 and type(element[0]) is int for element in exact)
+    return MAX_UNROLLED_NUMBERS if numbers else MAX_UNROLLED
 
 
 def _turn(run: Run, target: ast.expr, element: Value, body: list[ast.stmt], frame: Frame) -> bool:

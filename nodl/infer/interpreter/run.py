@@ -161,6 +161,7 @@ class Run:
         self.options = OptionDefaults()
         self.memo: dict[tuple[object, ...], tuple[int, Value]] = {}
         self.unstable = False  # a recursion learned something new since its outermost call asked
+        self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
         self._deadline = time.process_time() + MAX_SECONDS
