@@ -96,7 +96,8 @@ def test_marks_chain(outer: str | None, inner: str | None, whole: str | None) ->
 
 @given(st.lists(st.floats(0, 10), max_size=20))
 def test_the_virtual_clock_fires_by_due_time_then_creation(delays: list[float]) -> None:
-    loop, fired = VirtualLoop(), []
+    loop = VirtualLoop()
+    fired: list[object] = []
     for number, delay in enumerate(delays):
         loop.call_later(delay, fired.append, number)
     while loop.fire_next():
@@ -105,7 +106,8 @@ def test_the_virtual_clock_fires_by_due_time_then_creation(delays: list[float]) 
 
 
 def test_cancelled_timers_do_not_fire_and_a_saved_clock_comes_back() -> None:
-    loop, fired = VirtualLoop(), []
+    loop = VirtualLoop()
+    fired: list[object] = []
     loop.call_later(1, fired.append, "cancelled").cancel()
     loop.call_later(2, fired.append, "kept")
     saved = loop.save()
