@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_ros.node_action_extension import NodeActionExtension
     from enclave_launch.description.launch_ros.parameters_type import SomeParameters
     from enclave_launch.description.launch_ros.remap_rule_type import SomeRemapRules
-    from enclave_launch.process import EnclaveRequest, RemapRule, ResolvedProcess
+    from enclave_launch.process import RemapRule, ResolvedProcess
 
 
 class RosSpecificArgument(Substitution):
@@ -215,6 +215,7 @@ class Node(ExecuteProcess):
     def resolve(self, context: LaunchContext) -> ResolvedProcess:
         process = super().resolve(context)
         words = self.__words_after_program(process)
+        found = parse_ros_arguments(words)
         package = None if self.__package is None else _text(context, self.__package)
         return replace(
             process,
@@ -225,9 +226,9 @@ class Node(ExecuteProcess):
             namespace=self.__expanded_namespace,
             fqn=self.node_name,
             remaps=self.__rules_in_force(words, process),
-            parameters=self.__parameters.resolve(context, self.__name_tokens(), words),
+            parameters=self.__parameters.resolve(self.__name_tokens(), found.parameters),
             parameter_files=self.__parameters.written_files(context),
-            enclave=self.__enclave_request(process.enclave, words),
+            enclave=replace(process.enclave, argument=found.enclave) if found.enclave else process.enclave,
         )
 
     def __words_after_program(self, process: ResolvedProcess) -> tuple[str, ...]:
@@ -239,7 +240,8 @@ class Node(ExecuteProcess):
 
         A ``__node`` or ``__ns`` after those two can never be the first match: it is left out.
         """
-        user = parse_ros_arguments(words[: self.__user_word_count]).remaps
+        count = self.__user_word_count
+        user = parse_ros_arguments(words[:count]).remaps if count else ()
         settled = {"__node", "__name"} if self.__name is not None else set()
         if self.__expanded_namespace != UNSPECIFIED_NODE_NAMESPACE:
             settled.add("__ns")
@@ -253,9 +255,6 @@ class Node(ExecuteProcess):
         """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""
         known = self.node_name.replace(UNSPECIFIED_NODE_NAMESPACE, "").split("/")
         return [None if token == UNSPECIFIED_NODE_NAME else token for token in known if token]
-
-    def __enclave_request(self, request: EnclaveRequest, words: tuple[str, ...]) -> EnclaveRequest:
-        return replace(request, argument=parse_ros_arguments(words).enclave)
 
 
 _TEXT_ATTRIBUTES = (

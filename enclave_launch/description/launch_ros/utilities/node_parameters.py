@@ -12,7 +12,7 @@ from enclave_launch.description.launch_ros.utilities import yaml_text
 from enclave_launch.description.launch_ros.utilities.evaluate_parameters import evaluate_parameters
 from enclave_launch.evaluation.distro import Feature
 from enclave_launch.evaluation.rcl_parameters import Section, as_rcl_reads, resolve_parameters
-from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
+from enclave_launch.evaluation.ros_arguments import ParameterFile, ParameterRule
 from enclave_launch.process import ParameterValue
 
 if TYPE_CHECKING:
@@ -55,10 +55,10 @@ class NodeParameters:
         return path
 
     def resolve(
-        self, context: LaunchContext, name_tokens: Sequence[str | None], words: Sequence[str]
+        self, name_tokens: Sequence[str | None], sources: Sequence[ParameterFile | ParameterRule]
     ) -> dict[str, ParameterValue]:
         """What the node sees after rcl has merged everything on its command line."""
-        return resolve_parameters(name_tokens, parse_ros_arguments(words).parameters, self.__written.get)
+        return resolve_parameters(name_tokens, sources, self.__written.get)
 
     def written_files(self, context: LaunchContext) -> dict[str, str]:
         """Path to text of the files that were generated for this node."""
@@ -66,7 +66,7 @@ class NodeParameters:
 
 
 def _as_written(value: Any) -> ParameterValue:
-    return tuple(value) if isinstance(value, list) else value  # type: ignore[no-any-return]
+    return tuple(value) if isinstance(value, list) else value
 
 
 def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
