@@ -220,6 +220,8 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         return run.call(getter, Arguments([key]), node, frame)
     if isinstance(atom, ClassValue):
         return _class_item(run, atom, key, node, frame)
+    if isinstance(atom, External) and atom.path == "os.environ":
+        return run.call(external("os.environ.get"), Arguments([key]), node, frame)
     if isinstance(atom, External):
         return (atom,) if atom.path.startswith(("typing.", "builtins.")) else external(f"{atom.path}[]")
     return (atom,) if isinstance(atom, Unknown) else ANY

@@ -20,6 +20,7 @@ from nodl.infer.values import (
     Items,
     Key,
     Partial,
+    Sequence,
     Value,
     constant_strings,
     join,
@@ -196,7 +197,15 @@ def _simple_namespace(run: Run, call: Call) -> Value:
 
 
 def _copy(run: Run, call: Call) -> Value:
-    return call.args.at(0) or ANY
+    """Containers get a copy of their own; what is inside is shared, as if it were ``copy.copy``."""
+    result: Value = BOTTOM
+    for atom in call.args.at(0) or ANY:
+        if isinstance(atom, Sequence | Dictionary):
+            method = run.attribute((atom,), "copy", call.node, call.frame)
+            result = join(result, run.call(method, Arguments(), call.node, call.frame))
+        else:
+            result = join(result, (atom,))
+    return result
 
 
 def _chain(run: Run, call: Call) -> Value:

@@ -67,6 +67,7 @@ CASES: dict[str, tuple[str, list[str]]] = {
         ["param:--topic"],
     ),
     "environment": ("import os\nself.P(os.environ.get('TOPIC', 'a'))", ["param:$TOPIC"]),
+    "environment without a default": ("import os\nself.P(os.environ['TOPIC'])", ["param:$TOPIC"]),
     "node name in a name": ("self.P(self.get_name() + '/a')", ["{node}/a"]),
     "fully qualified name": ("self.P(self.get_fully_qualified_name() + '/a')", ["~/a"]),
 }  # fmt: skip
