@@ -71,7 +71,8 @@ def _read_policy(path: Path) -> PolicyDocument:
 
 @dataclass(frozen=True, slots=True)
 class SecurityOptions:
-    """How to provision: the keystore's own options, and the strategy that the processes are told."""
+    """How to provision: the keystore's own options (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
+    the strategy that the processes are told."""
 
     strategy: str = "Enforce"
     keystore: ProvisionOptions | None = None
@@ -121,13 +122,14 @@ def provision(
     """
     from enclave_launch.secured import ProvisionedLaunch, provision_policies
     from enclave_launch.security_environment import SecuritySettings
+    from keystore.domains import Domains
     from keystore.provisioning import ProvisionOptions
 
     if plan.problems:
         raise ManifestError("\n".join((*plan.problems, "nothing was started or written")))
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
-    wanted = chosen.keystore or ProvisionOptions()
+    wanted = chosen.keystore or ProvisionOptions(domains=Domains.parse(os.environ.get("ROS_DOMAIN_ID") or "0"))
     report = provision_policies(settings, plan.derived.policy.enclaves, wanted)
     return ProvisionedLaunch(plan, settings, report, wanted)
 

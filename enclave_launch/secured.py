@@ -1,7 +1,7 @@
 """A provisioned launch: the plan, the keystore it is signed into, and what each process gets from it.
 
-Stands between the plan and the runtime's gate. ``ensure`` is called before every start: it brings the enclave to
-the planned state (a few file reads when it already is) and hands out the arguments and variables that rcl reads.
+Stands between the plan and the runtime's gate. ``ensure`` is called before every start: it holds the enclave against
+what was provisioned (a few file reads) and hands out the arguments and variables that rcl reads.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from enclave_launch.security_environment import (
 from keystore import layout
 from keystore.errors import KeystoreError
 from keystore.policy import EnclavePolicy
-from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
+from keystore.provisioning import ProvisionOptions, ProvisionReport, provision, what_is_wrong
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,49 +48,71 @@ def provision_policies(
 
 
 class PlanProvider:
-    """Makes enclaves complete as the plan says, and no further."""
+    """Lets processes start whose enclave is what was provisioned, and hands out what rcl reads."""
 
     def __init__(self, launch: ProvisionedLaunch):
         self._launch = launch
-        self._completed: dict[str, tuple[EnclavePolicy, tuple[tuple[str, int, int, int], ...]]] = {}
+        self._seen: dict[str, tuple[EnclavePolicy, tuple[tuple[str, int, int, int], ...]]] = {}
         self._follow(launch.plan)
 
     def _follow(self, plan: LaunchPlan) -> None:
         self._plan = plan
-        self._planned = {identity(item.process): item for item in plan.processes}
+        self._by_name = {(item.process.process_name, identity(item.process)): item for item in plan.processes}
+        self._by_identity = {identity(item.process): item for item in plan.processes}
         self._policies = {enclave.path: enclave for enclave in plan.derived.policy.enclaves}
 
     def ensure(self, process: ResolvedProcess) -> Grant:
-        """Raises ``ProvisionError`` when the enclave cannot be completed."""
-        planned = self._planned[identity(process)]
+        """Raises ``ProvisionError`` when its enclave is no longer what was provisioned."""
+        planned = self._planned(process)
         if planned.enclave is not None:
-            self._complete(planned.enclave.path)
+            self._check(planned.enclave.path)
         return self._grant(planned, process.environment)
 
+    def _planned(self, process: ResolvedProcess) -> PlannedProcess:
+        """Equal processes may have enclaves of their own; their names tell them apart unless events reordered them."""
+        key = identity(process)
+        return self._by_name.get((process.process_name, key)) or self._by_identity[key]
+
     def ensure_late(self, process: ResolvedProcess) -> Grant:
-        """Extend the plan by ``process``. Raises ``ProvisionError`` when its interfaces are not known."""
+        """Extend the plan by ``process`` and provision that. Raises ``ProvisionError`` when its interfaces are not
+        known."""
         evaluation = self._plan.evaluation
         extended = self._plan.planner.plan(replace(evaluation, processes=(*evaluation.processes, process)))
         new = [problem for problem in extended.problems if problem not in self._plan.problems]
         if new:
             raise ProvisionError("\n".join(new))
         self._follow(extended)
+        planned = self._planned(process)
+        if planned.enclave is not None:
+            policy = self._policies[planned.enclave.path]
+            provision_policies(self._launch.settings, [policy], self._launch.options)
         return self.ensure(process)
 
     def launcher(self) -> Grant | None:
         launcher = self._plan.launcher
         if launcher is None:
             return None
-        self._complete(launcher.enclave)
+        self._check(launcher.enclave)
         return Grant(("--enclave", launcher.enclave), launcher_environment(self._launch.settings))
 
-    def _complete(self, enclave: str) -> None:
-        """Nodes that share an enclave, and restarts, pay for a look at its files only while nobody touches those."""
+    def _check(self, enclave: str) -> None:
+        """Nothing is repaired here: what changed since it was signed was changed by somebody else.
+
+        Nodes that share an enclave, and restarts, pay for a look at its files only while nobody touches those.
+        """
         policy = self._policies[enclave]
-        if self._completed.get(enclave) == (policy, self._files(enclave)):
+        if self._seen.get(enclave) == (policy, self._files(enclave)):
             return
-        provision_policies(self._launch.settings, [policy], self._launch.options)
-        self._completed[enclave] = (policy, self._files(enclave))
+        try:
+            wrong = what_is_wrong(self._launch.settings.keystore, policy, options=self._launch.options)
+        except KeystoreError as error:
+            raise ProvisionError(str(error)) from error
+        if wrong:
+            raise ProvisionError(
+                f"enclave {enclave} in {self._launch.settings.keystore} is no longer what was provisioned for this "
+                f"launch: {'; '.join(wrong)}. Find out who changed it; a new launch provisions it again"
+            )
+        self._seen[enclave] = (policy, self._files(enclave))
 
     def _files(self, enclave: str) -> tuple[tuple[str, int, int, int], ...]:
         """What any change to the enclave's files changes: name, inode, size and time of each."""

@@ -106,6 +106,24 @@ def provision(
     return bring_about(root, wishes, chosen)
 
 
+def what_is_wrong(
+    keystore: Path | str, policy: EnclavePolicy, *, options: ProvisionOptions | None = None
+) -> tuple[str, ...]:
+    """Why an enclave is not (or no longer) what ``provision`` with the same options left; empty when it is.
+
+    Reads only, and cheaply: bytes, dates, modes and links, no signatures. Raises a KeystoreError for a
+    keystore that cannot be read at all.
+    """
+    root = resolve_root(keystore)
+    chosen = with_domains(root, options or ProvisionOptions())
+    view = KeystoreView(root)
+    view.require_complete()
+    now = chosen.now or utc_now()
+    state = inspect_wish(view, policy.path, Wish(policy_source(policy, chosen)), chosen, now)
+    governance = () if governance_stands(view, chosen.domains) else ("the governance is not what it was",)
+    return (*state.reasons, *governance) if not state.is_good or governance else ()
+
+
 def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
     """The same options with the domains decided."""
     if options.domains is not None:

@@ -151,12 +151,13 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
 
 def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
     from enclave_launch.flow import provision, run
-    from enclave_launch.verb.security import expiry_notices, security_options
 
     _warn(plan.warnings)
     settings = _run_settings(options)
     if keystore is None:
         return run(plan, options=settings)
+    from enclave_launch.verb.security import expiry_notices, security_options
+
     launch = provision(plan, keystore, options=security_options(options))
     _warn((*launch.report.warnings, *expiry_notices(keystore, plan, options.warn_expiry)))
     return run(launch, options=settings)

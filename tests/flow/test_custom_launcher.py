@@ -148,3 +148,30 @@ def test_an_executable_without_enclave_is_still_told_that_security_is_on(
     variables = variables_of_a_secured_process("")
     assert variables["ROS_SECURITY_STRATEGY"] == "Enforce"
     assert "ROS_SECURITY_ENCLAVE_OVERRIDE" not in variables
+
+
+TAMPERINGS = {
+    "another signature": ("permissions.p7s", lambda data: data.replace(b"MII", b"MIJ", 1)),
+    "other permissions, unsigned": ("permissions.p7s", lambda data: data.replace(b"rt/chatter", b"rt/chatteR")),
+    "the reviewed copy": ("permissions.xml", lambda data: data.replace(b"rt/chatter", b"rt/chatteR")),
+    "no permissions at all": ("permissions.p7s", None),
+    "another key": ("key.pem", lambda data: b""),
+}
+
+
+@pytest.mark.parametrize("case", TAMPERINGS)
+def test_an_enclave_changed_after_provisioning_starts_nothing(case: str, tmp_path: Path) -> None:
+    name, change = TAMPERINGS[case]
+    launch = provision(resolve(TALKER_LISTENER, [("seconds", "2")], options=OPTIONS), tmp_path / "ks")
+    file = tmp_path / "ks" / "enclaves" / name
+    if change is None:
+        file.unlink()
+    else:
+        changed = change(file.read_bytes())
+        assert changed != file.read_bytes()
+        file.write_bytes(changed)
+    assert asyncio.run(run_async(launch)) == 1
+    text = "".join(path.read_text() for path in (tmp_path / "log").rglob("launch.log"))
+    if case != "another signature":  # which a cheap look does not see: DDS refuses that process
+        assert "is no longer what was provisioned for this launch" in text
+        assert "process started" not in text
