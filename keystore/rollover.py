@@ -6,8 +6,9 @@
 
 Deploy after each step. What the overlap gives, as measured: Fast DDS trusts every certificate in
 ``identity_ca.cert.pem``, so after ``start`` is deployed everywhere, robots can take ``switch`` one by
-one. Cyclone DDS reads only the first certificate of the file: for it ``switch`` is a change of all
-participants together, the earlier and later steps are harmless. A CRL names one CA and both
+one, as far as the identity CA goes. Cyclone DDS reads only the first certificate of the file, and neither bridges
+a change of the permissions CA: there ``switch`` is a change of all participants together, the earlier and
+later steps are harmless. A CRL names one CA and both
 implementations read only one, so a keystore with revocations skips the overlap: the CRL goes with the old
 CA.
 """
