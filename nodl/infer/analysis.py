@@ -157,6 +157,7 @@ def _call(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple
 
 
 def _guarded(run: Run, body: Callable[[], None]) -> None:
+    run.start_clock()
     try:
         body()
     except BudgetExceeded as error:

@@ -164,13 +164,17 @@ class Run:
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
-        self._deadline = time.process_time() + MAX_SECONDS
+        self.start_clock()
         self.context = 0
         self._contexts: dict[tuple[int, object], int] = {}
         self._context_ids = itertools.count(1)
         self._tuples: dict[object, Value] = {}
         self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
         self._allocated: dict[tuple[object, ...], HeapObject] = {}
+
+    def start_clock(self) -> None:
+        """From now on ``MAX_SECONDS`` are allowed; runs wait for each other between their phases."""
+        self._deadline = time.process_time() + MAX_SECONDS
 
     # --- syntax -----------------------------------------------------------------------------------------
 
