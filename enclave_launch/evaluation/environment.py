@@ -11,7 +11,6 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
-
 _last: tuple[dict[bytes, bytes], dict[str, str]] | None = None
 
 
