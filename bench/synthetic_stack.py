@@ -107,7 +107,8 @@ def _node(area: str, name: str) -> str:
         f'    <param name="use_sim_time" value="$(var use_sim_time)"/>\n'
         f'    <param name="model"\n'
         f'      value="$(eval &quot;\'$(var vehicle_model)\' + \'_$(var sensor_model)\'&quot;)"/>\n'
-        f'    <remap from="~/input/state" to="/{area}/state"/>\n    <remap from="~/output" to="$(var launch_mode)/out"/>\n'
+        f'    <remap from="~/input/state" to="/{area}/state"/>\n'
+        f'    <remap from="~/output" to="$(var launch_mode)/out"/>\n'
         f"  </node>\n"
     )
 

@@ -20,7 +20,7 @@ __getattr__, __dir__ = lazy_names(
     },
     submodules=("type_utils", "typing_file_path"),
 )
-__all__ = [  # noqa: F822  (some come from __getattr__)
+__all__ = [
     "AsyncSafeSignalManager",
     "create_future",
     "ensure_argument_type",

@@ -22,7 +22,7 @@ __getattr__, __dir__ = lazy_names(
         "matches_pid": "process_matchers",
     },
 )
-__all__ = [  # noqa: F822  (some come from __getattr__)
+__all__ = [
     "ProcessExited",
     "ProcessIO",
     "ProcessStarted",
