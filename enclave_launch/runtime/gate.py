@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 
 
@@ -57,16 +58,15 @@ class LateProcess(RuntimeFailure):
 
 
 def identity(process: ResolvedProcess) -> tuple[object, ...]:
-    """What decides the permissions of a process. Not its number, its command line or its parameter files,
-    which
-    differ between a dry run and a live one."""
+    """What decides the permissions of a process. Not its number, its whole command line or its parameter files,
+    which differ between a dry run and a live one."""
     return (
         process.kind,
         process.package,
         process.executable,
         process.fqn,
         process.enclave,
-        tuple((rule.source, rule.target) for rule in process.remaps),
+        parse_ros_arguments(process.cmd).remaps,
         process.parameters.get("use_sim_time"),  # subscribes /clock
     )
 

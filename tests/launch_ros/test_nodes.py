@@ -41,27 +41,18 @@ def test_remap_rules_know_their_place(launched: Evaluate) -> None:
     </load_composable_node>"""
     result = launched(text)
     rules = [(r.source, r.target, r.location and r.location.line) for r in result.processes[0].remaps]
-    assert rules == [("user", "first", 3), ("a", "b", 2), ("c", "d", 4), ("e", "f", 5)]
+    assert rules == [("a", "b", 2), ("c", "d", 4), ("e", "f", 5)]
     component = result.components[0]
     assert [(r.source, r.location and r.location.line) for r in component.remaps] == [("a", 2), ("g", 8)]
     assert (component.location.line, component.location.element) == (8, "composable_node")
 
 
-@pytest.mark.parametrize(
-    ("attributes", "rules"),
-    [
-        ("", ["__node:=x", "__ns:=/y"]),
-        ('name="n"', ["__ns:=/y"]),
-        ('name="n" namespace="ns"', []),
-        ('name="n" args="--ros-args -r __node:=z"', ["__node:=z", "__ns:=/y"]),
-    ],
-)
-def test_rules_that_can_never_be_first_are_left_out(
-    launched: Evaluate, attributes: str, rules: list[str]
-) -> None:
-    text = f'<node pkg="pk" exec="e" {attributes}><remap from="__node" to="x"/><remap from="__ns" to="/y"/></node>'
+def test_remaps_are_launchs_own_rules_as_written_whoever_wins(launched: Evaluate) -> None:
+    text = """<node pkg="pk" exec="e" name="n" args="--ros-args -r __node:=z">
+      <remap from="__node" to="x"/><remap from="a" to="b"/>
+    </node>"""
     (process,) = launched(text).processes
-    assert [f"{rule.source}:={rule.target}" for rule in process.remaps] == rules
+    assert [(rule.source, rule.target) for rule in process.remaps] == [("__node", "x"), ("a", "b")]
 
 
 def test_a_prefix_is_not_taken_for_the_program(launched: Evaluate) -> None:
@@ -70,7 +61,7 @@ def test_a_prefix_is_not_taken_for_the_program(launched: Evaluate) -> None:
     ).processes
     assert process.cmd[:3] == ("nice", "-n", "3")
     assert (process.executable, process.enclave.argument) == ("e", "/x")
-    assert [rule.source for rule in process.remaps] == ["a"]
+    assert process.remaps == ()
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,6 @@ from enclave_launch.description.launch_ros.utilities.remap_rules import (
     PlacedRule,
     performed_remaps,
     placed,
-    remap_from_text,
 )
 from enclave_launch.description.launch_ros.utilities.track_node_names import warn_about_repeats
 from enclave_launch.evaluation.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
@@ -42,7 +41,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_ros.node_action_extension import NodeActionExtension
     from enclave_launch.description.launch_ros.parameters_type import SomeParameters
     from enclave_launch.description.launch_ros.remap_rule_type import SomeRemapRules
-    from enclave_launch.process import RemapRule, ResolvedProcess
+    from enclave_launch.process import ResolvedProcess
 
 
 class RosSpecificArgument(Substitution):
@@ -102,7 +101,6 @@ class Node(ExecuteProcess):
         self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
         self.__parameters = NodeParameters(normalize_parameters(parameters or []))
         self.__remappings = list(normalize_remap_rules(remappings or ()))
-        self.__user_word_count = len(user_words)
         self.__expanded_name = UNSPECIFIED_NODE_NAME
         self.__expanded_namespace = UNSPECIFIED_NODE_NAMESPACE
         self.__final_name: str | None = None
@@ -225,7 +223,7 @@ class Node(ExecuteProcess):
             name=self.__expanded_name,
             namespace=self.__expanded_namespace,
             fqn=self.node_name,
-            remaps=self.__rules_in_force(words, process),
+            remaps=tuple(placed(rule, process.location) for rule in self.__expanded_remappings or ()),
             parameters=self.__parameters.resolve(self.__name_tokens(), found.parameters),
             parameter_files=self.__parameters.written_files(context),
             enclave=replace(process.enclave, argument=found.enclave) if found.enclave else process.enclave,
@@ -234,22 +232,6 @@ class Node(ExecuteProcess):
     def __words_after_program(self, process: ResolvedProcess) -> tuple[str, ...]:
         prefix_length = len(process.cmd) - len(self.process_description.cmd)
         return process.cmd[prefix_length + 1 :]
-
-    def __rules_in_force(self, words: tuple[str, ...], process: ResolvedProcess) -> tuple[RemapRule, ...]:
-        """The user's rules, then launch's, without the two that ``name`` and ``namespace`` became.
-
-        A ``__node`` or ``__ns`` after those two can never be the first match: it is left out.
-        """
-        count = self.__user_word_count
-        user = parse_ros_arguments(words[:count]).remaps if count else ()
-        settled = {"__node", "__name"} if self.__name is not None else set()
-        if self.__expanded_namespace != UNSPECIFIED_NODE_NAMESPACE:
-            settled.add("__ns")
-        own = [rule for rule in self.__expanded_remappings or () if rule[0] not in settled]
-        return (
-            *(remap_from_text(text, process.location) for text in user),
-            *(placed(rule, process.location) for rule in own),
-        )
 
     def __name_tokens(self) -> list[str | None]:
         """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""

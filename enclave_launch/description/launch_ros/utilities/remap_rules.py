@@ -38,9 +38,3 @@ def performed_remaps(rules: Iterable[Sequence[Any]], context: LaunchContext) -> 
 def placed(rule: Sequence[str], default: SourceLocation) -> RemapRule:
     """The value that policies are derived from; ``default`` is where a plain pair counts as written."""
     return RemapRule(rule[0], rule[1], getattr(rule, "location", None) or default)
-
-
-def remap_from_text(text: str, location: SourceLocation) -> RemapRule:
-    """A rule that the user wrote among the ROS arguments; ``:=`` separates, unchecked as launch leaves it."""
-    source, _, target = text.partition(":=")
-    return RemapRule(source, target, location)
