@@ -75,7 +75,7 @@ def gate(*, allow_late: bool = False) -> tuple[PlannedGate, Keystore, list[str]]
     [
         TALKER,
         replace(TALKER, index=7, process_name="talker-7"),
-        replace(TALKER, cmd=("talker", "--params-file", "/tmp/launch_params_x")),
+        replace(TALKER, cmd=(*TALKER.cmd, "--params-file", "/tmp/launch_params_x")),
         replace(TALKER, on_event="OnProcessExit a-1"),
         replace(TALKER, remaps=(RemapRule("chatter", "news", PLACE),)),
     ],
