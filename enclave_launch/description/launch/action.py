@@ -30,6 +30,9 @@ class Action(LaunchDescriptionEntity):
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
         """The constructor arguments that every element has: ``if`` and ``unless``."""
+        given = entity.given
+        if "if" not in given and "unless" not in given:
+            return Action, {}
         if_text = entity.get_attr("if", optional=True)
         unless_text = entity.get_attr("unless", optional=True)
         if if_text is None and unless_text is None:

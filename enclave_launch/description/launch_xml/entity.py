@@ -10,6 +10,8 @@ from enclave_launch.description.launch.utilities.type_utils import get_typed_val
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from enclave_launch.frontend.xml_tree import XmlElement
 
 _VALUE_TYPES = frozenset({str, int, float, bool, None})  # certainly no lists of entities
@@ -45,6 +47,13 @@ class Entity(BaseEntity):
     @property
     def source_location(self) -> SourceLocation:
         return SourceLocation(self._file, self._element.sourceline, self._element.tag)
+
+    @property
+    def given(self) -> Container[str]:
+        element = self._element
+        if not element.children:
+            return element.attrib
+        return {*element.attrib, *[child.tag for child in element.children]}
 
     def find_text(self, text: str) -> SourceLocation | None:
         """The first place at or below this element where an attribute has exactly this text."""

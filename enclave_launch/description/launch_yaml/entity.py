@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from typing import Any
 
 from enclave_launch.description.launch.frontend import Entity as BaseEntity
@@ -90,6 +90,10 @@ class Entity(BaseEntity):
     def _entity(self, element: Any, type_name: str, begins_at: Any) -> Entity:
         line = self._lines.get(id(begins_at), self._line)
         return Entity(element, type_name, file=self._file, lines=self._lines, line=line)
+
+    @property
+    def given(self) -> Container[str]:
+        return self._element if isinstance(self._element, dict) else super().given
 
     def find_text(self, text: str) -> SourceLocation | None:
         """The place of the innermost mapping or list that holds exactly this text."""

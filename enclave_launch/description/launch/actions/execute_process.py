@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.launch.action import Action
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.frontend.parser import Parser
     from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
     from enclave_launch.description.launch.substitution import Substitution
+    from enclave_launch.evaluation.distro import Release
 
 
 @expose_action("executable")
@@ -49,21 +51,17 @@ class ExecuteProcess(ExecuteLocal):
     def parse(
         cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
     ) -> tuple[type[Action], dict[str, Any]]:
-        """``ignore``: attributes that a subclass reads itself, or does not have."""
+        """``ignore``: arguments that a subclass reads itself, or does not have."""
         _, kwargs = super().parse(entity, parser)
-        reader = _AttributeReader(entity, parser, frozenset(ignore or ()), kwargs)
-        if reader.wanted("cmd"):
+        skipped = ignore or ()
+        if "cmd" not in skipped:
             kwargs["cmd"] = cls._parse_cmdline(entity.get_attr("cmd"), parser)
-        reader.text("cwd")
-        reader.text("name")
-        reader.text("launch-prefix", "prefix")
-        reader.text("output")
-        reader.text("respawn")
-        reader.text("enclave")
-        reader.seconds("respawn_delay", float)
-        reader.flag("shell")
-        _read_newer_attributes(reader)
-        reader.environment()
+        given = entity.given
+        for attribute, keyword, read in _attributes_of(current_release()):
+            if attribute in given and keyword not in skipped:
+                value = read(entity, parser, attribute)
+                if value is not None:
+                    kwargs[keyword] = value
         return cls, kwargs
 
     @property
@@ -92,79 +90,91 @@ class ExecuteProcess(ExecuteLocal):
         return self.process_description.additional_env
 
 
-def _read_newer_attributes(reader: _AttributeReader) -> None:
-    release = current_release()
-    if release.has(Feature.EXIT_AND_TTY_ATTRIBUTES):
-        reader.on_exit()
-        reader.flag("emulate_tty")
-    if release.has(Feature.TIMEOUT_ATTRIBUTES):
-        reader.value("respawn_max_retries", int)
-        reader.seconds("sigkill_timeout", str)
-        reader.seconds("sigterm_timeout", str)
+def _text(entity: Entity, parser: Parser, name: str) -> Any:
+    value = entity.get_attr(name, optional=True)
+    return None if value is None else parser.parse_substitution(value)
 
 
-class _AttributeReader:
-    """Reads the optional attributes of a process element into constructor arguments."""
+def _flag(entity: Entity, parser: Parser, name: str) -> Any:
+    return entity.get_attr(name, data_type=bool, optional=True)
 
-    def __init__(self, entity: Entity, parser: Parser, ignore: frozenset[str], kwargs: dict[str, Any]) -> None:
-        self.entity, self.parser, self.ignore, self.kwargs = entity, parser, ignore, kwargs
 
-    def wanted(self, name: str) -> bool:
-        return name not in self.ignore
+def _count(entity: Entity, parser: Parser, name: str) -> Any:
+    return entity.get_attr(name, data_type=int, optional=True)
 
-    def text(self, attribute: str, name: str = "") -> None:
-        name = name or attribute
-        if self.wanted(name):
-            value = self.entity.get_attr(attribute, optional=True)
-            if value is not None:
-                self.kwargs[name] = self.parser.parse_substitution(value)
 
-    def value(self, name: str, data_type: type) -> None:
-        if self.wanted(name):
-            value: Any = self.entity.get_attr(name, data_type=data_type, optional=True)
-            if value is not None:
-                self.kwargs[name] = value
+def _seconds(entity: Entity, parser: Parser, name: str) -> Any:
+    value: Any = entity.get_attr(name, data_type=float, optional=True)
+    if value is not None and value < 0.0:
+        raise ValueError(
+            f"Attribute {name} of Entity node expected to be a non-negative value but got `{value}`"
+        )
+    return value
 
-    def flag(self, name: str) -> None:
-        self.value(name, bool)
 
-    def seconds(self, name: str, convert: Callable[[float], object]) -> None:
-        if not self.wanted(name):
-            return
-        value = self.entity.get_attr(name, data_type=float, optional=True)
-        if value is None:
-            return
-        if value < 0.0:
-            raise ValueError(
-                f"Attribute {name} of Entity node expected to be a non-negative value but got `{value}`"
-            )
-        self.kwargs[name] = value if convert is float else convert(value)
+def _seconds_as_text(entity: Entity, parser: Parser, name: str) -> Any:
+    value = _seconds(entity, parser, name)
+    return None if value is None else str(value)
 
-    def on_exit(self) -> None:
-        if not self.wanted("on_exit"):
-            return
-        value = self.entity.get_attr("on_exit", optional=True)
-        if value is None:
-            return
-        if value != "shutdown":
-            raise ValueError(
-                f"Attribute on_exit of Entity node expected to be shutdown but got `{value}`"
-                "Other on_exit actions not yet supported"
-            )
-        self.kwargs["on_exit"] = [Shutdown()]
 
-    def environment(self) -> None:
-        if not self.wanted("additional_env"):
-            return
-        variables = self.entity.get_attr("env", data_type=list[Entity], optional=True)
-        if variables is None:
-            return
-        parse = self.parser.parse_substitution
-        self.kwargs["additional_env"] = {
-            tuple(parse(variable.get_attr("name"))): parse(variable.get_attr("value")) for variable in variables
-        }
-        for variable in variables:
-            variable.assert_entity_completely_parsed()
+def _on_exit(entity: Entity, parser: Parser, name: str) -> Any:
+    value = entity.get_attr(name, optional=True)
+    if value is None:
+        return None
+    if value != "shutdown":
+        raise ValueError(
+            f"Attribute on_exit of Entity node expected to be shutdown but got `{value}`"
+            "Other on_exit actions not yet supported"
+        )
+    return [Shutdown()]
+
+
+def _environment(entity: Entity, parser: Parser, name: str) -> Any:
+    variables = entity.get_attr(name, data_type=list[Entity], optional=True)
+    if variables is None:
+        return None
+    parse = parser.parse_substitution
+    environment = {
+        tuple(parse(variable.get_attr("name"))): parse(variable.get_attr("value")) for variable in variables
+    }
+    for variable in variables:
+        variable.assert_entity_completely_parsed()
+    return environment
+
+
+_Attribute = tuple[str, str, Callable[[Entity, "Parser", str], Any]]  # attribute, constructor argument, reader
+
+_ATTRIBUTES: tuple[_Attribute, ...] = (
+    ("cwd", "cwd", _text),
+    ("name", "name", _text),
+    ("launch-prefix", "prefix", _text),
+    ("output", "output", _text),
+    ("respawn", "respawn", _text),
+    ("enclave", "enclave", _text),
+    ("respawn_delay", "respawn_delay", _seconds),
+    ("shell", "shell", _flag),
+)
+_EXIT_AND_TTY: tuple[_Attribute, ...] = (
+    ("on_exit", "on_exit", _on_exit),
+    ("emulate_tty", "emulate_tty", _flag),
+)
+_TIMEOUTS: tuple[_Attribute, ...] = (
+    ("respawn_max_retries", "respawn_max_retries", _count),
+    ("sigkill_timeout", "sigkill_timeout", _seconds_as_text),
+    ("sigterm_timeout", "sigterm_timeout", _seconds_as_text),
+)
+_ENVIRONMENT: _Attribute = ("env", "additional_env", _environment)
+
+
+@lru_cache(maxsize=8)
+def _attributes_of(release: Release) -> tuple[_Attribute, ...]:
+    """The optional attributes of a process element, in the order in which upstream reads them."""
+    return (
+        *_ATTRIBUTES,
+        *(_EXIT_AND_TTY if release.has(Feature.EXIT_AND_TTY_ATTRIBUTES) else ()),
+        *(_TIMEOUTS if release.has(Feature.TIMEOUT_ATTRIBUTES) else ()),
+        _ENVIRONMENT,
+    )
 
 
 def split_words(template: Iterable[Substitution]) -> list[SomeSubstitutionsType]:

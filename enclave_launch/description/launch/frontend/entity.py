@@ -5,9 +5,19 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 if TYPE_CHECKING:
+    from collections.abc import Container
+
     from enclave_launch.source_location import SourceLocation
 
 T = TypeVar("T")
+
+
+class _Everything:
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
+_EVERYTHING = _Everything()
 
 
 class Entity:
@@ -32,6 +42,12 @@ class Entity:
     def source_location(self) -> SourceLocation | None:
         """File, line and element name (ours; upstream has no positions)."""
         return None
+
+    @property
+    def given(self) -> Container[str]:
+        """Names for which ``get_attr`` may find something (ours): most optional attributes are not there, and
+        to ask for each takes time. By default any name."""
+        return _EVERYTHING
 
     @overload
     def get_attr(

@@ -115,22 +115,23 @@ class Node(ExecuteProcess):
     def parse(
         cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
     ) -> tuple[type[Node], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser, ignore=["cmd", *(ignore or ())])
-        for attribute, keyword in (("args", "arguments"), ("ros_args", "ros_arguments")):
-            text = entity.get_attr(attribute, optional=True)
-            if text is not None:
+        _, kwargs = super().parse(entity, parser, ignore=["cmd", "name", *(ignore or ())])
+        given = entity.given
+        for attribute, keyword in _COMMAND_LINES:
+            if attribute in given and (text := entity.get_attr(attribute, optional=True)) is not None:
                 kwargs[keyword] = cls._parse_cmdline(text, parser)
         for attribute, keyword in _TEXT_ATTRIBUTES:
-            text = entity.get_attr(attribute, optional=True)
-            if text is not None:
+            if attribute in given and (text := entity.get_attr(attribute, optional=True)) is not None:
                 kwargs[keyword] = parser.parse_substitution(text)
         kwargs["executable"] = parser.parse_substitution(entity.get_attr("exec"))
-        remaps = entity.get_attr("remap", data_type=list[Entity], optional=True)
-        if remaps is not None:
-            kwargs["remappings"] = parse_remaps(remaps, parser)
-        params = entity.get_attr("param", data_type=list[Entity], optional=True)
-        if params is not None:
-            kwargs["parameters"] = cls.parse_nested_parameters(params, parser)
+        if "remap" in given:
+            remaps = entity.get_attr("remap", data_type=list[Entity], optional=True)
+            if remaps is not None:
+                kwargs["remappings"] = parse_remaps(remaps, parser)
+        if "param" in given:
+            params = entity.get_attr("param", data_type=list[Entity], optional=True)
+            if params is not None:
+                kwargs["parameters"] = cls.parse_nested_parameters(params, parser)
         return cls, kwargs
 
     @property
@@ -239,6 +240,7 @@ class Node(ExecuteProcess):
         return [None if token == UNSPECIFIED_NODE_NAME else token for token in known if token]
 
 
+_COMMAND_LINES = (("args", "arguments"), ("ros_args", "ros_arguments"))
 _TEXT_ATTRIBUTES = (
     ("node-name", "node_name"),  # upstream reads it, and then the constructor refuses it
     ("name", "name"),
@@ -272,6 +274,9 @@ def parse_remaps(remaps: list[Entity], parser: Parser) -> list[PlacedRule]:
 
 def _parse_parameter(param: Entity, parser: Parser) -> Any:
     """One ``param``: a file, or a dict of one name. Raises ``RuntimeError``, ``ValueError`` as upstream."""
+    given = param.given
+    if "from" not in given and "allow_substs" not in given and "name" in given:
+        return _parse_named_parameters([param], parser)
     file = param.get_attr("from", optional=True)
     allow_substs: Any = param.get_attr("allow_substs", data_type=bool, optional=True)
     name = param.get_attr("name", optional=True)
@@ -297,10 +302,11 @@ def _parse_named_parameters(params: list[Entity], parser: Parser) -> dict[tuple[
 
 def _parse_named_parameter(param: Entity, parser: Parser) -> tuple[tuple[Substitution, ...], Any]:
     name = tuple(parser.parse_substitution(param.get_attr("name")))
-    type_name: Any = param.get_attr("type", data_type=None, optional=True)
+    given = param.given
+    type_name: Any = param.get_attr("type", data_type=None, optional=True) if "type" in given else None
     data_type = None if type_name is None else get_data_type_from_identifier(type_name)
     value: Any = param.get_attr("value", data_type=data_type, optional=True)
-    nested = param.get_attr("param", data_type=list[Entity], optional=True)
+    nested = param.get_attr("param", data_type=list[Entity], optional=True) if "param" in given else None
     param.assert_entity_completely_parsed()
     if value is not None and nested:
         raise RuntimeError("nested parameters and value attributes are mutually exclusive")
