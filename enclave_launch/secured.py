@@ -22,6 +22,7 @@ from enclave_launch.security_environment import (
     secured_environment,
 )
 from keystore import layout
+from keystore.enclave_state import OTHER_PERMISSIONS
 from keystore.errors import KeystoreError
 from keystore.policy import EnclavePolicy
 from keystore.provisioning import ProvisionOptions, ProvisionReport, provision, what_is_wrong
@@ -55,6 +56,11 @@ class PlanProvider:
         self._seen: dict[str, tuple[EnclavePolicy, tuple[tuple[str, int, int, int], ...]]] = {}
         self._follow(launch.plan)
 
+    @property
+    def plan(self) -> LaunchPlan:
+        """The launch's, with what came late."""
+        return self._plan
+
     def _follow(self, plan: LaunchPlan) -> None:
         self._plan = plan
         self._by_name = {(item.process.process_name, identity(item.process)): item for item in plan.processes}
@@ -65,7 +71,7 @@ class PlanProvider:
         """Raises ``ProvisionError`` when its enclave is no longer what was provisioned."""
         planned = self._planned(process)
         if planned.enclave is not None:
-            self._check(planned.enclave.path)
+            self._check(self._policies[planned.enclave.path])
         return self._grant(planned, process.environment)
 
     def _planned(self, process: ResolvedProcess) -> PlannedProcess:
@@ -74,17 +80,24 @@ class PlanProvider:
         return self._by_name.get((process.process_name, key)) or self._by_identity[key]
 
     def ensure_late(self, process: ResolvedProcess) -> Grant:
-        """Extend the plan by ``process`` and provision that. Raises ``ProvisionError`` when its interfaces are not
-        known."""
+        """Extend the plan by ``process`` and provision that; what the plan has already is only held against it.
+
+        Raises ``ProvisionError`` when its interfaces are not known, or its enclave is no longer what was provisioned.
+        """
+        if (process.process_name, identity(process)) in self._by_name:
+            return self.ensure(process)
         evaluation = self._plan.evaluation
         extended = self._plan.planner.plan(replace(evaluation, processes=(*evaluation.processes, process)))
         new = [problem for problem in extended.problems if problem not in self._plan.problems]
         if new:
             raise ProvisionError("\n".join(new))
+        before = self._policies
         self._follow(extended)
         planned = self._planned(process)
         if planned.enclave is not None:
             policy = self._policies[planned.enclave.path]
+            if policy.path in before:  # to extend is not to repair
+                self._check(before[policy.path])
             provision_policies(self._launch.settings, [policy], self._launch.options)
         return self.ensure(process)
 
@@ -92,40 +105,58 @@ class PlanProvider:
         launcher = self._plan.launcher
         if launcher is None:
             return None
-        self._check(launcher.enclave)
+        self._check(self._policies[launcher.enclave])
         return Grant(("--enclave", launcher.enclave), launcher_environment(self._launch.settings))
 
-    def _check(self, enclave: str) -> None:
+    def _check(self, policy: EnclavePolicy) -> None:
         """Nothing is repaired here: what changed since it was signed was changed by somebody else.
 
         Nodes that share an enclave, and restarts, pay for a look at its files only while nobody touches those.
         """
-        policy = self._policies[enclave]
+        enclave = policy.path
         if self._seen.get(enclave) == (policy, self._files(enclave)):
             return
+        keystore = self._launch.settings.keystore
         try:
-            wrong = what_is_wrong(self._launch.settings.keystore, policy, options=self._launch.options)
+            wrong = what_is_wrong(keystore, policy, options=self._launch.options)
         except KeystoreError as error:
-            raise ProvisionError(str(error)) from error
+            raise ProvisionError(
+                f"enclave {enclave} cannot be looked at any more, though it was provisioned for this launch: {error}"
+            ) from error
         if wrong:
             raise ProvisionError(
-                f"enclave {enclave} in {self._launch.settings.keystore} is no longer what was provisioned for this "
-                f"launch: {'; '.join(wrong)}. Find out who changed it; a new launch provisions it again"
+                f"enclave {enclave} in {keystore} is no longer what was provisioned for this launch: "
+                f"{'; '.join(wrong)}. {_who_changed_it(wrong)}"
             )
         self._seen[enclave] = (policy, self._files(enclave))
 
     def _files(self, enclave: str) -> tuple[tuple[str, int, int, int], ...]:
-        """What any change to the enclave's files changes: name, inode, size and time of each."""
+        """What any change to the enclave's files changes: name, inode, size and change time (which nobody can set back)
+        of each."""
         directory = os.path.join(self._launch.settings.keystore, layout.enclave_directory(enclave))
         try:
             with os.scandir(directory) as entries:
-                files = [(entry.name, entry.stat()) for entry in entries if not entry.is_dir(follow_symlinks=False)]
+                files = [
+                    (entry.name, entry.stat()) for entry in entries if not entry.is_dir(follow_symlinks=False)
+                ]
         except OSError:
             return ()
-        return tuple(sorted((name, status.st_ino, status.st_size, status.st_mtime_ns) for name, status in files))
+        return tuple(
+            sorted((name, status.st_ino, status.st_size, status.st_ctime_ns) for name, status in files)
+        )
 
     def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
         variables = dict(secured_environment(planned, self._launch.settings))
         if planned.enclave is not None and (OVERRIDE in environment or OVERRIDE in os.environ):
             variables[OVERRIDE] = planned.enclave.path
         return Grant(enclave_arguments(planned), variables)
+
+
+def _who_changed_it(wrong: tuple[str, ...]) -> str:
+    if OTHER_PERMISSIONS in wrong:
+        return (
+            "Another launch on this keystore that has an enclave of this name provisions its own permissions: give "
+            "each launch enclaves or a keystore of its own. If there is none, find out who changed it; a new launch "
+            "provisions it again"
+        )
+    return "Find out who changed it; a new launch provisions it again"

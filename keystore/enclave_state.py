@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import binascii
 import os
+import shlex
 import stat
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -29,6 +30,7 @@ PermissionsSource = Callable[[str, Validity], "bytes | None"]
 
 
 NEW = "new enclave"
+OTHER_PERMISSIONS = "other permissions"
 
 
 class Identity(Enum):
@@ -95,7 +97,8 @@ def _is_there(view: KeystoreView, directory: str) -> bool:
         try:
             if stat.S_ISLNK(os.lstat(path).st_mode):
                 raise UnsafeKeystore(
-                    f"{path!r} is a link; an enclave must be a real directory. Remove it: rm {path}"
+                    f"{printable(path)} is a link; an enclave must be a real directory. "
+                    f"Remove it: rm {shlex.quote(path)}"
                 )
         except FileNotFoundError:
             return False
@@ -206,10 +209,11 @@ def _permissions_stand(
         return False
     expected = wanted(subject_name(facts.common_name), facts.validity) or present.document
     if present.document != expected:
-        reasons.append("other permissions")
+        reasons.append(OTHER_PERMISSIONS)
         return False
     twin = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS_XML}")
-    if twin is not None and twin.replace(b"\r\n", b"\n") == present.document:
+    # A deployed enclave has none: nothing reads it but people.
+    if twin is None or twin.replace(b"\r\n", b"\n") == present.document:
         return True
     reasons.append("permissions.xml differs from what is signed")
     return False

@@ -7,7 +7,7 @@ every process just before it starts and returns when its enclave is complete on 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NoReturn, Protocol
 
 from launch.event_handlers import OnShutdown
@@ -48,19 +48,13 @@ class OpenDoor:
     """
 
     def __init__(self, launch: ProvisionedLaunch) -> None:
-        self._launch = launch
+        self._provider = PlanProvider(launch)
 
     def admit(self, process: ResolvedProcess, components: Sequence[ResolvedComponent]) -> Grant:
         """:raises ProvisionError: no manifest, or something to load that only a plan could have permitted."""
         if components:
             raise ProvisionError(f"{process.location}: {process.fqn} loads components; {_NEEDS_PLAN}")
-        known = self._launch.plan.evaluation
-        plan = self._launch.plan.planner.plan(replace(known, processes=(*known.processes, process)))
-        new = [problem for problem in plan.problems if problem not in self._launch.plan.problems]
-        if new:
-            raise ProvisionError("\n".join(new))
-        self._launch = replace(self._launch, plan=plan)
-        return PlanProvider(self._launch).ensure(process)
+        return self._provider.ensure_late(process)
 
     def launcher(self) -> Grant | None:
         return None

@@ -162,6 +162,7 @@ class ProcessTree:
     """Use as an async context manager: leaving it ends everything that is still running."""
 
     def __init__(self) -> None:
+        _occupy_standard_descriptors()
         ours, theirs = socket.socketpair()
         with theirs:
             os.set_inheritable(theirs.fileno(), True)
@@ -285,6 +286,13 @@ class ProcessTree:
                 child.started.set_exception(RuntimeFailure("the warden process was killed"))
         if self.lost is not None and not self.lost.done():
             self.lost.set_result(None)
+
+
+def _occupy_standard_descriptors() -> None:
+    """Where we were started with one of 0, 1, 2 closed: what we open must not end up there, and be printed into."""
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
 
 
 def _warden_script() -> str:

@@ -67,8 +67,10 @@ def run_launch(
 ) -> int:
     """Run a launch file to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
 
-    :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed.
+    :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed, not the
+        main thread.
     """
+    _require_signals()
 
     async def main() -> int:
         service = LaunchService(launch_file, arguments, gate=gate, options=options or RunOptions())
@@ -129,7 +131,7 @@ class LaunchService:
             stack.callback(_running.release)
             tree = ProcessTree()  # first: the warden starts up while we go on
             await stack.enter_async_context(tree)
-            _allow_many_descriptors()
+            stack.enter_context(_many_descriptors())
             self._services = self._ros_services()
             if self._services is not None:
                 stack.callback(self._services.close)
@@ -302,15 +304,32 @@ class LaunchService:
         self._log.log(level, "launch", message)
 
 
-def _allow_many_descriptors() -> None:
+@contextmanager
+def _many_descriptors() -> Iterator[None]:
     """Each process costs us three. The warden runs already: its children keep the limit we were given."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    if soft != hard:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 class _Over(Exception):
     """Nothing is left to wait for."""
+
+
+def _require_signals() -> None:
+    """Only the main thread can take the signals of a process, and only one that runs no loop can block."""
+    if threading.current_thread() is not threading.main_thread():
+        raise RuntimeFailure(
+            "run() takes the signals of the process, which only its main thread can; "
+            "in another thread use asyncio.run(run_async(...))"
+        )
+    if asyncio._get_running_loop() is not None:
+        raise RuntimeFailure(
+            "run() would block the event loop that is running here; await run_async(...) instead"
+        )
 
 
 @contextmanager

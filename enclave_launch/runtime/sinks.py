@@ -28,19 +28,15 @@ class Sink(Protocol):
 
 
 class ScreenSink:
-    """Our own standard output. A reader that went away costs the screen, not the robot."""
+    """Our own standard output; None where it is closed. A reader that went away costs the screen, not the robot."""
 
-    def __init__(self, stream: TextIO) -> None:
+    def __init__(self, stream: TextIO | None) -> None:
         self._stream = stream
-        self._gone = False
-        try:
-            stream.flush()
-            self._descriptor: int | None = stream.fileno()
-        except (OSError, ValueError):  # a stream in memory, as test runners put in place
-            self._descriptor = None
+        self._gone = stream is None
+        self._descriptor = _descriptor_of(stream)
 
     def write(self, data: bytes) -> None:
-        if self._gone:
+        if self._gone or self._stream is None:
             return
         try:
             if self._descriptor is None:
@@ -146,6 +142,17 @@ def _merged(batch: list[tuple[Sink, bytes]]) -> list[tuple[Sink, bytes]]:
     for sink, data in batch:
         pieces.setdefault(sink, []).append(data)
     return [(sink, b"".join(parts)) for sink, parts in pieces.items()]
+
+
+def _descriptor_of(stream: TextIO | None) -> int | None:
+    """None for a stream in memory, as test runners put in place."""
+    if stream is None:
+        return None
+    try:
+        stream.flush()
+        return stream.fileno()
+    except (OSError, ValueError):
+        return None
 
 
 def _write_all(descriptor: int, data: bytes) -> None:

@@ -234,10 +234,11 @@ def test_the_keystore_passes_openssl(demo: Workspace) -> None:
 
 
 PROGRAM = """
-import json, sys
+import os, sys
 import stand_ins
 stand_ins.install()
 from launch import LaunchDescription, LaunchService
+from launch.actions import OpaqueFunction
 from launch_ros.actions import ComposableNodeContainer, Node, PushRosNamespace
 from launch_ros.descriptions import ComposableNode
 from enclave_launch.ros2.secured import secured
@@ -245,7 +246,14 @@ from enclave_launch.ros2.secured import secured
 def node(**options):
     return Node(package="demo", output="screen", **options)
 
+def tamper(context):
+    with open(sys.argv[2] + "/enclaves/permissions.p7s", "ab") as file:
+        file.write(b"x")
+    os.remove(sys.argv[2] + "/enclaves/key.pem")
+
 cases = {
+    "shared": [node(executable="talker"), node(executable="listener", remappings=[("chatter", "news")])],
+    "tampered": [node(executable="talker"), OpaqueFunction(function=tamper), node(executable="listener")],
     "plain": [node(executable="talker"), PushRosNamespace("robot"), node(executable="listener", name="ears"),
               node(executable="talker", enclave="sub")],
     "components": [ComposableNodeContainer(package="rclcpp_components", executable="component_container", name="box",
@@ -271,6 +279,20 @@ def test_a_description_in_a_program_is_secured(demo: Workspace) -> None:
     for enclave in ("/", "/robot", "/robot/sub"):
         assert f"enclave={enclave} " in screen
         assert (keystore / "enclaves" / enclave.lstrip("/") / "permissions.p7s").is_file()
+
+
+def test_each_node_extends_the_permissions_of_an_enclave_that_they_share(demo: Workspace) -> None:
+    status, screen = program(demo, "shared", demo.directory / "ks")
+    assert status == 0, screen
+    permissions = (demo.directory / "ks/enclaves/permissions.xml").read_text()
+    assert "<topic>rt/chatter</topic>" in permissions and "<topic>rt/news</topic>" in permissions
+
+
+def test_an_enclave_that_somebody_changed_is_not_extended(demo: Workspace) -> None:
+    status, screen = program(demo, "tampered", demo.directory / "ks")
+    assert status == 1
+    assert "is no longer what was provisioned for this launch" in screen
+    assert "[listener-2]: process started" not in screen
 
 
 def test_what_only_a_plan_could_permit_is_refused_there(demo: Workspace) -> None:
