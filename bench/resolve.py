@@ -30,10 +30,11 @@ from bench.synthetic_stack import write_nodes, write_stack  # noqa: E402
 RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 5
 
 OURS = """
-import sys
+import gc, sys
 from enclave_launch.evaluation.evaluate import evaluate
 result = evaluate(sys.argv[1])
 print(len(result.processes), len(result.components))
+gc.freeze()  # ends as the command line does: without a last search for garbage
 """
 
 FLOOR = """

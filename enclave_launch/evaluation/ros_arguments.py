@@ -15,6 +15,7 @@ _PARAMETER = ("-p", "--param")
 _PARAMETER_FILE = ("--params-file",)
 _ENCLAVE = ("-e", "--enclave")
 _OTHER_WITH_VALUE = ("--log-level", "--log-config-file", "--log-file-name")
+_WITH_VALUE = frozenset((*_REMAP, *_PARAMETER, *_PARAMETER_FILE, *_ENCLAVE, *_OTHER_WITH_VALUE))
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +69,7 @@ def _flags(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
             inside = True
         elif inside and word == "--":
             inside = False
-        elif inside and word in (*_REMAP, *_PARAMETER, *_PARAMETER_FILE, *_ENCLAVE, *_OTHER_WITH_VALUE):
+        elif inside and word in _WITH_VALUE:
             value = next(words, None)
             if value is not None:
                 yield word, value

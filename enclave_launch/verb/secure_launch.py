@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from enclave_launch.errors import EnclaveLaunchError, UsageError
+from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 
 if TYPE_CHECKING:
@@ -105,8 +106,11 @@ def _show_file(target: Target, options: argparse.Namespace) -> int:
 
 def _show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
     text = _plan_text(plan, options, keystore)
+    if options.format == "policy" or options.dump_params or options.explain:  # the tree and the JSON hold them
+        _warn((*plan.problems, *plan.warnings))
     machine_readable = options.dump_params or (options.format != "tree" and not options.explain)
     sys.stdout.write(text if machine_readable else _with_short_paths(text))
+    gc.freeze()  # the process ends now: no last search for garbage among all that was read
     return 0
 
 
@@ -129,12 +133,20 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
         security = SecuritySettings(keystore, options.strategy) if keystore else None
         return plan_json(plan, security) + "\n"
     if options.format == "policy":
-        from keystore.policy_xml import policy_xml
-
-        return policy_xml(plan.derived.policy).decode()
+        return _policy_text(plan)
     from enclave_launch.report.tree import plan_tree
 
     return plan_tree(plan)
+
+
+def _policy_text(plan: LaunchPlan) -> str:
+    """Raises ``ManifestError`` when there is no enclave to write: SROS2's schema wants at least one."""
+    from keystore.policy_xml import policy_xml
+
+    if not plan.derived.policy.enclaves:
+        nothing = "no enclave with known permissions: there is no policy to print"
+        raise ManifestError("\n".join((*plan.problems, nothing)))
+    return policy_xml(plan.derived.policy).decode()
 
 
 def _explained(plan: LaunchPlan, subject: str) -> str:

@@ -75,6 +75,9 @@ class Entity(BaseEntity):
     ) -> Any:
         attributes = self._element.attrib
         text = attributes.get(name)
+        if data_type is str and text is not None and name + "-sep" not in attributes:
+            self._read_attributes.add(name)
+            return text
         if data_type not in _VALUE_TYPES and check_is_list_entity(data_type):
             return self._children_named(name, data_type, optional)
         if text is None:
@@ -87,8 +90,6 @@ class Entity(BaseEntity):
         if separator is not None:
             self._read_attributes.add(name + "-sep")
             value = text.split(separator)
-        elif data_type is str:
-            return text
         return self._typed(name, value, data_type, can_be_str)
 
     def _typed(self, name: str, value: str | list[str], data_type: Any, can_be_str: bool) -> Any:

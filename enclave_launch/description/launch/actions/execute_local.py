@@ -199,28 +199,32 @@ class ExecuteLocal(Action):
         context.register_event_handler(OnProcessExit(target_action=self, on_exit=on_exit))
 
     def resolve(self, context: LaunchContext) -> ResolvedProcess:
-        """The prepared process as a value. Subclasses add what they know of the node."""
+        """The prepared process as a value."""
+        return ResolvedProcess(**self.resolved_fields(context))
+
+    def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
+        """The fields of ``resolve``'s value. Subclasses replace what they know better of their node."""
         description = self.__process_description
         name, cmd = description.final_name or "", tuple(description.final_cmd or ())
-        return ResolvedProcess(
-            index=int(name.rpartition("-")[2]),
-            kind="executable",
-            package=None,
-            executable=first_word(cmd),
-            process_name=name,
-            name=None,
-            namespace=None,
-            fqn=None,
-            cmd=cmd,
-            remaps=(),
-            parameters={},
-            environment=self.__changed_environment(context),
-            enclave=self.enclave_request(context),
-            location=location_of(self, context),
-            on_event=context.on_event,
-            cwd=description.final_cwd,
-            shell=self.__shell is True,  # other true values do not make one, as upstream
-        )
+        return {
+            "index": int(name.rpartition("-")[2]),
+            "kind": "executable",
+            "package": None,
+            "executable": first_word(cmd),
+            "process_name": name,
+            "name": None,
+            "namespace": None,
+            "fqn": None,
+            "cmd": cmd,
+            "remaps": (),
+            "parameters": {},
+            "environment": self.__changed_environment(context),
+            "enclave": self.enclave_request(context),
+            "location": location_of(self, context),
+            "on_event": context.on_event,
+            "cwd": description.final_cwd,
+            "shell": self.__shell is True,  # other true values do not make one, as upstream
+        }
 
     def enclave_request(self, context: LaunchContext) -> EnclaveRequest:
         """What the launch file says about the enclave, without the user's own ROS arguments."""

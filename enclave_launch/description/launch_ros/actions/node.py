@@ -10,6 +10,7 @@ from enclave_launch.description.launch.actions.execute_process import ExecutePro
 from enclave_launch.description.launch.frontend import Entity, Parser, expose_action
 from enclave_launch.description.launch.frontend.type_utils import get_data_type_from_identifier
 from enclave_launch.description.launch.substitution import Substitution
+from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
 from enclave_launch.description.launch.utilities import (
     ensure_argument_type,
     normalize_to_list_of_substitutions,
@@ -41,7 +42,8 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_ros.node_action_extension import NodeActionExtension
     from enclave_launch.description.launch_ros.parameters_type import SomeParameters
     from enclave_launch.description.launch_ros.remap_rule_type import SomeRemapRules
-    from enclave_launch.process import ResolvedProcess
+    from enclave_launch.process import EnclaveRequest
+    from enclave_launch.source_location import SourceLocation
 
 
 class RosSpecificArgument(Substitution):
@@ -183,7 +185,7 @@ class Node(ExecuteProcess):
         namespace = make_namespace_absolute(prefix_namespace(pushed, own))
         if namespace is not None:
             self.__expanded_namespace = namespace
-            self.cmd.extend([normalize_to_list_of_substitutions("-r"), [RosSpecificArgument("ns")]])
+            self.cmd.extend([[TextSubstitution(text="-r")], [RosSpecificArgument("ns")]])
             validate_namespace(namespace)
         self.__final_name = prefix_namespace(self.__expanded_namespace, self.__expanded_name)
 
@@ -195,7 +197,7 @@ class Node(ExecuteProcess):
             self.__extend_command(word for rule in rules for word in ("-r", f"{rule[0]}:={rule[1]}"))
 
     def __extend_command(self, words: Iterable[str]) -> None:
-        self.cmd.extend(normalize_to_list_of_substitutions(word) for word in words)
+        self.cmd.extend([[TextSubstitution(text=word)] for word in words])
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
         self._perform_substitutions(context)
@@ -211,28 +213,27 @@ class Node(ExecuteProcess):
             warn_about_repeats(context, self.node_name, self.name)
         return actions
 
-    def resolve(self, context: LaunchContext) -> ResolvedProcess:
-        process = super().resolve(context)
-        words = self.__words_after_program(process)
-        found = parse_ros_arguments(words)
-        package = None if self.__package is None else _text(context, self.__package)
-        return replace(
-            process,
-            kind=self.process_kind,
-            package=package,
-            executable=_text(context, self.__executable),
-            name=self.__expanded_name,
-            namespace=self.__expanded_namespace,
-            fqn=self.node_name,
-            remaps=tuple(placed(rule, process.location) for rule in self.__expanded_remappings or ()),
-            parameters=self.__parameters.resolve(self.__name_tokens(), found.parameters),
-            parameter_files=self.__parameters.written_files(context),
-            enclave=replace(process.enclave, argument=found.enclave) if found.enclave else process.enclave,
-        )
+    def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
+        fields = super().resolved_fields(context)
+        place: SourceLocation = fields["location"]
+        enclave: EnclaveRequest = fields["enclave"]
+        found = parse_ros_arguments(self.__words_after_program(fields["cmd"]))
+        return fields | {
+            "kind": self.process_kind,
+            "package": None if self.__package is None else _performed(context, self.__package),
+            "executable": _performed(context, self.__executable),
+            "name": self.__expanded_name,
+            "namespace": self.__expanded_namespace,
+            "fqn": self.node_name,
+            "remaps": tuple([placed(rule, place) for rule in self.__expanded_remappings or ()]),
+            "parameters": self.__parameters.resolve(self.__name_tokens(), found.parameters),
+            "parameter_files": self.__parameters.written_files(context),
+            "enclave": replace(enclave, argument=found.enclave) if found.enclave else enclave,
+        }
 
-    def __words_after_program(self, process: ResolvedProcess) -> tuple[str, ...]:
-        prefix_length = len(process.cmd) - len(self.process_description.cmd)
-        return process.cmd[prefix_length + 1 :]
+    def __words_after_program(self, cmd: tuple[str, ...]) -> tuple[str, ...]:
+        prefix_length = len(cmd) - len(self.process_description.cmd)
+        return cmd[prefix_length + 1 :]
 
     def __name_tokens(self) -> list[str | None]:
         """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""
@@ -250,7 +251,7 @@ _TEXT_ATTRIBUTES = (
 )
 
 
-def _text(context: LaunchContext, value: SomeSubstitutionsType) -> str:
+def _performed(context: LaunchContext, value: SomeSubstitutionsType) -> str:
     return perform_substitutions(context, normalize_to_list_of_substitutions(value))
 
 
