@@ -1,13 +1,22 @@
-"""How long from the command to the first process, and what ``--secure`` adds to it.
+"""How long from the command to the first and the last process, and what ``--secure`` adds to that.
 
-Times whole commands as a person starts them: interpreter, imports, evaluation, keystore, process. The nodes
-are small shell scripts that write down when they were started. Each figure is the median of several runs.
+Times whole commands as a person starts them: interpreter, imports, evaluation, keystore, process. The nodes are small
+shell scripts that write down when they were started.
 
-    plain            secure-launch
-    secured, cold    secure-launch --secure, keystore created in the run
-    secured, warm    the same with everything in the keystore already
-    ros2 launch      upstream's engine without security, where launch, launch_ros and ros2launch are
-    importable floor            the interpreter starting the same programs with nothing decided
+    floor                the interpreter starting the same programs with nothing decided
+    plain                secure-launch
+    secured, cold        secure-launch --secure, keystore created in the run
+    secured, warm        the same with everything in the keystore already
+    ros2 launch          upstream's engine without security
+    ros2 launch, warm    upstream's engine with our --secure and everything in the keystore already
+
+The last two where launch, launch_ros and ros2launch are importable, from a sourced workspace or from the folders in
+``REAL_LAUNCH_PYTHONPATH``; only they get these on their path.
+
+What makes the figures hold on a machine that does other things, too: every round runs each variant once, in random order,
+so that a disturbance or a change of the clock rate meets all alike; a figure is the median over rounds (``BENCH_RUNS``,
+by default 15) after one that only warms caches; what ``--secure`` adds is the median of the differences *within* rounds,
+shown with its quartiles. CPU time counts launcher and nodes together.
 
 Also: output through our pumps to a file, against ``cat``.
 """
@@ -15,6 +24,7 @@ Also: output through our pumps to a file, against ``cat``.
 from __future__ import annotations
 
 import os
+import random
 import resource
 import shutil
 import statistics
@@ -22,8 +32,8 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import astuple, dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,12 +45,14 @@ if TYPE_CHECKING:
 else:
     import upstream
 
-RUNS = int(os.environ.get("BENCH_RUNS", "5"))
+REAL_LAUNCH = [path for path in os.environ.get("REAL_LAUNCH_PYTHONPATH", "").split(os.pathsep) if path]
+sys.path.extend(REAL_LAUNCH)
+ROUNDS = int(os.environ.get("BENCH_RUNS", "15"))
 NODES = 50
 PACKAGE = "bench_nodes"
 
-SCRIPT = """#!/bin/sh
-date +%s%N >> "$BENCH_STAMPS"
+SCRIPT = """#!/bin/bash
+echo "$EPOCHREALTIME" >> "$BENCH_STAMPS"
 """
 MANIFEST = """<interface version="1">
   <node name="node" executable="node">
@@ -62,6 +74,9 @@ class Times:
     cpu: float
 
 
+COLUMNS = ("first", "last", "cpu")
+
+
 class Workspace:
     """An ament prefix with one node, launched once and ``NODES`` times."""
 
@@ -70,7 +85,6 @@ class Workspace:
         self.prefix = directory / "prefix"
         self.stamps = directory / "stamps"
         self.program = self.prefix / "lib" / PACKAGE / "node"
-        self.keystore = directory / "keystore"
         share = self.prefix / "share" / PACKAGE
         for folder in (share, self.program.parent, self.prefix / "share/ament_index/resource_index/packages"):
             folder.mkdir(parents=True, exist_ok=True)
@@ -91,7 +105,7 @@ class Workspace:
     def launch_file(self, count: int) -> Path:
         return self.directory / f"{count}.launch.xml"
 
-    def environment(self) -> dict[str, str]:
+    def environment(self, path: Sequence[str] = ()) -> dict[str, str]:
         prefixes = [str(self.prefix), os.environ.get("AMENT_PREFIX_PATH", "")]
         inherited = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
         return {
@@ -99,30 +113,37 @@ class Workspace:
             "PYTHONPYCACHEPREFIX": str(self.directory / "bytecode"),
             "BENCH_STAMPS": str(self.stamps),
             "AMENT_PREFIX_PATH": os.pathsep.join(filter(None, prefixes)),
-            "PYTHONPATH": os.pathsep.join(
-                [str(self.site), str(ROOT / "tests/ros2"), os.environ.get("PYTHONPATH", "")]
-            ),
+            "PYTHONPATH": os.pathsep.join(filter(None, [*path, os.environ.get("PYTHONPATH", "")])),
             "ROS_LOG_DIR": str(self.directory / "log"),
         }
 
-    def time(self, command: list[str]) -> Times:
+    def time(self, variant: Variant, count: int) -> Times:
+        if variant.forgets is not None:
+            shutil.rmtree(variant.forgets, ignore_errors=True)
         self.stamps.unlink(missing_ok=True)
-        used = cpu_of_children()
-        start = time.time_ns()
+        used, start = cpu_of_children(), time.time()
         done = subprocess.run(
-            command,
-            env=self.environment(),
+            variant.command,
+            env=self.environment(variant.path),
             stdin=subprocess.DEVNULL,
             capture_output=True,
             text=True,
             check=False,
         )
         if done.returncode != 0:
-            raise SystemExit(f"{' '.join(command)} failed:\n{done.stdout}{done.stderr}")
-        while not self.stamps.is_file():
-            time.sleep(0.01)
-        stamps = [int(line) for line in self.stamps.read_text().split()]
-        return Times((min(stamps) - start) / 1e6, (max(stamps) - start) / 1e6, cpu_of_children() - used)
+            raise SystemExit(f"{' '.join(variant.command)} failed:\n{done.stdout}{done.stderr}")
+        stamps = self.all_stamps(count)
+        return Times((min(stamps) - start) * 1e3, (max(stamps) - start) * 1e3, cpu_of_children() - used)
+
+    def all_stamps(self, count: int) -> list[float]:
+        """Seconds since the epoch at which each node was started; the floor does not wait for them to end."""
+        deadline = time.monotonic() + 10
+        while time.monotonic() < deadline:
+            lines = self.stamps.read_text().splitlines() if self.stamps.is_file() else []
+            if len(lines) == count:
+                return [float(line.replace(",", ".")) for line in lines]
+            time.sleep(0.005)
+        raise SystemExit(f"{len(lines)} of {count} nodes were started")
 
 
 def cpu_of_children() -> float:
@@ -131,62 +152,84 @@ def cpu_of_children() -> float:
     return (usage.ru_utime + usage.ru_stime) * 1e3
 
 
-def secure_launch(workspace: Workspace, count: int, *options: str) -> list[str]:
-    program = [
-        sys.executable,
-        "-c",
-        "import sys; from enclave_launch.verb.secure_launch import main; sys.exit(main())",
-    ]
-    return [*program, *options, str(workspace.launch_file(count))]
+@dataclass(frozen=True)
+class Variant:
+    """One way to start the nodes. ``path``: before its PYTHONPATH; ``forgets``: a keystore removed before each run."""
+
+    command: Sequence[str]
+    path: tuple[str, ...] = ()
+    forgets: Path | None = None
 
 
-def secured(workspace: Workspace, count: int) -> list[str]:
-    return secure_launch(workspace, count, "--secure", "--keystore", str(workspace.keystore))
+def secure_launch(*words: str) -> list[str]:
+    main = "import sys; from enclave_launch.verb.secure_launch import main; sys.exit(main())"
+    return [sys.executable, "-c", main, *words]
 
 
-def ros2_launch(workspace: Workspace, count: int) -> list[str]:
-    return [sys.executable, str(ROOT / "tests/ros2/ros2_launch.py"), str(workspace.launch_file(count))]
+def secured_by(keystore: Path) -> list[str]:
+    return ["--secure", "--keystore", str(keystore)]
 
 
-def median(measure: Callable[[], Times], prepare: Callable[[], object] = lambda: None) -> Times:
-    """The first run only warms caches: bytecode, files."""
-    results = []
-    for _ in range(RUNS + 1):
-        prepare()
-        results.append(measure())
-    del results[0]
-    return Times(*(statistics.median(values) for values in zip(*map(astuple, results), strict=True)))
+def variants(workspace: Workspace, count: int) -> Mapping[str, Variant]:
+    file = str(workspace.launch_file(count))
+    cold, warm = (workspace.directory / f"{name}-{count}" for name in ("cold", "warm"))
+    found = {
+        "floor": Variant([sys.executable, "-c", FLOOR, str(workspace.program), str(count)]),
+        "plain": Variant(secure_launch(file)),
+        "secured, cold": Variant(secure_launch(*secured_by(cold), file), forgets=cold),
+        "secured, warm": Variant(secure_launch(*secured_by(warm), file)),
+    }
+    if workspace.site.is_dir():
+        peer = [sys.executable, str(ROOT / "tests/ros2/ros2_launch.py")]
+        path = (str(workspace.site), str(ROOT / "tests/ros2"), str(ROOT), *REAL_LAUNCH)
+        found["ros2 launch"] = Variant([*peer, file], path)
+        found["ros2 launch, warm"] = Variant([*peer, *secured_by(warm), file], path)
+    return found
 
 
-def measured(workspace: Workspace, count: int) -> Iterable[tuple[str, Times | None]]:
-    def forget() -> None:
-        shutil.rmtree(workspace.keystore, ignore_errors=True)
+def measured(workspace: Workspace, count: int) -> Mapping[str, list[Times]]:
+    """All rounds of all variants but the first, which warms caches: bytecode, files, keystores."""
+    chosen = variants(workspace, count)
+    results: dict[str, list[Times]] = {name: [] for name in chosen}
+    for _ in range(ROUNDS + 1):
+        for name in random.sample(list(chosen), len(chosen)):
+            results[name].append(workspace.time(chosen[name], count))
+    return {name: times[1:] for name, times in results.items()}
 
-    floor = [sys.executable, "-c", FLOOR, str(workspace.program), str(count)]
-    yield "floor", median(lambda: workspace.time(floor))
-    yield "plain", median(lambda: workspace.time(secure_launch(workspace, count)))
-    yield "secured, cold", median(lambda: workspace.time(secured(workspace, count)), forget)
-    yield "secured, warm", median(lambda: workspace.time(secured(workspace, count)))
-    peer = ros2_launch(workspace, count)
-    yield "ros2 launch", median(lambda: workspace.time(peer)) if workspace.site.is_dir() else None
+
+def median(times: Sequence[Times]) -> Times:
+    return Times(*(statistics.median(getattr(item, column) for item in times) for column in COLUMNS))
 
 
 def report_starts(workspace: Workspace) -> None:
     for count in (1, NODES):
-        rows = dict(measured(workspace, count))
-        peer, floor, plain, warm = (rows[name] for name in ("ros2 launch", "floor", "plain", "secured, warm"))
-        assert floor is not None and plain is not None and warm is not None
-        title = f"{count} node(s), median of {RUNS}"
+        results = measured(workspace, count)
+        rows = {name: median(times) for name, times in results.items()}
+        peer = rows.get("ros2 launch")
+        title = f"{count} node(s), median of {ROUNDS}"
         print(f"\n{title:24} {'first':>10} {'last':>10} {'CPU':>10} {'x floor':>9} {'x ros2 launch':>14}")
         for name, times in rows.items():
-            if times is None:
-                print(f"  {name:22} not available")
-                continue
             ratio = f"{times.last / peer.last:14.2f}" if peer else f"{'-':>14}"
             columns = f"{times.first:7.0f} ms {times.last:7.0f} ms {times.cpu:7.0f} ms"
-            print(f"  {name:22} {columns} {times.last / floor.last:9.1f} {ratio}")
-        added = f"{warm.last - plain.last:+.0f} ms until the last process, {warm.cpu - plain.cpu:+.0f} ms CPU"
-        print(f"  --secure on a warm keystore: {added}")
+            print(f"  {name:22} {columns} {times.last / rows['floor'].last:9.1f} {ratio}")
+        if peer is None:
+            print(f"  ros2 launch            not available: no {', '.join(upstream.missing())}")
+        for before, after in (("plain", "secured, warm"), ("ros2 launch", "ros2 launch, warm")):
+            if before in results:
+                print(
+                    f"  {after!r} adds to {before!r}:",
+                    *differences(results[before], results[after]),
+                    sep="\n    ",
+                )
+
+
+def differences(before: Sequence[Times], after: Sequence[Times]) -> Iterator[str]:
+    """Of runs in the same round."""
+    labels = ("until the first process", "until the last process", "CPU")
+    for column, label in zip(COLUMNS, labels, strict=True):
+        added = [getattr(b, column) - getattr(a, column) for a, b in zip(before, after, strict=True)]
+        low, middle, high = statistics.quantiles(added, n=4)
+        yield f"{label:24} {middle:+6.1f} ms  (half of the rounds between {low:+.1f} and {high:+.1f})"
 
 
 def report_output(workspace: Workspace, title: str, command: str) -> None:
@@ -199,7 +242,7 @@ def report_output(workspace: Workspace, title: str, command: str) -> None:
     floor = time.perf_counter() - start
     size, lines = plain.stat().st_size / 1e6, plain.read_bytes().count(b"\n")
     used, start = cpu_of_children(), time.perf_counter()
-    launch = [*secure_launch(workspace, 1)[:-1], str(file)]
+    launch = secure_launch(str(file))
     subprocess.run(launch, env=workspace.environment(), capture_output=True, check=True)
     ours, cpu = time.perf_counter() - start, (cpu_of_children() - used) / 1e3
     logged = (workspace.directory / "log/latest/launch.log").read_bytes().count(b" [noise-1] ")
