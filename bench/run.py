@@ -13,10 +13,10 @@ shell scripts that write down when they were started.
 The last two where launch, launch_ros and ros2launch are importable, from a sourced workspace or from the folders in
 ``REAL_LAUNCH_PYTHONPATH``; only they get these on their path.
 
-What makes the figures hold on a machine that does other things, too: every round runs each variant once, in random order,
-so that a disturbance or a change of the clock rate meets all alike; a figure is the median over rounds (``BENCH_RUNS``,
-by default 15) after one that only warms caches; what ``--secure`` adds is the median of the differences *within* rounds,
-shown with its quartiles. CPU time counts launcher and nodes together.
+What makes the figures hold on a machine that does other things, too: every round runs each variant once, in random
+order, so that a disturbance meets all alike; a figure is the median over rounds (``BENCH_RUNS``,
+by default 15) after one that only warms caches; what ``--secure`` adds is the median of the differences *within*
+rounds, shown with its quartiles. CPU time counts launcher and nodes together.
 
 Also: output through our pumps to a file, against ``cat``.
 """
