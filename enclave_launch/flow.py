@@ -11,7 +11,6 @@ running event loop await ``run_async``. Errors are ``EnclaveLaunchError``; ``str
 from __future__ import annotations
 
 import os
-import secrets
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -100,7 +99,7 @@ def resolve(
         tuple(arguments),
         tuple(map(os.path.abspath, chosen.prefixes)),
         {**chosen.launch_configurations},
-        {**chosen.host_options(), "anonymous_seed": secrets.randbits(64)},
+        {**chosen.host_options(), "anonymous_seed": int.from_bytes(os.urandom(8), "big")},
     )
     with ament_prefixes(source.prefixes):
         evaluation = evaluate(

@@ -21,8 +21,7 @@ from functools import partial
 from pathlib import Path
 
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
-from nodl.document import V1_SUFFIX, ManifestNode, read_document
-from nodl.document.v2_include import RESOURCE_TYPE, resource_key
+from nodl.document import RESOURCE_TYPE, V1_SUFFIX, ManifestNode, read_document, resource_key
 from nodl.errors import ConflictingNoDLError
 from nodl.node_interface import NodeInterface
 

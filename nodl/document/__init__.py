@@ -10,10 +10,11 @@ from nodl.document.manifest_node import ManifestNode
 from nodl.errors import InvalidNoDLError
 from nodl.source_ref import SourceRef
 
-__all__ = ["V1_SUFFIX", "V2_SUFFIXES", "ManifestNode", "read_document"]
+__all__ = ["RESOURCE_TYPE", "V1_SUFFIX", "V2_SUFFIXES", "ManifestNode", "read_document", "resource_key"]
 
 V1_SUFFIX = ".nodl.xml"
 V2_SUFFIXES = (".nodl.yaml", ".nodl.yml", ".nodl.json", ".yaml", ".yml", ".json")
+RESOURCE_TYPE = "nodl"  # of v2 documents in the ament index
 _MAX_BYTES = 4_000_000
 
 
@@ -25,14 +26,20 @@ def read_document(
     ``name`` is the registered name of a v2 document (default: from the file name). Raises
     ``InvalidNoDLError`` with file:line, also for a file that cannot be read.
     """
-    from nodl.document.v1 import parse_v1
-    from nodl.document.v2 import parse_v2
-
     file = str(path)
     text = _read(file)
     if text.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<":
+        from nodl.document.v1 import parse_v1
+
         return parse_v1(text, file, package)
+    from nodl.document.v2 import parse_v2
+
     return (parse_v2(text, file, package=package, name=name or _stem(file), prefixes=prefixes),)
+
+
+def resource_key(package: str, name: str) -> str:
+    """Name in the ament index of the v2 document ``nodl://package/name``."""
+    return f"{package}__{name}"
 
 
 def _read(file: str) -> bytes:

@@ -8,14 +8,13 @@ as rcl would, which the schema leaves open.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
 from nodl.document.manifest_node import ManifestNode
+from nodl.document.xml_text import XmlElement, parse_xml
 from nodl.errors import (
     InvalidElementError,
     InvalidNodeChildError,
     InvalidNoDLDocumentError,
-    InvalidXMLError,
     UnsupportedInterfaceError,
 )
 from nodl.name_template import NameTemplate
@@ -30,10 +29,6 @@ from nodl.names import (
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 from nodl.source_ref import SourceRef
 
-if TYPE_CHECKING:
-    from lxml import etree
-
-MAX_BYTES = 4_000_000
 VERSION = 1
 
 # element -> role -> the endpoints it stands for
@@ -58,7 +53,7 @@ _ROLES: dict[str, dict[str, tuple[EndpointKind, ...]]] = {
 
 def parse_v1(text: bytes, file: str, package: str | None = None) -> tuple[ManifestNode, ...]:
     """The nodes of one document, in document order. Raises ``InvalidNoDLError`` with file:line."""
-    root = _parse_xml(text, file)
+    root = parse_xml(text, file)
     _expect(root, "interface", ("version",), file)
     version = root.get("version", "")
     if version != str(VERSION):
@@ -71,33 +66,7 @@ def parse_v1(text: bytes, file: str, package: str | None = None) -> tuple[Manife
     return nodes
 
 
-def _parse_xml(text: bytes, file: str) -> etree._Element:
-    """No DOCTYPE, no entities, no network; comments and processing instructions are dropped."""
-    from lxml import etree
-
-    if len(text) > MAX_BYTES:
-        raise InvalidXMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
-    parser = etree.XMLParser(
-        resolve_entities=False,
-        no_network=True,
-        load_dtd=False,
-        huge_tree=False,
-        remove_comments=True,
-        remove_pis=True,
-    )
-    try:
-        if b"<!DOCTYPE" not in text:
-            root = etree.fromstring(text, parser)
-            if root.getroottree().docinfo.internalDTD is None:
-                return root
-    except etree.XMLSyntaxError as error:
-        raise InvalidXMLError.at(
-            SourceRef(file, error.lineno or 0), f"not well-formed XML: {error.msg}"
-        ) from None
-    raise InvalidXMLError.at(SourceRef(file), "a DOCTYPE is not allowed; remove it and write entities out")
-
-
-def _node(element: etree._Element, file: str, package: str | None) -> ManifestNode:
+def _node(element: XmlElement, file: str, package: str | None) -> ManifestNode:
     _expect(element, "node", ("name", "executable"), file)
     namespace, name = _node_name(element, file)
     executable = element.get("executable", "")
@@ -134,7 +103,7 @@ def _node(element: etree._Element, file: str, package: str | None) -> ManifestNo
     return ManifestNode(interface, VERSION, parameters)
 
 
-def _node_name(element: etree._Element, file: str) -> tuple[str | None, str]:
+def _node_name(element: XmlElement, file: str) -> tuple[str | None, str]:
     """Namespace (when the name has one, as in ``/ns/node``) and node name."""
     written = element.get("name", "")
     try:
@@ -149,9 +118,9 @@ def _node_name(element: etree._Element, file: str) -> tuple[str | None, str]:
         raise InvalidElementError.at(_at(element, file), f"<node> {error}") from None
 
 
-def _endpoints(element: etree._Element, file: str, own_prefix: str) -> list[Endpoint]:
+def _endpoints(element: XmlElement, file: str, own_prefix: str) -> list[Endpoint]:
     """``/node_name/x`` is v1's habit of writing the private name ``~/x``, and is taken as that."""
-    tag = str(element.tag)
+    tag = element.tag
     _expect(element, tag, ("name", "type", "role"), file)
     name, role = element.get("name", ""), element.get("role", "")
     if role not in _ROLES[tag]:
@@ -180,7 +149,7 @@ def _once(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
     return tuple(first.values())
 
 
-def _expect(element: etree._Element, tag: str, attributes: tuple[str, ...], file: str) -> None:
+def _expect(element: XmlElement, tag: str, attributes: tuple[str, ...], file: str) -> None:
     if element.tag != tag:
         raise InvalidNoDLDocumentError.at(_at(element, file), f"expected <{tag}>, found <{element.tag}>")
     for name in attributes:
@@ -192,16 +161,14 @@ def _expect(element: etree._Element, tag: str, attributes: tuple[str, ...], file
     _no_text(element, file)
 
 
-def _no_text(element: etree._Element, file: str) -> None:
+def _no_text(element: XmlElement, file: str) -> None:
     """The schema knows no text; some there is mostly a tag that lost its bracket."""
-    for text in (element.text, *(child.tail for child in element)):
-        if text and text.strip():
-            raise InvalidNoDLDocumentError.at(
-                _at(element, file),
-                f"<{element.tag}> holds the text {shown(text.strip()[:40])}, which has no meaning",
-            )
+    if element.text:
+        raise InvalidNoDLDocumentError.at(
+            _at(element, file),
+            f"<{element.tag}> holds the text {shown(element.text[:40])}, which has no meaning",
+        )
 
 
-def _at(element: etree._Element, file: str) -> SourceRef:
-    line = element.sourceline
-    return SourceRef(file, line if isinstance(line, int) else 0)
+def _at(element: XmlElement, file: str) -> SourceRef:
+    return SourceRef(file, element.line)

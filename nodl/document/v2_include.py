@@ -14,13 +14,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nodl.ament_index import INDEX_FOLDER, find_resource
+from nodl.document import RESOURCE_TYPE, resource_key
 from nodl.document.v2_schema import check_document
 from nodl.document.yaml_text import MAX_BYTES, YamlList, YamlMap, YamlScalar, parse_yaml
 from nodl.errors import IncludeError
 from nodl.names import shown
 from nodl.source_ref import SourceRef
 
-RESOURCE_TYPE = "nodl"
 MAX_DEPTH = 32
 _PACKAGE_OR_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.:-]*\Z")
 
@@ -31,10 +31,6 @@ class Included:
 
     file: str
     root: YamlMap
-
-
-def resource_key(package: str, name: str) -> str:
-    return f"{package}__{name}"
 
 
 def follow_includes(root: YamlMap, file: str, prefixes: Sequence[str]) -> tuple[Included, ...]:

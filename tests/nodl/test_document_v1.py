@@ -106,6 +106,23 @@ BROKEN = {
         errors.InvalidXMLError,
         None,
     ),
+    "undeclared entity": ('<interface version="1">\n&b;</interface>', errors.InvalidXMLError, 2),
+    "elements in elements": ("<a>\n" * 300, errors.InvalidXMLError, 250),
+    "an encoding that nobody knows": (
+        '<?xml version="1.0" encoding="klingon"?><interface version="1"/>',
+        errors.InvalidXMLError,
+        1,
+    ),
+    "another namespace": (
+        f'<interface version="1" xmlns="urn:x">{NODE}</interface>',
+        errors.InvalidNoDLDocumentError,
+        1,
+    ),
+    "text after a child": (
+        f'<interface version="1">\n<node name="n" executable="e">{TOPIC}topic</node></interface>',
+        errors.InvalidNoDLDocumentError,
+        2,
+    ),
     "another root": ("<nodes/>", errors.InvalidNoDLDocumentError, 1),
     "no version": (f"<interface>{NODE}</interface>", errors.InvalidNoDLDocumentError, 1),
     "version 2": (f'<interface version="2">{NODE}</interface>', errors.UnsupportedInterfaceError, 1),
