@@ -7,6 +7,9 @@ order and any number of times: the state after each call is joined with the one 
 from __future__ import annotations
 
 import ast
+import functools
+import re
+from bisect import bisect_left
 from collections.abc import Callable, Iterable
 
 from nodl.infer.interpreter.define import linearized
@@ -22,10 +25,10 @@ MAX_ROUNDS = 12
 WIDEN_TEXTS_FROM = 4
 
 # A function or class whose text has none of these creates nothing by itself.
-_CREATING_WORDS = (
-    "create_", "ActionClient", "ActionServer", "Subscriber(", "Broadcaster(", "TransformListener(",
-    "Node(", "Node.__init__", "ParameterClient(", "wait_for_message", "Updater(",
-)  # fmt: skip
+_CREATING = re.compile(
+    r"create_|ActionClient|ActionServer|Subscriber\(|Broadcaster\(|TransformListener\(|Node\(|Node\.__init__"
+    r"|ParameterClient\(|wait_for_message|Updater\("
+)
 
 
 def start(program: Program, main: SourceModule, functions: Iterable[str] = ()) -> Run:
@@ -114,8 +117,16 @@ def _is_node(cls: ClassValue) -> bool:
 def _creates(run: Run, node: ast.AST, cls: ClassValue | None) -> bool:
     if cls is not None and _is_node(cls):
         return True
-    lines = run.main.text.splitlines()[node.lineno - 1 : node.end_lineno]  # type: ignore[attr-defined]
-    return any(word in line for line in lines for word in _CREATING_WORDS)
+    first, last = node.lineno, node.end_lineno or node.lineno  # type: ignore[attr-defined]
+    places = _creating_lines(run.main)
+    index = bisect_left(places, first)
+    return index < len(places) and places[index] <= last
+
+
+@functools.lru_cache(maxsize=4)
+def _creating_lines(module: SourceModule) -> list[int]:
+    """The numbers of the lines with one of ``_CREATING``, in order."""
+    return [number for number, line in enumerate(module.text.split("\n"), 1) if _CREATING.search(line)]
 
 
 def settle(run: Run) -> None:
@@ -157,7 +168,6 @@ def _call(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple
 
 
 def _guarded(run: Run, body: Callable[[], None]) -> None:
-    run.start_clock()
     try:
         body()
     except BudgetExceeded as error:

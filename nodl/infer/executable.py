@@ -30,10 +30,6 @@ _LOADS_ENTRY_POINT = re.compile(
     r"load_entry_point\(\s*['\"]([^'\"]+)['\"]\s*,\s*['\"]console_scripts['\"]\s*,\s*['\"]([^'\"]+)['\"]"
 )
 _DEVELOPED = re.compile(r"^__file__ = ['\"](.+)['\"]$", re.MULTILINE)
-_MANIFEST_HINT = (
-    "describe it in a manifest: share/{package}/{package}.nodl.xml (NoDL v1) or a NoDL v2 document, "
-    "installed with the package or named with --nodl"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,15 +51,14 @@ def infer_executable(
     prefixes: Sequence[str],
 ) -> InferredExecutable:
     """The nodes that ``executable`` of an installed package creates; gaps are attached to them."""
-    hint = _MANIFEST_HINT.format(package=package)
     if executable is None:
-        return InferredExecutable((), f"component {plugin} is compiled code, which is not analysed; {hint}")
+        return InferredExecutable((), f"component {plugin} is compiled code, which is not analysed")
     try:
         path = executable_path(package, executable, prefixes)
     except (PackageNotFoundError, ExecutableNotFoundError, ValueError) as error:
         return InferredExecutable((), str(error))
     if not _is_python(path):
-        return InferredExecutable((), f"{path} is a compiled program, which is not analysed; {hint}")
+        return InferredExecutable((), f"{path} is a compiled program, which is not analysed")
     finder = _Finder(prefixes)
     with without_collector():
         run = finder.run(path, package, executable)

@@ -13,7 +13,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-MAX_SOURCE_BYTES = 4_000_000
+MAX_SOURCE_BYTES = 1_000_000
 
 # Libraries whose behaviour the models describe; their sources are never analysed.
 MODELLED = frozenset(

@@ -303,6 +303,12 @@ class ClassMethod:
     static: bool
 
 
+# Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
+_COMPARED_IN_C = frozenset(
+    {str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue}
+)
+
+
 def join(left: Value, right: Value) -> Value:
     """What may be ``left`` or ``right``. Returns ``left`` itself when ``right`` adds nothing."""
     if left is right or not right:
@@ -326,7 +332,7 @@ def join_all(values: Iterable[Value]) -> Value:
 def contains(value: Value, atom: object) -> bool:
     """Whether ``atom`` is one of ``value``: ``1`` is not ``True``, and unknown is unknown."""
     kind = type(atom)
-    if kind is str:
+    if kind in _COMPARED_IN_C:
         return atom in value
     if kind is Unknown:
         return any(type(other) is Unknown for other in value)

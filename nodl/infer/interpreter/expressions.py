@@ -246,6 +246,7 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
         else:
             everything = True
     if everything:
+        run.spend(len(obj.cells))
         result = join(result, values_of(obj).any_element())
     result = join(result, obj.cells.get(OTHER, BOTTOM))
     if obj.default:

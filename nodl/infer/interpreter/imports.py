@@ -126,4 +126,10 @@ def import_submodule(run: Run, name: str, frame: Frame) -> ModuleValue | None:
     top = name.partition(".")[0]
     if not run.program.has_namespace_package(top, run.beside):
         return None
-    return _load(run, name, frame)
+    place = (name, frame.module)
+    if place in run.no_submodules:
+        return None
+    found = _load(run, name, frame)
+    if found is None:
+        run.no_submodules.add(place)
+    return found

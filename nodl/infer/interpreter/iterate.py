@@ -28,6 +28,7 @@ MAX_EXACT = 256
 
 def elements(run: Run, value: Value, node: ast.AST, frame: Frame) -> Items:
     """The elements of every iterable that ``value`` may be; ``None`` among others is not iterable."""
+    run.spend(len(value))
     found = [_elements_of(run, atom, node, frame) for atom in value if atom is not None]
     if not found:
         return Items(None, ANY)

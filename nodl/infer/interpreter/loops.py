@@ -229,6 +229,7 @@ def _one(
     emit: Callable[[], None],
 ) -> bool:
     generator = generators[index]
+    run.spend(1)
     assign(run, generator.target, element, frame)
     certain = True
     for condition in generator.ifs:

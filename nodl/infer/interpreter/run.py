@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import ast
 import itertools
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
@@ -36,8 +35,9 @@ from nodl.infer.values import (
 )
 from nodl.source_ref import SourceRef
 
-MAX_STEPS = 60_000  # statements analysed in one run, and cells touched to join branches over 32
-MAX_SECONDS = 4  # of processor time, a last resort: which statement it hits depends on the machine
+# What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
+# evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
+MAX_STEPS = 800_000
 MAX_DEPTH = 48  # analysed calls inside calls
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
@@ -150,6 +150,7 @@ class Run:
         self.state = State()
         self.findings = Findings()
         self.modules: dict[str, ModuleValue] = {}
+        self.no_submodules: set[tuple[str, ModuleValue]] = set()  # looked for and not found
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
@@ -164,7 +165,6 @@ class Run:
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
-        self.start_clock()
         self.context = 0
         self._contexts: dict[tuple[int, object], int] = {}
         self._context_ids = itertools.count(1)
@@ -172,29 +172,28 @@ class Run:
         self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
         self._allocated: dict[tuple[object, ...], HeapObject] = {}
 
-    def start_clock(self) -> None:
-        """From now on ``MAX_SECONDS`` are allowed; runs wait for each other between their phases."""
-        self._deadline = time.process_time() + MAX_SECONDS
-
     # --- syntax -----------------------------------------------------------------------------------------
 
     def evaluate(self, node: ast.expr, frame: Frame) -> Value:
+        self.steps += 1
         handler = self._expressions.get(type(node))
         return handler(self, node, frame) if handler else ANY
 
     def execute(self, body: list[ast.stmt], frame: Frame) -> bool:
         """Run statements in order. False: control cannot reach the end of ``body``."""
-        self.steps += len(body)
-        if self.steps + (self.state.work >> 5) > MAX_STEPS:
-            raise BudgetExceeded(f"more than {MAX_STEPS} statements to analyse")
-        if time.process_time() > self._deadline:
-            raise BudgetExceeded(f"it takes more than {MAX_SECONDS} s")
+        self.spend(len(body))
         statements = self._statements
         for statement in body:
             handler = statements.get(type(statement))
             if handler is not None and not handler(self, statement, frame):
                 return False
         return True
+
+    def spend(self, count: int) -> None:
+        """Count ``count`` units of work. Raises ``BudgetExceeded`` when there were too many."""
+        self.steps += count
+        if self.steps + (self.state.work >> 2) > MAX_STEPS:
+            raise BudgetExceeded(f"more than {MAX_STEPS} steps")
 
     # --- variables --------------------------------------------------------------------------------------
 
@@ -226,6 +225,7 @@ class Run:
     def call(self, callee: Value, args: Arguments, node: ast.AST, frame: Frame) -> Value:
         """Call every callable that ``callee`` may be; the results are joined."""
         call = Call(args, node, frame)
+        self.spend(len(callee))
         if len(callee) > MAX_RECEIVERS:
             callee, merged = self._merge_receivers(callee, call)
         else:
@@ -285,6 +285,7 @@ class Run:
                 continue  # an attribute of None is an error, not a value
             reader = readers.get(type(atom))
             result = join(result, reader(self, atom, name, node, frame) if reader else ANY)
+            self.steps += len(result)
         return result or ANY
 
     # --- heap -------------------------------------------------------------------------------------------
@@ -345,6 +346,7 @@ class Run:
             self.escape_value(value, opened)
 
     def escape_value(self, value: Value, opened: bool = True, depth: int = 0) -> None:
+        self.steps += len(value)
         for atom in value:
             if isinstance(atom, Sequence | Dictionary):
                 self._escape_container(atom, opened, depth)

@@ -41,9 +41,11 @@ def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
     if isinstance(receiver, str | Text):
         return _text_method(run, receiver, name, call)
     if isinstance(receiver, Dictionary):
+        run.spend(len(receiver.cells))
         model = _DICTIONARY.get(name)
         return model(run, receiver, call) if model else ANY
     if isinstance(receiver, Sequence):
+        run.spend(len(receiver.items.exact or receiver.items.rest))
         method = _SEQUENCE.get(name)
         return method(run, receiver, call) if method else ANY
     return unknown(f"the result of {name}()")

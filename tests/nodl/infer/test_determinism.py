@@ -1,0 +1,110 @@
+"""The same input gives the same bytes: on a slow machine, under any hash seed, and when a budget ends the analysis."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from nodl.infer import InferredSystem, infer_paths
+from nodl.infer.report.expanded import expand
+from nodl.infer.report.json_report import to_json
+
+# Each level of calls doubles the work: without a budget this would take minutes.
+_ENDLESS = "\n".join(
+    (
+        "from rclpy.node import Node",
+        "from std_msgs.msg import String",
+        "class N(Node):",
+        "    def __init__(self):",
+        "        super().__init__('n')",
+        "        self.seen = {}",
+        "        self.create_publisher(String, 'before', 10)",
+        "        self.step0('a')",
+        "        self.create_publisher(String, 'after', 10)",
+        *(
+            f"    def step{level}(self, text):\n"
+            f"        self.seen[text] = [text, self.seen]\n"
+            f"        self.step{level + 1}(text + 'l')\n"
+            f"        self.step{level + 1}(text + 'r')"
+            for level in range(20)
+        ),
+        "    def step20(self, text):",
+        "        self.seen[text] = text",
+        "N()",
+    )
+)
+_SETS = """
+    from rclpy.node import Node
+    from std_msgs.msg import String
+    class N(Node):
+        def __init__(self, names):
+            super().__init__('n')
+            for name in names | {'x', 'y'}:
+                self.create_publisher(String, name + '/state', 10)
+                self.create_publisher(String, self.declare_parameter(name, name).value, 10)
+    N({'front', 'rear', 'left', 'right'})
+"""
+
+_SECURE_NODL = "import sys; from nodl.verb import main; sys.exit(main())"
+
+
+@pytest.fixture
+def slow_clocks(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every look at a clock finds that an hour has passed."""
+
+    def hours() -> Iterator[float]:
+        now = 0.0
+        while True:
+            now += 3600
+            yield now
+
+    clock = hours()
+    for name in ("process_time", "perf_counter", "monotonic", "time", "thread_time"):
+        monkeypatch.setattr(time, name, lambda: next(clock))
+
+
+def _json(path: Path) -> str:
+    return to_json(expand(infer_paths([path])))
+
+
+def test_a_budget_ends_at_the_same_step_whatever_the_clock_says(
+    tmp_path: Path, request: pytest.FixtureRequest
+) -> None:
+    program = tmp_path / "endless.py"
+    program.write_text(_ENDLESS)
+    plain = _json(program)
+    assert "the analysis was given up" in plain
+    assert '"/before"' in plain
+    request.getfixturevalue("slow_clocks")
+    assert _json(program) == plain
+
+
+def test_the_hash_seed_does_not_change_a_byte(tmp_path: Path, infer: Callable[..., InferredSystem]) -> None:
+    infer(_SETS)
+    found = {_in_fresh_process(tmp_path, seed) for seed in ("0", "1", "2")}
+    assert len(found) == 1
+    assert b'"/front/state"' in found.pop()
+
+
+def _in_fresh_process(folder: Path, seed: str) -> bytes:
+    command = [sys.executable, "-c", _SECURE_NODL, "infer", str(folder), "--format", "json"]
+    environment = {**os.environ, "PYTHONHASHSEED": seed}
+    return subprocess.run(command, env=environment, check=True, capture_output=True).stdout
+
+
+def test_a_huge_literal_costs_little_and_is_said(tmp_path: Path) -> None:
+    program = tmp_path / "table.py"
+    program.write_text("TABLE = [" + "1," * 600_000 + "]\n")
+    system = infer_paths([program])
+    assert [gap.why for gap in system.gaps] == ["the file is too large to be a program"]
+
+
+def test_nested_comprehensions_are_bounded(names: Callable[..., list[str]]) -> None:
+    loops = " ".join(f"for {name} in range(60)" for name in "abcde")
+    assert names(f"NAMES = [a + b + c + d + e {loops}]") == []
