@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -23,6 +23,7 @@ from enclave_launch.policy import PolicyOptions
 from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
+    from enclave_launch.process import Evaluation
     from enclave_launch.secured import ProvisionedLaunch
     from keystore.policy_xml import PolicyDocument
     from keystore.provisioning import ProvisionOptions
@@ -109,7 +110,18 @@ def resolve(
             launch_configurations=source.launch_configurations,
         )
         finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
-        return Planner(source, finder, chosen.plan_options()).plan(evaluation)
+        plan = Planner(source, finder, chosen.plan_options()).plan(evaluation)
+        return replace(plan, warnings=(*plan.warnings, *_missing_programs(evaluation)))
+
+
+def _missing_programs(evaluation: Evaluation) -> list[str]:
+    """``run`` would refuse them. Placeholders of packages that are not installed have their own warning."""
+    from enclave_launch.evaluation.host import MISSING_PREFIX
+    from enclave_launch.evaluation.programs import missing_programs
+
+    placeholders = f"{MISSING_PREFIX}/"
+    real = [item for item in evaluation.processes if not "".join(item.cmd[:1]).startswith(placeholders)]
+    return [str(error) for error in missing_programs(real)]
 
 
 def provision(
@@ -146,7 +158,8 @@ class RunSettings:
 def run(launch: LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None) -> int:
     """Start what was planned and stay until all has ended; handles SIGINT and SIGTERM. Gives the exit status.
 
-    Raises ``RuntimeFailure`` before anything is started when something it needs is not there.
+    Before anything is started raises ``RuntimeFailure`` when something it needs is not there, and ``LaunchFileError``
+    for a program that cannot be executed.
     """
     from enclave_launch.running import run_plan
 

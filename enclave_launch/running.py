@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING
 
+from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
@@ -20,10 +21,12 @@ if TYPE_CHECKING:
 
 
 def run_plan(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> int:
-    """Block until all is over. Raises ``RuntimeFailure`` before anything was started."""
+    """Block until all is over. Before anything was started raises ``RuntimeFailure``, and ``LaunchFileError``
+    for a program that is not there."""
     source = _plan(launch).planner.source
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
+        check_programs(_plan(launch).evaluation.processes)
         return run_launch(source.launch_file, source.arguments, gate=gate, options=options)
 
 
@@ -32,6 +35,7 @@ async def run_plan_async(launch: LaunchPlan | ProvisionedLaunch, settings: RunSe
     source = _plan(launch).planner.source
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
+        check_programs(_plan(launch).evaluation.processes)
         return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
 
 

@@ -9,34 +9,48 @@ import os
 import shutil
 from collections.abc import Iterable
 
+from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import ResolvedProcess
 
 
-def missing_programs(processes: Iterable[ResolvedProcess]) -> list[str]:
-    """One message, with its place, for each process whose program cannot be executed.
+def missing_programs(processes: Iterable[ResolvedProcess]) -> list[LaunchFileError]:
+    """One error, not raised, for each process whose program cannot be executed.
 
     The program is the first word of the command, a prefix such as ``gdb`` included. What a shell would run
     is the shell's business.
     """
-    return [
-        f"{process.location}: <{process.location.element}> program '{process.cmd[0]}' cannot be executed: "
-        f"{_why(process)}"
-        for process in processes
-        if process.cmd and not process.shell and not _found(process)
-    ]
+    known: dict[tuple[str, str], bool] = {}
+    errors = []
+    for process in processes:
+        if process.cmd and not process.shell:
+            key = _program(process), _path(process)
+            if key not in known:
+                known[key] = shutil.which(key[0], path=key[1]) is not None
+            if not known[key]:
+                errors.append(LaunchFileError(_message(process), process.location))
+    return errors
 
 
-def _found(process: ResolvedProcess) -> bool:
+def check_programs(processes: Iterable[ResolvedProcess]) -> None:
+    """Raise ``LaunchFileError`` unless all that starts by itself can be executed.
+
+    What only an event starts is not asked for: a process before it may bring its program.
+    """
+    missing = missing_programs(process for process in processes if process.on_event is None)
+    if missing:
+        raise LaunchFileError("\n".join((*map(str, missing), "nothing was started")))
+
+
+def _program(process: ResolvedProcess) -> str:
     program = process.cmd[0]
-    if os.path.dirname(program):
-        return shutil.which(os.path.join(process.cwd or "", program)) is not None
-    return shutil.which(program, path=_path(process)) is not None
+    return os.path.join(process.cwd or "", program) if os.path.dirname(program) else program
 
 
-def _why(process: ResolvedProcess) -> str:
-    if os.path.dirname(process.cmd[0]):
-        return "no such file, or it is not executable"
-    return f"not on the PATH ({_path(process)})"
+def _message(process: ResolvedProcess) -> str:
+    program = process.cmd[0]
+    is_path = os.path.dirname(program)
+    why = "no such file, or it is not executable" if is_path else f"not on the PATH ({_path(process)})"
+    return f"program '{program}' cannot be executed: {why}"
 
 
 def _path(process: ResolvedProcess) -> str:
