@@ -10,6 +10,7 @@ import asyncio
 import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,7 +48,7 @@ class LiveHost(BaseHost):
         self._tree = tree
         self._log = log
         self._gate = gate
-        self._gate_free = asyncio.Lock()
+        self._at_the_gate = ThreadPoolExecutor(1, "gate")  # one call at a time, in the order of the starts
         self._secrets = secrets
         self._fail = fail
         self._services = services
@@ -132,6 +133,8 @@ class LiveHost(BaseHost):
         for task in list(self._tasks):
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
+        if self._gate is not None:  # it may wait for a keystore's lock
+            await asyncio.to_thread(self._at_the_gate.shutdown, cancel_futures=True)
         if self._parameter_directory is not None:
             shutil.rmtree(self._parameter_directory, ignore_errors=True)
 
@@ -163,5 +166,4 @@ class LiveHost(BaseHost):
     async def _granted(self, process: ResolvedProcess) -> Grant:
         if self._gate is None:
             return Grant()
-        async with self._gate_free:
-            return await asyncio.to_thread(self._gate.ensure, process)
+        return await self._loop.run_in_executor(self._at_the_gate, self._gate.ensure, process)
