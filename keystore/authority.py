@@ -117,12 +117,11 @@ def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) ->
     """A CA certificate for the key of ``signer``: CA:TRUE, pathlen 0, key usage after the role.
 
     keyCertSign + cRLSign for identities; the permissions CA also needs digitalSignature, without which both
-    implementations refuse its documents. Raises InvalidInput for a name that is empty or over 64 characters.
+    implementations refuse its documents. Raises InvalidInput for a name that is empty or over 64 bytes.
     """
     from cryptography import x509
 
-    if not name or len(name) > 64 or any(char in name for char in ',+"\\=/|<>;#\0'):
-        raise InvalidInput('a CA name has 1 to 64 characters and none of , + " \\ = / | < > ; #')
+    refuse_ca_name(name)
     subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
     builder = (
         _builder(subject, subject, validity, signer.public_key())
@@ -131,6 +130,13 @@ def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) ->
         .add_extension(x509.SubjectKeyIdentifier.from_public_key(signer.public_key()), critical=False)
     )
     return Authority(certificate.read_der(_sign(builder, signer)), signer)
+
+
+def refuse_ca_name(name: str) -> None:
+    """Raises InvalidInput for what X.509 cannot carry, or DDS implementations read as more than one piece."""
+    fits = name.strip() and name.isprintable() and len(name.encode()) <= 64
+    if not fits or any(char in name for char in ',+"\\=/|<>;#'):
+        raise InvalidInput('a CA name has 1 to 64 bytes of UTF-8 and none of , + " \\ = / | < > ; #')
 
 
 def _key_usage(role: Role) -> x509.KeyUsage:

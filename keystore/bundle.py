@@ -18,9 +18,10 @@ from datetime import datetime
 from enum import Enum
 from pathlib import Path
 
-from keystore import certificate, layout, safe_files, store
+from keystore import layout, safe_files, store
 from keystore.errors import DamagedKeystore, InvalidInput, StorageError, printable
 from keystore.validity import utc_now
+from keystore.verification.finding import Finding, Severity
 from keystore.view import KeystoreView, resolve_root
 
 _LINKED = ("identity_ca.cert.pem", "permissions_ca.cert.pem", layout.ENCLAVE_GOVERNANCE, layout.ENCLAVE_CRL)
@@ -65,6 +66,8 @@ def export(
     target = Path(output)
     if target.exists() or target.is_symlink():
         raise InvalidInput(f"{printable(target)} exists already; choose a new name or remove it")
+    if Path(os.path.realpath(target)).is_relative_to(view.root):
+        raise InvalidInput(f"{printable(target)} lies in the keystore; choose another place")
     try:
         _write(target, files)
     except OSError as error:
@@ -80,8 +83,12 @@ def _matching(names: list[str], patterns: list[str]) -> list[str]:
 
 
 def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime) -> None:
+    """What ``verify`` calls an error of these enclaves or of the CAs would only fail on the host."""
     from keystore.revocation import revoked_serials
+    from keystore.verification.authorities import check_deployed
+    from keystore.verification.enclaves import check_enclave
 
+    _refuse("the keystore", check_deployed(view, now))
     revoked = revoked_serials(view)
     for name in names:
         directory = layout.enclave_directory(name)
@@ -90,11 +97,17 @@ def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime) -> None:
                 raise DamagedKeystore(
                     f"enclave {name} is incomplete ({file}); secure-keystore renew completes it"
                 )
-        facts = certificate.read_pem(safe_files.read(view.root, f"{directory}/{layout.CERT}"))
-        if facts.serial in revoked:
-            raise DamagedKeystore(f"enclave {name} is revoked; remove it, or renew it first")
-        if not facts.validity.covers(now):
-            raise DamagedKeystore(f"the certificate of {name} is expired; secure-keystore renew first")
+        _refuse(f"enclave {name}", check_enclave(view, name, frozenset(revoked), now))
+
+
+def _refuse(what: str, findings: Iterable[Finding]) -> None:
+    for finding in findings:
+        # Fast DDS alone cannot carry large permissions: the user's choice of DDS.
+        if finding.severity is Severity.ERROR and finding.code != "too-large":
+            raise DamagedKeystore(
+                f"{what} is not fit for a host: {finding.place}: {finding.message} [{finding.code}]; "
+                f"repair: {finding.repair}"
+            )
 
 
 def _files(view: KeystoreView, names: list[str], public: PublicFiles) -> Iterator[ExportedFile]:
@@ -146,14 +159,25 @@ def _write(target: Path, files: list[ExportedFile]) -> None:
 
 
 def _write_directory(aside: Path, files: list[ExportedFile]) -> None:
-    os.mkdir(aside, 0o755)
+    os.mkdir(aside, 0o700)
+    os.chmod(aside, 0o755)
     for file in files:
         path = aside / file.path
-        path.parent.mkdir(parents=True, exist_ok=True)
+        _make_directories(aside, file.path)
         if file.link is not None:
             os.symlink(file.link, path)
         else:
             _create(path, file.data, file.mode)
+
+
+def _make_directories(aside: Path, relative: str) -> None:
+    """Modes are ours, whatever the umask: who can write in a directory can replace the key in it."""
+    for parent in reversed(list(_parents(relative))):
+        try:
+            os.mkdir(aside / parent, 0o755)
+            os.chmod(aside / parent, 0o755)
+        except FileExistsError:
+            continue
 
 
 def _create(path: Path, data: bytes, mode: int) -> None:

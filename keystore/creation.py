@@ -8,6 +8,7 @@ directory and installed from there, so that no crash can leave a certificate bes
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
@@ -78,9 +79,24 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
     chosen = options or CreateOptions()
     root = resolve_root(keystore)
     _refuse_foreign(root)
+    refuse_unusable(chosen)
     store.create_root(root)
     with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         return complete(opened, chosen)
+
+
+def refuse_unusable(options: CreateOptions) -> None:
+    """Before anything is written: options that no keystore can be made with. Raises InvalidInput."""
+    now = options.now or utc_now()
+    for lifetime in (options.ca_lifetime, options.lifetime):
+        Validity.starting(now, lifetime, backdate=options.backdate)
+    for name in options.names.values():
+        authority.refuse_ca_name(name)
+    passphrase = passphrase_for_new_keys(options.encrypt_ca_keys, options.access)
+    if passphrase is not None:
+        passphrase.value()
+    for role in options.imported:
+        _import_ca(role, options, [])
 
 
 def _refuse_foreign(root: Path) -> None:
@@ -126,6 +142,7 @@ def _complete_ca(
         if role in options.imported:
             _refuse_other_ca(opened, role, options.imported[role])
         return  # a missing key is no fault: the CA may be kept elsewhere
+    _refuse_foreign_enclaves(view, role)
     if role in options.imported:
         made, key_name, key_bytes = _import_ca(role, options, warnings)
         verb = "imported"
@@ -139,6 +156,15 @@ def _complete_ca(
         warnings.append(
             f"the {role.value.replace('_ca', ' CA')} key is {authority_kind(made)}: "
             "Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
+        )
+
+
+def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
+    """A bundle of stand-alone enclaves, or a lost CA: another CA would replace what these enclaves trust."""
+    if view.key_file(role) is None and os.path.isdir(view.root / layout.ENCLAVES) and view.enclaves():
+        raise DamagedKeystore(
+            f"{printable(view.root)} holds enclaves, but not the {role.value.replace('_ca', ' CA')} they belong to: "
+            "a deployed copy, or a keystore to restore from a backup"
         )
 
 
@@ -279,12 +305,45 @@ def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
 def _complete_governance(opened: Store, options: CreateOptions, actions: list[str]) -> None:
     if os.path.isfile(opened.root / layout.GOVERNANCE):
         return
-    present = safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML)
-    document = present or governance_document(options.governance or Governance.for_domains(options.domains))
+    document = _unsigned_default(opened.root) or governance_document(
+        options.governance or Governance.for_domains(options.domains)
+    )
     view = KeystoreView(opened.root)
     signer = view.authority(Role.PERMISSIONS, options.access)
     write_governance(opened, document, signer, options.now or utc_now())
     actions.append("governance signed")
+
+
+def _unsigned_default(root: Path) -> bytes | None:
+    """What an interrupted run left beside a missing ``governance.p7s``, unless it is more lax than the default.
+
+    Raises DamagedKeystore for any other document: nobody signed it, so somebody must look at it first.
+    """
+    present = safe_files.read_if_there(root, layout.GOVERNANCE_XML)
+    if present is None:
+        return None
+    place = root / layout.GOVERNANCE_XML
+    try:
+        found = parse_governance(present, printable(place))
+        if found == Governance.for_domains(found.domains()):
+            return present
+    except InvalidInput:
+        pass
+    raise DamagedKeystore(
+        f"{printable(place)} is not the default governance, and its signature governance.p7s is missing; look at "
+        f"it and remove it: rm {shlex.quote(str(place))}"
+    )
+
+
+def mirror_governance(opened: Store) -> bool:
+    """``governance.xml`` again as what is signed, where somebody changed it; whether that was needed."""
+    present = safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML)
+    document = trusted_document(KeystoreView(opened.root), layout.GOVERNANCE)
+    if present is None or present.replace(b"\r\n", b"\n") == document:
+        return False
+    with opened.batch() as batch:
+        batch.file(layout.GOVERNANCE_XML, document)
+    return True
 
 
 def write_governance(opened: Store, document: bytes, permissions_ca: Authority, now: datetime) -> None:

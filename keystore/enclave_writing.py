@@ -55,7 +55,7 @@ class EnclaveWriter:
         if not all(ca.covers(self._now) for ca in cas):
             raise DamagedKeystore("a CA of this keystore is expired: secure-keystore renew KEYSTORE --ca start")
         options = self._options
-        lifetime = options.lifetime or self._view.settings.lifetime
+        lifetime = self._view.settings.lifetime if options.lifetime is None else options.lifetime
         asked = Validity.starting(self._now, lifetime, until=options.valid_until, backdate=options.backdate)
         return asked.within(cas[0]).within(cas[1])
 

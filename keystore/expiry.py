@@ -13,7 +13,7 @@ from keystore import certificate, der, layout, safe_files, smime
 from keystore.authority import Role
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import DamagedKeystore, InvalidInput, printable
-from keystore.validity import Validity, parse_moment, utc_now
+from keystore.validity import Validity, later, parse_moment, utc_now
 from keystore.view import KeystoreView, resolve_root
 
 _DATES = re.compile(rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_")
@@ -30,7 +30,7 @@ class Expiry:
     not_before: datetime
 
     def ends_within(self, now: datetime, margin: timedelta) -> bool:
-        return self.not_after <= now + margin
+        return self.not_after <= later(now, margin)
 
     def is_valid(self, now: datetime) -> bool:
         return self.not_before <= now <= self.not_after

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from keystore import layout, lock, store
+from keystore import layout, lock, safe_files, store
 from keystore.authority import Role
 from keystore.copies import refresh_copies
 from keystore.creation import write_governance
+from keystore.errors import DamagedKeystore
 from keystore.governance import Governance, governance_document
 from keystore.governance_file import governance_stands, signed_governance
 from keystore.signer import CaAccess
@@ -36,12 +37,18 @@ def set_governance(
     document = governance_document(governance)
     with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         view = KeystoreView(root)
-        twin = root / layout.GOVERNANCE_XML
-        same = (
-            signed_governance(view).document == document and twin.is_file() and twin.read_bytes() == document
-        )
-        changed = not (same and governance_stands(view, None))
+        changed = not _stands(view, document)
         if changed:
             write_governance(opened, document, view.authority(Role.PERMISSIONS, chosen.access), utc_now())
         refresh_copies(opened)
     return changed
+
+
+def _stands(view: KeystoreView, document: bytes) -> bool:
+    """Whether exactly ``document`` is in force; what cannot be read is not."""
+    try:
+        signed = signed_governance(view)
+    except DamagedKeystore:
+        return False
+    twin = safe_files.read_if_there(view.root, layout.GOVERNANCE_XML)
+    return signed.document == document == twin and governance_stands(view, None)

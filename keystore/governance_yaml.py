@@ -24,10 +24,10 @@ the topic rule's last two (ENCRYPT).
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, StrictStr, ValidationError
 
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, printable
@@ -51,7 +51,7 @@ class _Topic(_Strict):
 
 
 class _Domain(_Strict):
-    domains: int | str = 0
+    domains: StrictInt | StrictStr = 0
     allow_unauthenticated_participants: StrictBool = False
     enable_join_access_control: StrictBool = True
     discovery_protection_kind: Protection = Protection.ENCRYPT
@@ -61,7 +61,7 @@ class _Domain(_Strict):
 
 
 class _Document(_Strict):
-    version: Literal[1]
+    version: StrictInt = Field(ge=1, le=1)
     domain_rules: list[_Domain] = Field(min_length=1)
 
 
@@ -79,12 +79,13 @@ def parse_governance_yaml(text: bytes, where: str) -> Governance:
         raise InvalidInput(f"{where}: larger than {_MAX_BYTES} bytes")
     try:
         content = yaml.load(text, _SafeLoader)
-        document = _Document.model_validate(content)
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
         raise InvalidInput(f"{where}{line}: {error.problem or 'not YAML'}") from None
-    except yaml.YAMLError:
+    except (yaml.YAMLError, ValueError, RecursionError):  # numbers, dates, nesting that Python refuses
         raise InvalidInput(f"{where}: not YAML text") from None
+    try:
+        document = _Document.model_validate(content)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "document"
@@ -116,6 +117,9 @@ class _SafeLoader(yaml.SafeLoader):
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen = set()
         for key, _ in node.value:
+            if not isinstance(key, yaml.ScalarNode):
+                mark = key.start_mark
+                raise yaml.constructor.ConstructorError(None, None, "a key must be a plain word", mark)
             if key.value in seen:
                 mark = key.start_mark
                 raise yaml.constructor.ConstructorError(None, None, f"{key.value!r} is written twice", mark)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import fcntl
 import os
+import shlex
 import stat
 import sys
 import time
@@ -29,23 +30,52 @@ def exclusive(root: Path, timeout: float = DEFAULT_TIMEOUT) -> Iterator[None]:
 
     ``root`` must exist. Raises StorageError when the lock cannot be opened (read-only, no permission).
     """
-    path = root / layout.LOCK
+    deadline = time.monotonic() + timeout
+    while (descriptor := _locked(root, timeout, deadline)) is None:
+        continue
     try:
-        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-    except OSError as error:
-        raise StorageError.of(error, "locking the keystore") from None
-    try:
-        if not stat.S_ISREG(os.fstat(descriptor).st_mode):
-            raise UnsafeKeystore(f"{printable(path)} is not a regular file; remove it")
-        _wait(descriptor, root, timeout)
         _sign_in(descriptor)
         yield
     finally:
         os.close(descriptor)
 
 
-def _wait(descriptor: int, root: Path, timeout: float) -> None:
-    deadline = time.monotonic() + timeout
+def _locked(root: Path, timeout: float, deadline: float) -> int | None:
+    """The locked descriptor; None when somebody removed or replaced the file meanwhile, so that others lock it."""
+    path = root / layout.LOCK
+    try:
+        descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+    except OSError as error:
+        raise StorageError.of(error, "locking the keystore") from None
+    try:
+        _refuse_strange(path, os.fstat(descriptor))
+        _wait(descriptor, root, timeout, deadline)
+        if _is_in_place(path, descriptor):
+            kept, descriptor = descriptor, -1
+            return kept
+        return None
+    finally:
+        if descriptor >= 0:
+            os.close(descriptor)
+
+
+def _refuse_strange(path: Path, info: os.stat_result) -> None:
+    """We write in it: a hard link would make that another file of ours."""
+    if not stat.S_ISREG(info.st_mode) or info.st_nlink > 1:
+        raise UnsafeKeystore(
+            f"{printable(path)} is not a file of its own, but a device or a hard link; "
+            f"remove it: rm {shlex.quote(str(path))}"
+        )
+
+
+def _is_in_place(path: Path, descriptor: int) -> bool:
+    try:
+        return os.path.samestat(os.lstat(path), os.fstat(descriptor))
+    except FileNotFoundError:
+        return False
+
+
+def _wait(descriptor: int, root: Path, timeout: float, deadline: float) -> None:
     while True:
         try:
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -26,7 +26,7 @@ from keystore.permissions import permissions_document
 from keystore.policy import EnclavePolicy
 from keystore.signer import CaAccess
 from keystore.subject import SubjectScheme
-from keystore.validity import DEFAULT_BACKDATE, Validity, utc_now
+from keystore.validity import DEFAULT_BACKDATE, Validity, later, utc_now
 from keystore.view import KeystoreView, resolve_root
 
 if TYPE_CHECKING:
@@ -183,7 +183,7 @@ def _all_stand(
 def inspect_wish(
     view: KeystoreView, enclave: str, wish: Wish, options: ProvisionOptions, now: datetime
 ) -> EnclaveState:
-    state = inspect(view, enclave, wish.permissions, now, now + options.renew_within)
+    state = inspect(view, enclave, wish.permissions, now, later(now, options.renew_within))
     if wish.identity is Identity.GOOD or state.identity is Identity.PAIR:
         return state
     return replace(state, identity=wish.identity, permissions=True, reasons=(*state.reasons, "asked for"))

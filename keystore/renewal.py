@@ -18,7 +18,7 @@ from pathlib import Path
 from keystore import certificate, layout, rollover, safe_files, store
 from keystore.authority import Role
 from keystore.certificate import CertificateFacts
-from keystore.creation import install_incoming
+from keystore.creation import install_incoming, mirror_governance
 from keystore.der import DerError
 from keystore.enclave_name import validate_enclave_name
 from keystore.enclave_state import Identity
@@ -64,6 +64,8 @@ def renew(
         repaired = _repair_keystore(opened, chosen, now)
         if renew_crl(opened, provisioning.access, now, chosen.within):
             repaired.append("CRL published again")
+        if mirror_governance(opened):
+            repaired.append("governance.xml made equal to the signed governance.p7s")
     view = KeystoreView(root)
     wishes = {name: _wish(view, name, named, chosen) for name in view.enclaves()}
     due = provisioning if named is not None else replace(provisioning, renew_within=chosen.within)

@@ -26,7 +26,7 @@ from keystore.errors import DamagedKeystore, InvalidInput, printable
 from keystore.expiry import crl_validity
 from keystore.signer import CaAccess
 from keystore.store import Link, Store
-from keystore.validity import utc_now
+from keystore.validity import later, utc_now
 from keystore.view import KeystoreView, resolve_root
 
 if TYPE_CHECKING:
@@ -116,10 +116,22 @@ def publish_crl(opened: Store, serials: dict[int, datetime], access: CaAccess, n
     issuer = view.authority(Role.IDENTITY, access)
     _refuse_without_crl_sign(issuer.facts.der)
     end = min(now + CRL_LIFETIME, issuer.validity.not_after)
-    number = int(now.timestamp())  # RFC 5280 section 5.2.3: only has to grow
+    number = max(int(now.timestamp()), _present_number(view) + 1)  # RFC 5280 section 5.2.3: only has to grow
     crl = IdentityIssuer(issuer).revocation_list(serials, now - _BACKDATE, end, number)
     with opened.batch() as batch:
         batch.file(layout.CRL, crl)
+
+
+def _present_number(view: KeystoreView) -> int:
+    """Of the CRL in force, 0 without one or without a number."""
+    from cryptography import x509
+
+    if not view.has_crl:
+        return 0
+    try:
+        return load_crl(view).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
+    except x509.ExtensionNotFound:
+        return 0
 
 
 def _refuse_without_crl_sign(ca_der: bytes) -> None:
@@ -148,7 +160,7 @@ def link_crl(opened: Store, names: Iterable[str]) -> None:
 def renew_crl(opened: Store, access: CaAccess, now: datetime, within: timedelta) -> bool:
     """Publish the CRL again if it ends within ``within``; whether it did."""
     view = KeystoreView(opened.root)
-    if not view.has_crl or crl_validity(view).not_after > now + within:
+    if not view.has_crl or crl_validity(view).not_after > later(now, within):
         return False
     publish_crl(opened, revoked_serials(view), access, now)
     link_crl(opened, view.enclaves())

@@ -15,7 +15,8 @@ CA.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import os
+from collections.abc import Collection
 from dataclasses import replace
 from datetime import datetime
 from enum import Enum
@@ -43,7 +44,7 @@ class Step(str, Enum):
 def roll_over(
     keystore: Path | str,
     step: Step,
-    roles: Iterable[Role] = tuple(Role),
+    roles: Collection[Role] = tuple(Role),
     *,
     options: ProvisionOptions | None = None,
     encrypt: bool = False,
@@ -59,6 +60,8 @@ def roll_over(
     now = chosen.now or utc_now()
     with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         install_incoming(opened)
+        for role in roles:
+            _forget_installed(opened, role)
         done = [_STEPS[step](opened, role, chosen, now, encrypt) for role in roles]
         refresh_copies(opened)
     if step is not Step.SWITCH:
@@ -143,6 +146,13 @@ def retire(opened: Store, role: Role) -> bytes:
 
 def _retired(opened: Store, role: Role) -> bool:
     return any((opened.root / layout.RETIRED).glob(f"{role.value}-*.cert.pem"))
+
+
+def _forget_installed(opened: Store, role: Role) -> None:
+    """What a ``switch`` interrupted while it forgot: the key goes first, and only after it was installed."""
+    waiting = opened.root / _waiting(role)
+    if waiting.is_dir() and not os.path.lexists(waiting / layout.KEY):
+        _forget_next(opened, role)
 
 
 def _forget_next(opened: Store, role: Role) -> None:

@@ -119,17 +119,34 @@ def refuse_unsafe_private(root: Path, relative: str) -> None:
             raise UnsafeKeystore(problem)
 
 
+def refuse_unsafe_private_directories(root: Path) -> None:
+    """What waits in ``private/`` is installed as a CA, what is retired there is trusted: nobody else may add to it."""
+    for relative in (layout.PRIVATE, layout.INCOMING, layout.NEXT, layout.RETIRED):
+        path = root / relative
+        if not os.path.lexists(path):
+            continue
+        refuse_unsafe_directory(path)
+        if problem := private_problem(path, os.lstat(path)):
+            raise UnsafeKeystore(problem)
+
+
 def private_problem(path: Path | str, info: os.stat_result) -> str | None:
     """What is wrong with the owner or mode of a private file or directory, with the repairing command."""
     if info.st_uid == os.geteuid() and not info.st_mode & _WRITABLE_BY_OTHERS:
         return None
-    quoted = shlex.quote(str(path))
     if info.st_uid != os.geteuid():
         return (
             f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that "
-            f"user, or take it over: chown -R {os.geteuid()} {quoted}"
+            f"user, or take it over: {private_repair(path, info)}"
         )
-    return f"{printable(path)} can be written by others (mode {mode_text(info)}): chmod go-w {quoted}"
+    return f"{printable(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
+
+
+def private_repair(path: Path | str, info: os.stat_result) -> str:
+    quoted = shlex.quote(str(path))
+    if info.st_uid != os.geteuid():
+        return f"chown -R {os.geteuid()} {quoted}"
+    return f"chmod go-rwx {quoted}"
 
 
 def refuse_unsafe_directory(path: Path) -> None:

@@ -51,7 +51,7 @@ class Settings:
                 Curve(content["curve"]),
                 timedelta(seconds=int(content["lifetime_seconds"])),
             )
-        except (ValueError, KeyError, TypeError, OverflowError):
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
             raise DamagedKeystore(
                 f"{place} is not the settings file of a keystore; restore or remove it"
             ) from None

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     PublicKey = ec.EllipticCurvePublicKey | rsa.RSAPublicKey
     PrivateKey = ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey
 
-_MAX_SECRET = 4096
+_MAX_SECRET = 1023  # what OpenSSL takes for an encrypted key
 
 
 class Signer(Protocol):
@@ -55,12 +55,12 @@ class Secret:
     def _fetch(self) -> bytes:
         try:
             if self.file is not None:
-                content = self.file.read_bytes()[: _MAX_SECRET + 1]
+                content = self.file.read_bytes()[: _MAX_SECRET + 3]
             elif self.descriptor is not None:
-                content = os.read(self.descriptor, _MAX_SECRET + 1)
+                content = _read_all(self.descriptor)
             else:
                 content = os.fsencode(os.environ[self.variable or ""])
-        except (OSError, KeyError) as error:
+        except (OSError, KeyError, ValueError, OverflowError) as error:
             reason = error.strerror if isinstance(error, OSError) else "not set"
             raise InvalidInput(f"cannot read the passphrase from {self._place()}: {reason}") from None
         content = content.removesuffix(b"\n").removesuffix(b"\r")
@@ -72,6 +72,14 @@ class Secret:
         if self.file is not None:
             return printable(self.file)
         return f"descriptor {self.descriptor}" if self.descriptor is not None else f"${self.variable}"
+
+
+def _read_all(descriptor: int) -> bytes:
+    """To its end: a pipe may give the secret in pieces."""
+    content = b""
+    while len(content) <= _MAX_SECRET + 2 and (piece := os.read(descriptor, _MAX_SECRET + 3)):
+        content += piece
+    return content
 
 
 class FileSigner:

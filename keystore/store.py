@@ -229,6 +229,7 @@ def opened(root: Path, *, timeout: float = lock.DEFAULT_TIMEOUT, durable: bool =
         for directory in (layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES):
             if os.path.lexists(root / directory):
                 safe_files.refuse_unsafe_directory(root / directory)
+        safe_files.refuse_unsafe_private_directories(root)
         yield store
 
 

@@ -16,12 +16,13 @@ from keystore.errors import InvalidInput, printable
 # Clocks behind ours, and Connext 5.3.1, make SROS2 back-date by a day; Fast DDS needs at least 14 h.
 DEFAULT_BACKDATE = timedelta(days=1)
 MIN_BACKDATE = timedelta(hours=14)
+MAX_BACKDATE = timedelta(days=3650)
 DEFAULT_LIFETIME = timedelta(days=3650)
 # Cyclone DDS counts nanoseconds in 64 bits (until 2262-04-11) and refuses later dates as expired.
 LATEST = datetime(2262, 4, 11, tzinfo=timezone.utc)
 
 _UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
-_DURATION = re.compile(r"(?:(\d{1,6})([smhdwy]))\Z")
+_DURATION = re.compile(r"([0-9]{1,6})([smhdwy])\Z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,13 +55,15 @@ class Validity:
     ) -> Validity:
         """Valid from ``now`` minus ``backdate`` for ``lifetime``, or to the absolute date ``until``.
 
-        Raises InvalidInput when ``until`` is past or ``backdate`` is under 14 hours.
+        Raises InvalidInput when ``until`` is past, or ``backdate`` under 14 hours or over 10 years.
         """
         if backdate < MIN_BACKDATE:
             raise InvalidInput("back-dating under 14 h makes Fast DDS start late west of UTC; use more")
-        end = until if until is not None else _add(now, lifetime)
+        end = until if until is not None else later(now, lifetime)
         if end <= now:
             raise InvalidInput(f"the validity would already have ended ({iso(end)})")
+        if backdate > MAX_BACKDATE:
+            raise InvalidInput("back-dating by more than 10 years helps no clock; use less")
         return cls(now - backdate, end)
 
     def within(self, outer: Validity) -> Validity:
@@ -71,9 +74,10 @@ class Validity:
         return self.not_before <= now <= self.not_after
 
 
-def _add(now: datetime, lifetime: timedelta) -> datetime:
+def later(now: datetime, span: timedelta) -> datetime:
+    """``now + span``, at most the last date that means anything here."""
     try:
-        return now + lifetime
+        return min(now + span, LATEST)
     except OverflowError:
         return LATEST
 
@@ -93,12 +97,15 @@ def parse_moment(text: str) -> datetime:
         moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
     except ValueError:
         raise InvalidInput(f"{printable(text)} is not an ISO date; write for example 2030-12-31") from None
-    return moment if moment.tzinfo else moment.replace(tzinfo=timezone.utc)
+    try:
+        return moment.astimezone(timezone.utc) if moment.tzinfo else moment.replace(tzinfo=timezone.utc)
+    except OverflowError:
+        raise InvalidInput(f"{printable(text)} is a date before the year 1 or after 9999") from None
 
 
 def parse_end(text: str, now: datetime) -> datetime:
     """``--valid-for``: a duration from now or an ISO date."""
-    return _add(now, parse_duration(text)) if _DURATION.match(text.strip()) else parse_moment(text)
+    return later(now, parse_duration(text)) if _DURATION.match(text.strip()) else parse_moment(text)
 
 
 def utc_now() -> datetime:

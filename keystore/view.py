@@ -7,6 +7,7 @@ writing. It proves nothing about signatures, see ``keystore.verify`` for that.
 from __future__ import annotations
 
 import os
+import shlex
 from functools import cached_property
 from pathlib import Path
 
@@ -49,16 +50,19 @@ class KeystoreView:
             return set(os.listdir(self.root)) <= _OWN_ENTRIES
         except (FileNotFoundError, NotADirectoryError):
             return not os.path.lexists(self.root)
+        except OSError as error:
+            raise StorageError.of(error, "looking for a keystore at") from None
 
     def require_complete(self) -> None:
         if not self.root.is_dir():
             raise NotAKeystore(
-                f"there is no keystore at {printable(self.root)}; make one: secure-keystore create"
+                f"there is no keystore at {printable(self.root)}; to make one: "
+                f"secure-keystore create {shlex.quote(str(self.root))}"
             )
         if not self.is_complete:
             raise NotAKeystore(
                 f"{printable(self.root)} is not a complete keystore (public/, enclaves/governance.p7s); "
-                "secure-keystore create makes or completes one"
+                f"to make or complete it: secure-keystore create {shlex.quote(str(self.root))}"
             )
 
     @cached_property
@@ -136,4 +140,8 @@ def _collect(directory: Path | str, prefix: str, found: list[str]) -> None:
 
 
 def resolve_root(keystore: Path | str) -> Path:
-    return Path(os.path.realpath(keystore))
+    """Raises NotAKeystore for what can be no path."""
+    try:
+        return Path(os.path.realpath(keystore))
+    except ValueError:
+        raise NotAKeystore(f"{printable(keystore)} is no path") from None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import sys
 import time
 from collections.abc import Iterable
@@ -47,9 +48,16 @@ def add_signing(parser: argparse.ArgumentParser) -> None:
 
 def add_lock(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
-        "--lock-timeout", metavar="SECONDS", type=float, default=DEFAULT_LOCK_TIMEOUT,
+        "--lock-timeout", metavar="SECONDS", type=_seconds, default=DEFAULT_LOCK_TIMEOUT,
         help="how long to wait for another run (30)",
     )  # fmt: skip
+
+
+def _seconds(text: str) -> float:
+    seconds = float(text)
+    if not 0 <= seconds < math.inf:
+        raise ValueError
+    return seconds
 
 
 def add_validity(parser: argparse.ArgumentParser) -> None:

@@ -39,8 +39,6 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from datetime import timedelta
-
     from keystore.authority import Curve, Role
     from keystore.creation import CreateOptions, ImportedCa, create_keystore
     from keystore.domains import Domains
@@ -50,7 +48,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     validity = common.span(arguments)
     now = utc_now()
-    lifetime: timedelta = validity.lifetime or (validity.until - now if validity.until else DEFAULT_LIFETIME)
+    lifetime = validity.lifetime
+    if lifetime is None:
+        lifetime = validity.until - now if validity.until else DEFAULT_LIFETIME
     given = vars(arguments)
     options = CreateOptions(
         domains=Domains.parse(arguments.domain_id),

@@ -10,9 +10,11 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from keystore import layout
 from keystore.errors import KeystoreError, StorageError
 from keystore.signer import CaAccess
 from keystore.validity import utc_now
+from keystore.verification import repair
 from keystore.verification.authorities import check_authorities
 from keystore.verification.enclaves import check_enclaves
 from keystore.verification.files import check_files
@@ -57,10 +59,19 @@ def _findings(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[F
     try:
         yield from check_authorities(view, access, now)
     except KeystoreError as error:
-        yield Finding(Severity.ERROR, "unreadable", "public", str(error), "restore it from a backup")
+        yield Finding(Severity.ERROR, "unreadable", layout.PUBLIC, str(error), repair.BACKUP)
         return
+    yield from _check_settings(view)
     try:
         revoked = frozenset(revoked_serials(view))
     except KeystoreError:
         revoked = frozenset()  # the CRL itself was reported above
     yield from check_enclaves(view, revoked, now)
+
+
+def _check_settings(view: KeystoreView) -> Iterator[Finding]:
+    try:
+        _ = view.settings
+    except KeystoreError as error:
+        fix = repair.run_on(view.root, "rm", layout.SETTINGS, "new enclaves then get the defaults")
+        yield Finding(Severity.ERROR, "settings", layout.SETTINGS, str(error), fix)

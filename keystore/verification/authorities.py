@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from datetime import datetime
 
@@ -9,12 +10,13 @@ from keystore import der, layout, safe_files, smime
 from keystore.authority import Role
 from keystore.certificate import CertificateFacts
 from keystore.creation import check_can_serve
-from keystore.errors import KeystoreError, SigningUnavailable
+from keystore.errors import KeystoreError, SigningUnavailable, UnsafeKeystore
 from keystore.expiry import crl_validity
 from keystore.governance import parse_governance
 from keystore.public_key import key_kind, signature_is_valid
 from keystore.signer import CaAccess
 from keystore.validity import iso
+from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 from keystore.view import KeystoreView
 
@@ -22,40 +24,47 @@ CYCLONE_KINDS = ("P-256", "RSA-2048")
 
 
 def check_authorities(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[Finding]:
+    yield from check_deployed(view, now)
     for role in Role:
-        for facts in view.ca_bundle(role):
-            yield from _check_certificate(role, facts, now)
         yield from _check_key(view, role, access)
         if len(view.ca_bundle(role)) > 1:
             yield Finding(
                 Severity.NOTE, "roll-over", layout.ca_cert(role),
                 "a CA roll-over is under way (two CAs in the file)",
-                "once deployed, go on: secure-keystore renew KEYSTORE --ca switch, later --ca finish",
+                repair.run(view.root, "renew", "--ca", _next_step(view, role), note="once this state is deployed"),
             )  # fmt: skip
     if view.shares_one_ca:
         yield Finding(
             Severity.EXPOSURE, "shared-ca", layout.PUBLIC,
             "one CA for identities and permissions: with Cyclone DDS before 11.0 and Fast DDS before 2.6.5, "
             "2.9.2 and 2.10.1 any enclave can sign permissions and governance for itself (CVE-2023-24010, -24011)",
-            "secure-keystore renew KEYSTORE",
+            repair.run(view.root, "renew", note="then deploy all enclaves together"),
         )  # fmt: skip
+
+
+def check_deployed(view: KeystoreView, now: datetime) -> Iterator[Finding]:
+    """What every host needs of the CAs: their certificates, the governance, the CRL."""
+    for role in Role:
+        for facts in view.ca_bundle(role):
+            yield from _check_certificate(view, role, facts, now)
     yield from check_governance(view)
     if view.has_crl:
         yield from _check_crl(view, now)
 
 
-def _check_certificate(role: Role, facts: CertificateFacts, now: datetime) -> Iterator[Finding]:
+def _next_step(view: KeystoreView, role: Role) -> str:
+    return "switch" if os.path.isdir(view.root / layout.NEXT / role.value) else "finish"
+
+
+def _check_certificate(view: KeystoreView, role: Role, facts: CertificateFacts, now: datetime) -> Iterator[Finding]:
     place = layout.ca_cert(role)
     try:
         check_can_serve(facts.der, role, now, place)
     except KeystoreError as error:
-        yield Finding(
-            Severity.ERROR, "ca-unfit", place, str(error), "secure-keystore renew KEYSTORE --ca start"
-        )
+        fix = repair.run(view.root, "renew", "--ca", "start", note="deploy; then --ca switch and --ca finish")
+        yield Finding(Severity.ERROR, "ca-unfit", place, str(error), fix)
     if facts.issuer == facts.subject and not issued_by(facts, facts):
-        yield Finding(
-            Severity.ERROR, "ca-signature", place, "its self-signature is wrong", "restore the file"
-        )
+        yield Finding(Severity.ERROR, "ca-signature", place, "its self-signature is wrong", repair.BACKUP)
     if key_kind(facts.public_key) not in CYCLONE_KINDS:
         yield Finding(
             Severity.WARNING, "ca-key-kind", place,
@@ -79,7 +88,10 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
             Severity.NOTE, "no-ca-key", layout.ca_key(role), "not here: nothing can be signed on this machine"
         )
         return
-    reference = safe_files.read_private(view.root, name)
+    try:
+        reference = safe_files.read_private(view.root, name)
+    except UnsafeKeystore:
+        return  # the check of all files names it, with what to do about it
     locked = b"ENCRYPTED" in reference and access.passphrase is None
     if locked or (name.endswith(".p11") and access.pin is None):
         yield Finding(
@@ -92,23 +104,24 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
     try:
         view.authority(role, access)
     except SigningUnavailable as error:
-        yield Finding(Severity.ERROR, "ca-key", name, str(error), "restore the CA key from a backup")
+        yield Finding(Severity.ERROR, "ca-key", name, str(error), repair.BACKUP)
 
 
 def check_governance(view: KeystoreView) -> Iterator[Finding]:
     place = layout.GOVERNANCE
-    again = "secure-keystore governance KEYSTORE FILE.yaml"
-    signed = smime.read(safe_files.read(view.root, place), place)
+    again = repair.sign_governance(view.root)
     try:
+        signed = smime.read(safe_files.read(view.root, place), place)
         smime.check(signed, view.ca_bundle(Role.PERMISSIONS), place)
         parse_governance(signed.document, place)
     except KeystoreError as error:
         yield Finding(Severity.ERROR, "governance", place, str(error), again)
+        return
     twin = safe_files.read_if_there(view.root, layout.GOVERNANCE_XML)
     if twin is not None and twin.replace(b"\r\n", b"\n") != signed.document:
         yield Finding(
             Severity.ERROR, "twin-differs", layout.GOVERNANCE_XML,
-            "differs from the signed governance.p7s in force", again,
+            "differs from the signed governance.p7s in force", repair.run(view.root, "renew"),
         )  # fmt: skip
 
 
@@ -119,11 +132,12 @@ def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:
         load_crl(view)
         validity = crl_validity(view)
     except KeystoreError as error:
-        yield Finding(Severity.ERROR, "crl", layout.CRL, str(error), "remove it and revoke again")
+        fix = f"{repair.BACKUP}: without it nobody knows who was revoked"
+        yield Finding(Severity.ERROR, "crl", layout.CRL, str(error), fix)
         return
     if not validity.covers(now):
         yield Finding(
             Severity.ERROR, "crl-expired", layout.CRL,
             f"valid from {iso(validity.not_before)} to {iso(validity.not_after)}: all participants are refused",
-            "secure-keystore renew KEYSTORE, then deploy",
+            repair.run(view.root, "renew", note="then deploy"),
         )  # fmt: skip

@@ -11,7 +11,8 @@ from keystore.authority import Role
 from keystore.certificate import CertificateFacts
 from keystore.der import DerError
 from keystore.enclave_state import key_matches
-from keystore.errors import InvalidInput, KeystoreError
+from keystore.errors import InvalidInput, KeystoreError, SigningUnavailable, UnsafeKeystore
+from keystore.identity import public_half
 from keystore.permissions_read import Grant, parse_permissions
 from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.public_key import key_kind
@@ -24,6 +25,7 @@ from keystore.subject import (
     subject_name,
 )
 from keystore.validity import LATEST, Validity, iso, parse_moment
+from keystore.verification import repair
 from keystore.verification.authorities import CYCLONE_KINDS, issued_by
 from keystore.verification.finding import Finding, Severity
 from keystore.view import KeystoreView
@@ -45,10 +47,17 @@ def check_enclaves(view: KeystoreView, revoked: frozenset[int], now: datetime) -
             yield check.error(
                 "serial-reused", layout.CERT, f"same serial number as {other}; one CRL entry hits both"
             )
-    yield from _check_subjects(names)
+    yield from _check_subjects(view, names)
 
 
-def _check_subjects(names: dict[str, str]) -> Iterator[Finding]:
+def check_enclave(
+    view: KeystoreView, enclave: str, revoked: frozenset[int], now: datetime
+) -> Iterator[Finding]:
+    """One enclave by itself."""
+    return _EnclaveCheck(view, enclave, revoked, now).findings()
+
+
+def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Finding]:
     compatible = [enclave for enclave, cn in names.items() if scheme_of(cn) is SubjectScheme.COMPATIBLE]
     pairs = borrowable(names)
     if pairs:
@@ -56,14 +65,14 @@ def _check_subjects(names: dict[str, str]) -> Iterator[Finding]:
             Severity.EXPOSURE, "borrowed-permissions", layout.ENCLAVES,
             f"on Cyclone DDS (every version so far) {cannot_be_told_apart(pairs)}: it compares subjects as "
             "bags of path segments",
-            "secure-keystore renew KEYSTORE gives exact subjects",
+            repair.run(view.root, "renew", "--all", note="gives exact subjects"),
         )  # fmt: skip
     elif compatible:
         yield Finding(
             Severity.NOTE, "compatible-subjects", layout.ENCLAVES,
             f"{len(compatible)} enclaves have SROS2's subjects (CN=/path); a new enclave could make their "
             "permissions borrowable on Cyclone DDS",
-            "secure-keystore renew KEYSTORE ENCLAVE... gives exact subjects",
+            repair.run(view.root, "renew", *compatible, note="gives exact subjects"),
         )  # fmt: skip
 
 
@@ -77,11 +86,17 @@ class _EnclaveCheck:
         self.facts: CertificateFacts | None = None
 
     def error(self, code: str, file: str, message: str) -> Finding:
-        repair = f"secure-keystore renew KEYSTORE {self._enclave}"
-        return Finding(Severity.ERROR, code, f"{self._directory}/{file}", message, repair)
+        return self._finding(Severity.ERROR, code, file, message, self._renew())
 
-    def _finding(self, severity: Severity, code: str, file: str, message: str, repair: str = "") -> Finding:
-        return Finding(severity, code, f"{self._directory}/{file}", message, repair)
+    def _renew(self) -> str:
+        return repair.run(self._view.root, "renew", self._enclave)
+
+    def _distrusted(self, code: str, message: str) -> Finding:
+        again = repair.grant_again(self._view.root, self._enclave)
+        return self._finding(Severity.ERROR, code, layout.PERMISSIONS, message, again)
+
+    def _finding(self, severity: Severity, code: str, file: str, message: str, fix: str = "") -> Finding:
+        return Finding(severity, code, f"{self._directory}/{file}".rstrip("/"), message, fix)
 
     def _read(self, name: str) -> bytes | None:
         return safe_files.read_if_there(self._view.root, f"{self._directory}/{name}")
@@ -92,6 +107,8 @@ class _EnclaveCheck:
             yield from self._certificate()
             yield from self._links()
             yield from self._permissions()
+        except UnsafeKeystore:
+            return  # the check of all files names it, with what to do about it
         except KeystoreError as error:
             yield self.error("unreadable", "", str(error))
 
@@ -113,14 +130,22 @@ class _EnclaveCheck:
         yield from self._subject(self.facts)
         key = self._read(layout.KEY)
         if key is not None and not key_matches(key, self.facts):
-            yield self.error(
-                "key-mismatch", layout.KEY, "does not belong to cert.pem; Cyclone DDS starts but never talks"
-            )
+            yield self._wrong_key(key)
         if key_kind(self.facts.public_key) not in CYCLONE_KINDS:
             kind = key_kind(self.facts.public_key)
             yield self._finding(
                 Severity.WARNING, "key-kind", layout.CERT, f"a {kind} key: Cyclone DDS refuses it"
             )
+
+    def _wrong_key(self, key: bytes) -> Finding:
+        try:
+            public_half(key, layout.KEY)
+        except SigningUnavailable:
+            fix = repair.run(self._view.root, "renew", self._enclave, "--new-keys")
+            return self._finding(Severity.ERROR, "key", layout.KEY, "not a usable private key", fix)
+        return self.error(
+            "key-mismatch", layout.KEY, "does not belong to cert.pem; Cyclone DDS starts but never talks"
+        )
 
     def _chain(self, facts: CertificateFacts) -> Iterator[Finding]:
         bundle = self._view.ca_bundle(Role.IDENTITY)
@@ -138,14 +163,15 @@ class _EnclaveCheck:
                 f"valid from {iso(facts.validity.not_before)} to {iso(facts.validity.not_after)}",
             )  # fmt: skip
         if facts.serial in self._revoked:
-            yield self.error(
-                "revoked", layout.CERT, "revoked: peers refuse it; remove the enclave or renew it"
+            fix = repair.run(
+                self._view.root, "renew", self._enclave, "--new-keys", note="or secure-keystore remove"
             )
+            yield self._finding(Severity.ERROR, "revoked", layout.CERT, "revoked: peers refuse it", fix)
         if facts.can_sign_mail and self._view.shares_one_ca:
             yield self._finding(
                 Severity.EXPOSURE, "leaf-can-sign", layout.CERT,
                 "its key can sign permissions that older DDS versions accept (shared CA, no EKU)",
-                "secure-keystore renew KEYSTORE",
+                repair.run(self._view.root, "renew"),
             )  # fmt: skip
 
     def _subject(self, facts: CertificateFacts) -> Iterator[Finding]:
@@ -181,7 +207,7 @@ class _EnclaveCheck:
             smime.check(signed, self._view.ca_bundle(Role.PERMISSIONS), place)
             grants = parse_permissions(signed.document, place)
         except KeystoreError as error:
-            yield self.error("permissions", layout.PERMISSIONS, str(error))
+            yield self._distrusted("permissions", str(error))
             return
         twin = self._read(layout.PERMISSIONS_XML)
         if twin is not None and twin.replace(b"\r\n", b"\n") != signed.document:
@@ -199,16 +225,14 @@ class _EnclaveCheck:
             yield self._finding(
                 Severity.WARNING, "several-grants", layout.PERMISSIONS,
                 f"{len(grants)} grants; of those with one subject only the first counts",
-                f"secure-keystore renew KEYSTORE {self._enclave}",
+                self._renew(),
             )  # fmt: skip
         if self.facts is None:
             return
         subject = subject_name(self.facts.common_name or "")
         mine = next((grant for grant in grants if grant.subject_name.strip() == subject), None)
         if mine is None:
-            yield self.error(
-                "wrong-grant", layout.PERMISSIONS, f"no grant for {subject}, the subject of cert.pem"
-            )
+            yield self._distrusted("wrong-grant", f"no grant for {subject}, the subject of cert.pem")
             return
         yield from self._validity(mine, self.facts)
         wide = sorted(
@@ -236,5 +260,5 @@ class _EnclaveCheck:
             yield self._finding(
                 Severity.WARNING, "validity-differs", layout.PERMISSIONS,
                 "not valid as long as the certificate",
-                f"secure-keystore renew KEYSTORE {self._enclave}",
+                self._renew(),
             )  # fmt: skip

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 import stat
 from collections.abc import Iterator
 from pathlib import Path
@@ -12,6 +11,7 @@ from keystore import layout, safe_files
 from keystore.authority import Role
 from keystore.enclave_name import check_distinct, validate_enclave_name
 from keystore.errors import InvalidEnclaveName, printable
+from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
 _TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES})
@@ -29,6 +29,7 @@ _UNFINISHED = (layout.STAGING, layout.INCOMING)
 
 def check_files(root: Path) -> Iterator[Finding]:
     names: list[str] = []
+    yield from _check_owner(root, ".", os.lstat(root), private=False)
     for relative, info in _walk(root, ""):
         if stat.S_ISLNK(info.st_mode):
             yield from _check_link(root, relative)
@@ -40,8 +41,9 @@ def check_files(root: Path) -> Iterator[Finding]:
         check_distinct(names)
     except InvalidEnclaveName as error:
         yield Finding(
-            Severity.ERROR, "case-collision", error.name, str(error), "remove one of the two enclaves"
-        )
+            Severity.ERROR, "case-collision", error.name, str(error),
+            repair.run_on(root, "rm -r", layout.enclave_directory(error.name), "or the other one"),
+        )  # fmt: skip
 
 
 def _walk(root: Path, relative: str) -> Iterator[tuple[str, os.stat_result]]:
@@ -59,11 +61,11 @@ def _check_link(root: Path, relative: str) -> Iterator[Finding]:
     target = safe_files.link_target(root, relative) or ""
     if target not in safe_files.allowed_targets(relative):
         message = str(safe_files.strange_link(root, relative, target))
-        yield Finding(Severity.ERROR, "strange-link", relative, message, _command("rm", root / relative))
+        yield Finding(Severity.ERROR, "strange-link", relative, message, repair.run_on(root, "rm", relative))
     elif not os.path.exists(root / relative):
         yield Finding(
             Severity.ERROR, "dangling-link", relative, f"points at {printable(target)}, which is missing",
-            "restore the file, or run secure-keystore renew",
+            repair.run_on(root, "rm", relative, "or restore what it points at; without a CRL, the revoked are trusted"),
         )  # fmt: skip
 
 
@@ -71,7 +73,7 @@ def _check_directory(root: Path, relative: str, info: os.stat_result, names: lis
     if relative in _UNFINISHED:
         yield Finding(
             Severity.WARNING, "interrupted", relative, "an interrupted run left this behind",
-            "any secure-keystore command that writes completes or clears it",
+            repair.run(root, "renew", note="as any command that writes, completes or clears it"),
         )  # fmt: skip
         return
     yield from _check_owner(root, relative, info, private=relative.split("/")[0] == layout.PRIVATE)
@@ -82,14 +84,37 @@ def _check_directory(root: Path, relative: str, info: os.stat_result, names: lis
         try:
             names.append(validate_enclave_name(name))
         except InvalidEnclaveName as error:
-            yield _stray(root, relative, f"no enclave can have this name: {error.reason}")
+            stray = _stray(root, relative, f"no enclave can have this name: {error.reason}")
+            yield _not_a_file(root, relative, "rm -r") or stray
+        else:
+            yield from _incomplete(root, relative)
     else:
-        yield _stray(root, relative, "no keystore has this directory")
+        yield _not_a_file(root, relative, "rm -r") or _stray(root, relative, "no keystore has this directory")
+
+
+def _incomplete(root: Path, relative: str) -> Iterator[Finding]:
+    """An enclave counts by its key or certificate; without both the rest of it would go unseen."""
+    names = set(os.listdir(root / relative))
+    if names & layout.ENCLAVE_FILES and not names & {layout.KEY, layout.CERT}:
+        enclave = relative.removeprefix(layout.ENCLAVES)
+        yield Finding(
+            Severity.ERROR, "incomplete", relative, "neither key nor certificate, but other files of an enclave",
+            repair.run(root, "create-enclave", enclave),
+        )  # fmt: skip
+
+
+def _not_a_file(root: Path, relative: str, remove: str) -> Finding | None:
+    """Something else in the place of a file that is read."""
+    name = relative.rpartition("/")[2]
+    if relative not in _KNOWN and not (relative.startswith(layout.ENCLAVES) and name in layout.ENCLAVE_FILES):
+        return None
+    fix = repair.run_on(root, remove, relative, "then verify again")
+    return Finding(Severity.ERROR, "not-a-file", relative, "not a regular file", fix)
 
 
 def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Finding]:
     if not stat.S_ISREG(info.st_mode):
-        yield _stray(root, relative, "neither file, directory nor link")
+        yield _not_a_file(root, relative, "rm") or _stray(root, relative, "neither file, directory nor link")
         return
     directory, _, name = relative.rpartition("/")
     secret = directory == layout.PRIVATE or name == layout.KEY
@@ -109,33 +134,38 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
 def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bool) -> Iterator[Finding]:
     path = root / relative
     if private and (problem := safe_files.private_problem(path, info)):
-        yield Finding(Severity.ERROR, "unsafe-owner", relative, problem, problem.rpartition(": ")[2])
+        yield Finding(Severity.ERROR, "unsafe-owner", relative, problem, safe_files.private_repair(path, info))
     elif info.st_mode & 0o022:
         yield Finding(
             Severity.ERROR, "writable-by-others", relative,
-            f"others can write it (mode {safe_files.mode_text(info)})", _command("chmod go-w", path),
+            f"others can write it (mode {safe_files.mode_text(info)})", repair.run_on(root, "chmod go-w", relative),
         )  # fmt: skip
     if private and info.st_mode & 0o077 and not info.st_mode & 0o022:
         yield Finding(
             Severity.ERROR, "readable-by-others", relative,
             f"others can read it (mode {safe_files.mode_text(info)}); whoever did holds the key",
-            _command("chmod go-rwx", path) + "; new keys: secure-keystore renew --new-keys",
+            repair.run_on(root, "chmod go-rwx", relative, "a key that was read wants a new one: renew --new-keys"),
         )  # fmt: skip
 
 
 def _stray(root: Path, relative: str, why: str) -> Finding:
     path = root / relative
-    holds_key = path.is_file() and b"PRIVATE KEY" in path.read_bytes()[:4096]
+    holds_key = _holds_key(path)
     return Finding(
         Severity.ERROR if holds_key else Severity.WARNING,
         "stray-key" if holds_key else "stray",
         relative,
         ("a private key that no DDS process reads" if holds_key else why) + "; it does not belong here",
-        _command("rm -r" if path.is_dir() else "rm", path),
+        repair.run_on(root, "rm -r" if path.is_dir() else "rm", relative),
     )
 
 
-def _command(verb: str, path: Path) -> str:
-    """Ready for a shell, unless the name holds something that would speak to the terminal instead."""
-    text = str(path)
-    return f"{verb} {shlex.quote(text) if text.isprintable() else ascii(text)}"
+def _holds_key(path: Path) -> bool:
+    """A stray may be anything: only the beginning is read, and one that cannot be read is no key of ours."""
+    if not path.is_file():
+        return False
+    try:
+        with path.open("rb") as stream:
+            return b"PRIVATE KEY" in stream.read(4096)
+    except OSError:
+        return False

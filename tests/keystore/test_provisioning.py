@@ -174,7 +174,6 @@ def test_other_enclaves_are_left_alone(tmp_path: Path) -> None:
     [
         ("cert.pem", ("certificate", "permissions")),
         ("permissions.p7s", ("permissions",)),
-        ("permissions.xml", ("permissions",)),
         ("governance.p7s", ("links",)),
         ("identity_ca.cert.pem", ("links",)),
         ("key.pem", ("key and certificate", "permissions")),
@@ -375,7 +374,7 @@ def test_private_parts_that_others_can_write_are_refused_with_the_repair(tmp_pat
     root = filled(tmp_path / "ks", ["/a"])
     path = root / private
     path.chmod(stat.S_IMODE(path.stat().st_mode) | 0o020)
-    with pytest.raises(UnsafeKeystore, match="chmod go-w"):
+    with pytest.raises(UnsafeKeystore, match="chmod go-rwx"):
         provision(root, [policy("/a", "/new"), policy("/b")], options=options())
 
 

@@ -203,6 +203,22 @@ def test_each_step_can_be_repeated(tmp_path: Path, step: Step) -> None:
     assert snapshot(root) == before
 
 
+@pytest.mark.parametrize("left", [["cert.pem"], []])
+def test_a_switch_interrupted_while_it_forgets_is_completed(tmp_path: Path, left: list[str]) -> None:
+    """The last steps of ``switch`` remove what waited in private/next, the key first."""
+    root = filled(tmp_path / "ks", ["/a"])
+    for step in (Step.START, Step.SWITCH):
+        roll_over(root, step, options=options())
+    waiting = root / "private/next/identity_ca"
+    waiting.mkdir(parents=True, mode=0o700)
+    (root / "private/next").chmod(0o700)
+    for name in left:
+        (waiting / name).write_bytes((root / "public/identity_ca.cert.pem").read_bytes())
+    roll_over(root, Step.SWITCH, options=options())
+    assert not (root / "private/next").exists()
+    assert codes(root) == {"roll-over"}
+
+
 def test_steps_out_of_order_are_refused(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a"])
     with pytest.raises(InvalidInput, match="first --ca start"):

@@ -100,7 +100,7 @@ BAD_USAGE = {
     ("list", "OUT"): ("no keystore at", 1),
     ("create", "KS", "--domain-id", "231"): ("0..230", 2),
     ("create", "NEW", "--encrypt-ca-keys"): ("needs a passphrase", 2),
-    ("create", "NEW", "--identity-ca-name", "a/b"): ("1 to 64 characters", 2),
+    ("create", "NEW", "--identity-ca-name", "a/b"): ("1 to 64 bytes", 2),
 }
 
 
