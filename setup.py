@@ -30,7 +30,10 @@ ENTRY_POINTS = {
 }
 
 if int(setuptools.__version__.split(".")[0]) >= 61:
-    setuptools.setup(data_files=DATA_FILES)
+    distribution = setuptools.setup(data_files=DATA_FILES)
+    # colcon reads this object's attributes as Python literals, which setuptools' SpecifierSet is not.
+    for holder in (distribution, distribution.metadata):
+        holder.python_requires = str(holder.python_requires)
 else:
     setuptools.setup(
         name=NAME,
