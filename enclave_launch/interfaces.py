@@ -87,7 +87,10 @@ class InterfaceFinder:
         return Found(inferred.interfaces, inferred=True)
 
 
-_NEXT_STEP = "write a manifest (secure-nodl infer makes a first one from the source) and name it with --nodl"
+_NEXT_STEP = (
+    "describe it in a manifest (secure-nodl infer makes a first one from the source), installed with the package or "
+    "named with --nodl"
+)
 
 
 def _executable_name(process: ResolvedProcess) -> str:

@@ -270,6 +270,12 @@ def _notes(
         for item in components
         if item.container is None
     ]
+    notes += [
+        f"{item.process.location}: {item.process.process_name} has --enclave {item.enclave.path} in its own ROS "
+        f"arguments; its enclave attribute {item.process.enclave.attribute!r} is not used"
+        for item in processes
+        if item.enclave and item.process.enclave.argument is not None and item.process.enclave.attribute is not None
+    ]
     if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
         notes.append(f"enclave {launcher.enclave} is shared with the launcher itself")
     return notes

@@ -83,7 +83,7 @@ def assign_enclave(
         validate_enclave_name(assignment.path)
     except InvalidEnclaveName as error:
         raise LaunchFileError(
-            f"enclave {assignment.path!r} ({assignment.reason.value}) is not valid: {error}",
+            f"enclave {assignment.path!r} ({assignment.reason.value}): {error}",
             process.location,
             error,
         ) from error

@@ -19,6 +19,8 @@ from enclave_launch.evaluation.host import current_host
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_description import LaunchDescription
 
+MISSING_ARGUMENT = "Included launch description missing required argument"
+
 
 @dataclass(slots=True)
 class Declared:
@@ -41,13 +43,17 @@ class Summary:
     given: list[str | None] = field(default_factory=list)
 
 
+def check_is_description(description: LaunchDescription) -> None:
+    """Whatever a Python file returned is asked as upstream asks it, so that ``None`` or a list fails alike."""
+    description.get_launch_arguments_with_include_launch_description_actions  # noqa: B018
+
+
 def check_required_arguments(description: LaunchDescription, given: list[str]) -> None:
     """Raise ``RuntimeError`` unless each required argument is given by the include itself or on the way to it.
 
     Configurations that happen to be set do not count, as upstream.
     """
-    # Whatever a Python file returned is asked as upstream asks it, so that None or a list fails alike.
-    description.get_launch_arguments_with_include_launch_description_actions  # noqa: B018
+    check_is_description(description)
     required = {name: d for name, d in _summarize(description).declared.items() if d.required}
     offers = {id(d.given): d.given for d in required.values() if d.given is not None}
     names = set(given).union(*offers.values())
@@ -63,7 +69,7 @@ def _complain(required: dict[str, Declared], given: list[str]) -> None:
             given.extend(_known(declared.given))
         if name not in given:
             raise RuntimeError(
-                f"Included launch description missing required argument '{name}' "
+                f"{MISSING_ARGUMENT} '{name}' "
                 f"(description: '{declared.description}'), given: [{', '.join(given)}]"
             )
 

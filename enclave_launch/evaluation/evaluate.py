@@ -93,11 +93,14 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
     from enclave_launch.description.launch.launch_description_sources import (
         get_launch_description_from_any_launch_file,
     )
+    from enclave_launch.evaluation.arguments import check_is_description
 
     path = os.path.abspath(launch_file)
     with evaluation_surroundings(host):
         try:
-            yield get_launch_description_from_any_launch_file(path)
+            description = get_launch_description_from_any_launch_file(path)
+            check_is_description(description)
+            yield description
         except EnclaveLaunchError:
             raise
         except Exception as error:  # Python launch files run code of their own: any exception is theirs
@@ -124,7 +127,8 @@ def _collector_paused() -> Iterator[None]:
     """Evaluation builds much and drops little: looking for garbage meanwhile only costs time.
 
     Descriptions are full of cycles, so from the second evaluation of a process on, the one before is cleared
-    away first: memory stays flat.
+    away first: memory stays flat. What is left in the end counts as old, or the next new object would have
+    all of it searched.
     """
     global _evaluated
     enabled = gc.isenabled()
@@ -136,6 +140,8 @@ def _collector_paused() -> Iterator[None]:
         yield
     finally:
         if enabled:
+            gc.freeze()
+            gc.unfreeze()  # puts everything into the oldest generation
             gc.enable()
 
 
@@ -172,27 +178,32 @@ def _evaluation(host: PlanHost) -> Evaluation:
 
 
 def _as_launch_file_error(error: Exception, path: str, host: PlanHost) -> EvaluationError:
+    from enclave_launch.evaluation.error_text import error_text
     from enclave_launch.frontend import error_location
 
-    shown = error_location.likeliest(error)
-    location = _location(error, path)
-    wrapped = EvaluationError(_message(error, shown), location, error)
+    location, helper = _location(error, path)
+    where = f" (in {helper.file}:{helper.line})" if helper else ""
+    wrapped = EvaluationError(error_text(error_location.likeliest(error)) + where, location, error)
     wrapped.partial = _evaluation(host)
     return wrapped
 
 
-def _location(error: Exception, path: str) -> SourceLocation:
-    """The innermost place known, with the include chain of the entity that was being visited."""
+def _location(error: Exception, path: str) -> tuple[SourceLocation, SourceLocation | None]:
+    """The innermost place known, with the include chain of the entity that was being visited; and the place in a
+    helper module of that entity, where it came from there."""
     from enclave_launch.frontend import error_location
 
     visited = place_of(error)
-    exact = error_location.location_of(error) or _user_frame(error)
+    known, frame = error_location.location_of(error), _user_frame(error)
+    exact = known or frame
     if exact is None:
-        return visited if visited is not None and visited.file != OUTSIDE else SourceLocation(path)
+        return (visited if visited is not None and visited.file != OUTSIDE else SourceLocation(path)), None
+    if known is None and visited is not None and visited.line and visited.file != exact.file:
+        return visited, exact
     includes = visited.includes if visited is not None else ()
     if visited is not None and visited.element == "include" and visited.file not in (exact.file, OUTSIDE):
         includes = (*includes, str(visited))
-    return SourceLocation(exact.file, exact.line, exact.element, includes)
+    return SourceLocation(exact.file, exact.line, exact.element, includes), None
 
 
 def _user_frame(error: BaseException) -> SourceLocation | None:
@@ -213,10 +224,3 @@ def _user_frame(error: BaseException) -> SourceLocation | None:
         if not file.startswith((*ours, library, "<")) or file.startswith(library + "/site-packages"):
             found = SourceLocation(file, line)
     return found
-
-
-def _message(error: Exception, shown: BaseException) -> str:
-    text = shown.args[0] if isinstance(shown, KeyError) and shown.args else str(shown)
-    if isinstance(shown, (EnclaveLaunchError, RuntimeError)) and text:
-        return str(text)
-    return f"{type(shown).__name__}: {text}" if text else type(shown).__name__

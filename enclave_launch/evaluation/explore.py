@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch.events.process import ProcessStarted
 from enclave_launch.description.launch.events.shutdown import Shutdown
 from enclave_launch.description.launch.events.timer_event import TimerEvent
+from enclave_launch.evaluation.error_text import error_text
 from enclave_launch.evaluation.events import chain, run_handler
 from enclave_launch.evaluation.location import location_of, place_of
 from enclave_launch.evaluation.suppositions import process_event_arguments
@@ -139,9 +140,8 @@ class Explorer:
     def _note_failure(self, event: Event, error: Exception) -> None:
         """A handler that fails would end the launch at that moment; before it, nobody can be sure."""
         place = place_of(error) or location_of(event, self._context)
-        what = f"on {event.name} {event.subject()}".rstrip()
-        self._host.warn(f"{place}: {what}: {error}")
-        self._host.unforeseeable(Unforeseeable(f"{what}: {error}", place))
+        what = f"what {event.name.rpartition('.')[2]} {event.subject()}".rstrip()
+        self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))
 
     def _report_unreached(self) -> None:
         """Handlers with entities that no event of this dry run could reach."""

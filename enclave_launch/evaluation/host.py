@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     )
 
 MISSING_PREFIX = "/missing"
-"""``--allow-missing-packages``: package ``p`` is taken to be installed in ``/missing/p``."""
+"""``--allow-missing-packages``: package ``p`` is taken to be installed in ``/missing/p``, a program in
+``/missing/bin``."""
 
 
 class CommandResult(NamedTuple):
@@ -73,6 +74,9 @@ class Host(Protocol):
 
     def is_missing(self, path: str) -> bool:
         """Is ``path`` inside the placeholder of a package that is not installed?"""
+
+    def find_program(self, name: str) -> str | None:
+        """Its path on the ``PATH``; ``None`` when it is not there."""
 
     def run_command(self, command: Sequence[str], *, merge_stderr: bool = False) -> CommandResult:
         """Run it without a shell, in our directory and environment. Raises ``FileNotFoundError``."""
@@ -179,7 +183,26 @@ class BaseHost:
     def is_missing(self, path: str) -> bool:
         return self.allow_missing_packages and path.startswith(f"{MISSING_PREFIX}/")
 
+    def find_program(self, name: str) -> str | None:
+        import shutil
+
+        found = shutil.which(name)
+        if found is None and self.allow_missing_packages:
+            return f"{MISSING_PREFIX}/bin/{name}"
+        return found
+
     def run_command(self, command: Sequence[str], *, merge_stderr: bool = False) -> CommandResult:
+        """With ``--allow-missing-packages`` a program that is not there "writes" a marked placeholder."""
+        if self.allow_missing_packages and command:
+            import shutil
+
+            if shutil.which(command[0]) is None:
+                program = os.path.basename(command[0])
+                self.warn(f"program '{program}' is not installed; a placeholder stands for what it would write")
+                return CommandResult(0, f"<output of {program}, which is not installed>", "")
+        return self._run_command(command, merge_stderr)
+
+    def _run_command(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
         import subprocess
 
         result = subprocess.run(

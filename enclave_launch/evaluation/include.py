@@ -22,14 +22,19 @@ OpenFile = tuple[str, dict[str, Any]]
 """A file that is being visited, and the launch configurations with which it was entered."""
 
 
-def prepare_include(include: IncludeLaunchDescription, context: LaunchContext) -> LaunchDescription | None:
-    """The description to visit; ``None``, with a warning, for a file of a package that is not installed."""
+def left_out(include: IncludeLaunchDescription, context: LaunchContext) -> bool:
+    """Whether ``include`` names a file of a package that is not installed; that gives a warning."""
+    location = include.launch_description_source.expand(context)
+    if not context.host.is_missing(location) or os.path.exists(location):
+        return False
+    context.host.warn(f"not included, because its package is not installed: {location}")
+    return True
+
+
+def prepare_include(include: IncludeLaunchDescription, context: LaunchContext) -> LaunchDescription:
+    """The description to visit: whatever a Python file returned. Raises ``CyclicIncludeError``."""
     source = include.launch_description_source
-    location = source.expand(context)
-    if context.host.is_missing(location) and not os.path.exists(location):
-        context.host.warn(f"not included, because its package is not installed: {location}")
-        return None
-    _check_cycle(location, context)
+    _check_cycle(source.expand(context), context)
     return source.get_launch_description(context)
 
 

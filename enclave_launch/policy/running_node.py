@@ -104,4 +104,5 @@ def _parse(
     try:
         return tuple(parse_rule(text, places.get(text, str(location))) for text in texts)
     except InvalidRemapRuleError as error:
-        raise LaunchFileError(f"{error}; rcl would refuse to start this process", location, error) from error
+        what = str(error).removeprefix(f"{location}: ")
+        raise LaunchFileError(f"{what}; rcl would refuse to start this process", location, error) from error

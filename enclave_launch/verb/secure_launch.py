@@ -13,6 +13,8 @@ from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from enclave_launch.flow import ResolveOptions, RunSettings
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.verb.target import Target
@@ -39,6 +41,7 @@ def _main(options: argparse.Namespace) -> int:
     from enclave_launch.verb.target import find_target
     from nodl.ament_index import search_prefixes
 
+    _check_prefixes(options.prefix)
     target = find_target(options.words, search_prefixes(options.prefix))
     if options.show_args or options.print_description:
         with ament_prefixes(options.prefix):
@@ -48,6 +51,13 @@ def _main(options: argparse.Namespace) -> int:
     if _only_looking(options):
         return _show_plan(plan, options, keystore)
     return _launch(plan, options, keystore)
+
+
+def _check_prefixes(prefixes: Iterable[Path]) -> None:
+    """Absent folders on ``AMENT_PREFIX_PATH`` are passed over, as by ament; one named here is a slip of the keyboard."""
+    for prefix in prefixes:
+        if not prefix.is_dir():
+            raise UsageError(f"--prefix {prefix}: no such directory")
 
 
 def _only_looking(options: argparse.Namespace) -> bool:

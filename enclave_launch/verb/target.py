@@ -30,7 +30,8 @@ def find_target(words: Sequence[str], prefixes: Sequence[str]) -> Target:
     if os.path.isfile(first):
         return Target(first, parse_arguments(rest))
     if not rest or ":=" in rest[0]:
-        raise UsageError(f"launch file {first!r} does not exist (give PACKAGE LAUNCH_FILE or a PATH)")
+        what = "is not a regular file" if os.path.exists(first) else "does not exist"
+        raise UsageError(f"launch file {first!r} {what} (give PACKAGE LAUNCH_FILE or a PATH)")
     return Target(_in_package(first, rest[0], prefixes), parse_arguments(rest[1:]))
 
 

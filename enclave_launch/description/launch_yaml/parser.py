@@ -32,6 +32,8 @@ class Parser(BaseParser):
         try:
             document = source.parsed_by(_parse_yaml)
             tree = document.root
+            if tree is None:
+                raise TypeError("the file is empty, expected the key 'launch'")
             if len(tree) != 1:
                 raise RuntimeError("Expected only one root")
             type_name = next(iter(tree.keys()))

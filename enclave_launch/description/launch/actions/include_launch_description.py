@@ -97,12 +97,12 @@ class IncludeLaunchDescription(Action):
         ]
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        from enclave_launch.evaluation.include import prepare_include
+        from enclave_launch.evaluation.include import left_out, prepare_include
 
         self.entered_with = dict(context.launch_configurations)
-        description = prepare_include(self, context)
-        if description is None:
+        if left_out(self, context):
             return []
+        description = prepare_include(self, context)
         before = {name: context.get_locals_as_dict().get(name) for name in _FILE_LOCALS}
         self.__set_file_locals(context)
         from enclave_launch.evaluation.arguments import check_required_arguments

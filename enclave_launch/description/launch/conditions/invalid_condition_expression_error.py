@@ -10,10 +10,12 @@ if TYPE_CHECKING:
 
 
 class InvalidConditionExpressionError(ValueError):
+    """``reason``: without the substitutions, which upstream's text shows as objects."""
+
     def __init__(
         self, expression: str, unexpanded_expression: Iterable[Substitution], valid_expressions: Iterable[str]
     ) -> None:
-        super().__init__(
-            f"invalid condition expression, expected one of [{', '.join(valid_expressions)}] "
-            f"but got '{expression}', expanded from '{' + '.join(map(str, unexpanded_expression))}'"
+        self.reason = (
+            f"invalid condition expression, expected one of [{', '.join(valid_expressions)}] but got '{expression}'"
         )
+        super().__init__(f"{self.reason}, expanded from '{' + '.join(map(str, unexpanded_expression))}'")

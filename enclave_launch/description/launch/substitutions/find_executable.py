@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -41,7 +40,7 @@ class FindExecutable(Substitution):
 
     def perform(self, context: LaunchContext) -> str:
         name = perform_substitutions(context, self.__name)
-        path = shutil.which(name)
+        path = context.host.find_program(name)
         if path is None:
             raise SubstitutionFailure(f"executable '{name}' not found on the PATH")
         return path

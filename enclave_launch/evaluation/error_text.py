@@ -1,0 +1,86 @@
+"""What a person reads of an exception that a launch file, its parser or launch raised.
+
+Texts of launch stay as they are, for they are searched for on the web; the class in front of them goes where it says
+nothing more. What Python raised in the user's own code keeps its class, as in a traceback. The place is not repeated.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Iterator
+from types import TracebackType
+
+from enclave_launch.description.launch.conditions.invalid_condition_expression_error import (
+    InvalidConditionExpressionError,
+)
+from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.evaluation.arguments import MISSING_ARGUMENT
+from enclave_launch.evaluation.host import MISSING_PREFIX
+from nodl.ament_index import PackageNotFoundError
+
+_OWN_PACKAGES = ("enclave_launch", "nodl", "keystore")
+
+
+def error_text(error: BaseException) -> str:
+    """One message: what is wrong and, where there is something to do about it, what."""
+    error = getattr(error, "orig_exc", error)  # of a template: the complaint of the substitution in it
+    text = _text(error).strip()
+    return text + _next_step(error, text) if text else type(error).__name__
+
+
+def _text(error: BaseException) -> str:
+    if isinstance(error, UnicodeDecodeError):
+        return f"not UTF-8 text: byte 0x{error.object[error.start]:02x} at offset {error.start}"
+    if isinstance(error, OSError) and error.strerror and error.filename is not None:
+        return f"{error.strerror}: '{os.fsdecode(error.filename)}'"
+    if isinstance(error, SyntaxError):
+        return _syntax(error)
+    if hasattr(error, "problem_mark"):  # yaml.MarkedYAMLError, without loading PyYAML for the question
+        parts = (getattr(error, "context", None), getattr(error, "problem", None))
+        return "malformed YAML: " + ", ".join(part for part in parts if part)
+    if isinstance(error, InvalidConditionExpressionError):
+        return error.reason
+    text = str(error.args[0]) if isinstance(error, KeyError) and error.args else str(error)
+    if isinstance(error, EnclaveLaunchError | RuntimeError) or _raised_by_us(error):
+        return text
+    return f"{type(error).__name__}: {text}" if text else ""
+
+
+def _syntax(error: SyntaxError) -> str:
+    """Python's errors have a ``msg`` of their own; those of XML end in their place."""
+    if getattr(error, "position", None) is not None:
+        return "malformed XML: " + str(error).rpartition(": line")[0]
+    return f"{type(error).__name__}: {error.msg}"
+
+
+def _raised_by_us(error: BaseException) -> bool:
+    frames = list(_frames(error.__traceback__))
+    if not frames:
+        return type(error).__module__.partition(".")[0] in _OWN_PACKAGES
+    module = frames[-1].tb_frame.f_globals.get("__name__", "")
+    return isinstance(module, str) and module.partition(".")[0] in _OWN_PACKAGES
+
+
+def _frames(traceback: TracebackType | None) -> Iterator[TracebackType]:
+    while traceback is not None:
+        yield traceback
+        traceback = traceback.tb_next
+
+
+def _next_step(error: BaseException, text: str) -> str:
+    if isinstance(error, PackageNotFoundError) and "not found, searching:" in text:
+        return (
+            "\nsource its workspace (AMENT_PREFIX_PATH) or name the install prefix with --prefix; "
+            "--allow-missing-packages goes on without it, for looking only"
+        )
+    if text.startswith(MISSING_ARGUMENT):
+        return "\ngive it as NAME:=VALUE after the launch file (--show-args lists all), or in the include"
+    if isinstance(error, OSError) and f"'{MISSING_PREFIX}/" in text:
+        return "\nthat file is part of a package that is not installed here; this launch file reads it itself"
+    if isinstance(error, ModuleNotFoundError):
+        folders = f"Python {sys.version_info.major}.{sys.version_info.minor}, PYTHONPATH and the install prefixes"
+        return f" (searched: {folders})"
+    if isinstance(error, AttributeError) and "get_launch_arguments_with_include" in text:
+        return "\ngenerate_launch_description() must return a LaunchDescription"
+    return ""

@@ -1,0 +1,101 @@
+"""What a person reads when a launch file is wrong: what, where, and what to do next; no class names, no Python."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.errors import LaunchFileError
+from enclave_launch.evaluation.evaluate import evaluate
+from enclave_launch.evaluation.host import PlanHost
+
+XML = "<launch>\n{}\n</launch>\n"
+
+
+def message(tmp_path: Path, name: str, text: str | bytes, **options: object) -> str:
+    file = tmp_path / name
+    file.write_bytes(text.encode() if isinstance(text, str) else text)
+    with pytest.raises(LaunchFileError) as caught:
+        evaluate(file, host=PlanHost(**options))
+    return str(caught.value).replace(f"{tmp_path}/", "")
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ('<node pkg="p" exec="e" foo="1"/>', "2: <node> Unexpected attribute(s) found in `node`: {'foo'}"),
+        ('<let name="x" value="$(nosub a)"/>', "2: <let> Unknown substitution: nosub"),
+        ('<log message="a" if="maybe"/>', "but got 'maybe'"),
+        ('<include file="$(dirname)/none.launch.xml"/>', "2: <include> No such file or directory: 'none.launch.xml'"),
+        ("<node", "malformed XML: not well-formed (invalid token)"),
+    ],
+)
+def test_a_mistake_in_xml(tmp_path: Path, content: str, told: str) -> None:
+    text = message(tmp_path, "a.launch.xml", XML.format(content))
+    assert text.startswith("a.launch.xml:")
+    assert told in text
+    assert "Error" not in text
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("launch: [\n", "a.launch.yaml:2: malformed YAML: while parsing a flow node, expected the node content"),
+        ("", "a.launch.yaml: the file is empty, expected the key 'launch'"),
+        (b"launch:\n- arg: {name: \xff}\n", "a.launch.yaml: not UTF-8 text: byte 0xff at offset 22"),
+    ],
+)
+def test_a_mistake_in_yaml(tmp_path: Path, content: str | bytes, told: str) -> None:
+    text = message(tmp_path, "a.launch.yaml", content)
+    assert text.startswith(told)
+    assert "Error" not in text
+
+
+def test_what_python_raised_in_the_users_code_keeps_its_class(tmp_path: Path) -> None:
+    code = "def generate_launch_description():\n    return {}['speed']\n"
+    assert message(tmp_path, "a.launch.py", code) == "a.launch.py:2: KeyError: speed"
+
+
+@pytest.mark.parametrize("returned", ["None", "5"])
+def test_a_python_file_must_return_a_description(tmp_path: Path, returned: str) -> None:
+    text = message(tmp_path, "a.launch.py", f"def generate_launch_description():\n    return {returned}\n")
+    assert text.endswith("generate_launch_description() must return a LaunchDescription")
+
+
+def test_a_missing_argument_says_how_to_give_it(tmp_path: Path) -> None:
+    text = message(tmp_path, "a.launch.xml", XML.format('<arg name="robot"/>'))
+    assert "missing required argument 'robot'" in text
+    assert "NAME:=VALUE" in text
+
+
+def test_a_package_that_is_not_installed_says_what_to_do(tmp_path: Path) -> None:
+    text = message(tmp_path, "a.launch.xml", XML.format('<node pkg="nowhere" exec="e"/>'))
+    assert "2: <node> package 'nowhere' not found" in text
+    assert "--prefix" in text and "--allow-missing-packages" in text
+
+
+def test_an_error_inside_a_helper_stands_at_the_element_and_names_the_helper(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "r3_helper.py").write_text(
+        "from launch import Substitution\n\nclass Broken(Substitution):\n"
+        "    def perform(self, context):\n        return context.launch_configurations['unset']\n"
+    )
+    monkeypatch.syspath_prepend(str(tmp_path))
+    code = (
+        "from launch import LaunchDescription\nfrom launch.actions import LogInfo\nfrom r3_helper import Broken\n\n"
+        "def generate_launch_description():\n    return LaunchDescription([\n        LogInfo(msg=[Broken()]),\n    ])\n"
+    )
+    text = message(tmp_path, "a.launch.py", code)
+    assert text == "a.launch.py:7: <LogInfo> KeyError: unset (in r3_helper.py:5)"
+
+
+def test_a_program_that_is_not_installed_is_a_placeholder_when_packages_may_be_missing(tmp_path: Path) -> None:
+    text = XML.format(
+        '<executable cmd="$(find-exec no-such-xacro) $(command \'no-such-xacro a.urdf\')" shell="true"/>'
+    )
+    assert "executable 'no-such-xacro' not found on the PATH" in message(tmp_path, "a.launch.xml", text)
+    found = evaluate(tmp_path / "a.launch.xml", host=PlanHost(allow_missing_packages=True))
+    assert " ".join(found.processes[0].cmd).startswith("/missing/bin/no-such-xacro <output of no-such-xacro")
+    assert found.warnings == ("program 'no-such-xacro' is not installed; a placeholder stands for what it would write",)
