@@ -54,7 +54,7 @@ def _main(options: argparse.Namespace) -> int:
 
 
 def _check_prefixes(prefixes: Iterable[Path]) -> None:
-    """Absent folders on ``AMENT_PREFIX_PATH`` are passed over, as by ament; one named here is a slip of the keyboard."""
+    """Absent folders on ``AMENT_PREFIX_PATH`` are passed over, as by ament; one named here is a slip."""
     for prefix in prefixes:
         if not prefix.is_dir():
             raise UsageError(f"--prefix {prefix}: no such directory")
