@@ -1,8 +1,11 @@
 """For colcon (build type ament_python); pip and everything else read pyproject.toml.
 
 Adds what an ament index wants installed. setuptools before 61, as on Ubuntu 22.04 with ROS 2 Humble, does not read
-pyproject.toml: there the same metadata is given here, and a test holds the two together.
+pyproject.toml, and colcon build --symlink-install runs in a folder without it: there the same metadata is given here,
+and a test holds the two together.
 """
+
+from pathlib import Path
 
 import setuptools
 
@@ -29,7 +32,7 @@ ENTRY_POINTS = {
     "ros2launch.option": ["security_enclaves = enclave_launch.ros2.option:EnclaveOption"],
 }
 
-if int(setuptools.__version__.split(".")[0]) >= 61:
+if int(setuptools.__version__.split(".")[0]) >= 61 and Path("pyproject.toml").is_file():
     distribution = setuptools.setup(data_files=DATA_FILES)
     # colcon reads this object's attributes as Python literals, which setuptools' SpecifierSet is not.
     for holder in (distribution, distribution.metadata):
@@ -41,6 +44,7 @@ else:
         packages=setuptools.find_packages(include=["enclave_launch*", "nodl*", "keystore*"]),
         package_data=PACKAGE_DATA,
         data_files=DATA_FILES,
+        python_requires=">=3.10",
         install_requires=REQUIRES,
         entry_points=ENTRY_POINTS,
         zip_safe=False,

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import re
 import runpy
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -58,3 +61,56 @@ def test_entry_points_are_those_of_pyproject() -> None:
         assert section is not None, f"pyproject.toml has no [{title}]"
         declared = re.findall(r'(?m)^([\w-]+) = "(.*)"$', section[1])
         assert [f"{name} = {value}" for name, value in declared] == entries
+
+
+AS_COLCON = """
+import ast, json, sys
+import setuptools
+from distutils.core import run_setup
+
+distribution = run_setup("setup.py", script_args=("--dry-run",), stop_after="config")
+read = ("packages", "entry_points", "data_files", "python_requires", "install_requires")
+print(json.dumps({key: ast.literal_eval(repr(getattr(distribution, key))) for key in read}))
+assert isinstance(distribution.metadata.python_requires, str)
+"""
+
+
+def as_colcon_reads(folder: Path) -> Any:
+    """colcon takes the attributes of the distribution as Python literals."""
+    run = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", AS_COLCON],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    return json.loads(run.stdout.splitlines()[-1])
+
+
+def test_colcon_reads_the_same_with_pyproject_toml_and_without(tmp_path: Path) -> None:
+    """``colcon build --symlink-install`` works in a folder of links to all that setup.py names."""
+    for name in (
+        "setup.py",
+        "package.xml",
+        "resource",
+        "enclave_launch",
+        "nodl",
+        "keystore",
+        "README.md",
+        "LICENSE",
+    ):
+        (tmp_path / name).symlink_to(ROOT / name)
+    without = as_colcon_reads(tmp_path)
+    (tmp_path / "pyproject.toml").symlink_to(ROOT / "pyproject.toml")
+    beside = as_colcon_reads(tmp_path)
+    for read in (without, beside):
+        read["install_requires"].sort()
+        # Folders of data are packages to one of the two.
+        read["packages"] = sorted(name for name in read["packages"] if python_package(name))
+    assert without == beside
+    assert {"enclave_launch.runtime", "nodl.infer", "keystore.verb"} <= set(beside["packages"])
+
+
+def python_package(name: str) -> bool:
+    return (ROOT / name.replace(".", "/") / "__init__.py").is_file()
