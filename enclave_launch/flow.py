@@ -132,15 +132,14 @@ def provision(
     Raises ``ManifestError`` for a plan with problems (nothing is written then) and ``ProvisionError``.
     """
     from enclave_launch.secured import ProvisionedLaunch, provision_policies
-    from enclave_launch.security_environment import SecuritySettings
-    from keystore.domains import Domains
+    from enclave_launch.security_environment import SecuritySettings, environment_domains
     from keystore.provisioning import ProvisionOptions
 
     if plan.problems:
         raise ManifestError("\n".join((*plan.problems, "nothing was started or written")))
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
-    wanted = chosen.keystore or ProvisionOptions(domains=Domains.parse(os.environ.get("ROS_DOMAIN_ID") or "0"))
+    wanted = chosen.keystore or ProvisionOptions(domains=environment_domains(os.environ))
     report = provision_policies(settings, plan.derived.policy.enclaves, wanted)
     return ProvisionedLaunch(plan, settings, report, wanted)
 

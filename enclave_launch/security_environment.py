@@ -7,16 +7,32 @@ appended only where the user wrote none); an ``executable`` action, whose comman
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from enclave_launch.enclave import Reason
+from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlannedProcess
+from keystore.domains import HIGHEST_ID, Domains
+from keystore.errors import printable
 
 ENABLE = "ROS_SECURITY_ENABLE"
 KEYSTORE = "ROS_SECURITY_KEYSTORE"
 STRATEGY = "ROS_SECURITY_STRATEGY"
 OVERRIDE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
+DOMAIN = "ROS_DOMAIN_ID"
+
+
+def environment_domains(environment: Mapping[str, str]) -> Domains:
+    """The one domain that the processes will use: rcl takes a plain number, and no value for 0.
+
+    Raises ``UsageError``; ranges are for ``--domain-id``, where somebody asks for them.
+    """
+    text = environment.get(DOMAIN) or "0"
+    if re.fullmatch("[0-9]{1,3}", text) is None or int(text) > HIGHEST_ID:
+        raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
+    return Domains.single(int(text))
 
 
 @dataclass(frozen=True, slots=True)

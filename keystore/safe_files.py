@@ -126,8 +126,12 @@ def refuse_unsafe_private_directories(root: Path) -> None:
         if not os.path.lexists(path):
             continue
         refuse_unsafe_directory(path)
-        if problem := private_problem(path, os.lstat(path)):
-            raise UnsafeKeystore(problem)
+        info = os.lstat(path)
+        if info.st_mode & _WRITABLE_BY_OTHERS:
+            raise UnsafeKeystore(
+                f"{printable(path)} can be written by others (mode {mode_text(info)}); for the whole keystore: "
+                f"{close_to_others(root)}"
+            )
 
 
 def private_problem(path: Path | str, info: os.stat_result) -> str | None:
@@ -140,6 +144,11 @@ def private_problem(path: Path | str, info: os.stat_result) -> str | None:
             f"user, or take it over: {private_repair(path, info)}"
         )
     return f"{printable(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
+
+
+def close_to_others(root: Path) -> str:
+    """One command for all that SROS2 leaves under the usual umask 002."""
+    return f"chmod -R go-w {shlex.quote(str(root))}"
 
 
 def private_repair(path: Path | str, info: os.stat_result) -> str:

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.flow import SecurityOptions
 from enclave_launch.plan import LaunchPlan
+from enclave_launch.security_environment import environment_domains
 from keystore.creation import CreateOptions
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError
@@ -40,8 +41,8 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
 
 
 def domains(options: argparse.Namespace) -> Domains:
-    """``--domain-id``, else the domain the processes will use. Raises ``InvalidInput``."""
-    return Domains.parse(options.domain_id or os.environ.get("ROS_DOMAIN_ID") or "0")
+    """``--domain-id``, else the domain the processes will use. Raises ``InvalidInput`` and ``UsageError``."""
+    return Domains.parse(options.domain_id) if options.domain_id else environment_domains(os.environ)
 
 
 def _passphrase(options: argparse.Namespace) -> Secret | None:

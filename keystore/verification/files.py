@@ -138,7 +138,7 @@ def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bo
     elif info.st_mode & 0o022:
         yield Finding(
             Severity.ERROR, "writable-by-others", relative,
-            f"others can write it (mode {safe_files.mode_text(info)})", repair.run_on(root, "chmod go-w", relative),
+            f"others can write it (mode {safe_files.mode_text(info)})", safe_files.close_to_others(root),
         )  # fmt: skip
     if private and info.st_mode & 0o077 and not info.st_mode & 0o022:
         yield Finding(

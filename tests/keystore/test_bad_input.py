@@ -154,7 +154,7 @@ def test_nobody_else_may_put_a_ca_in_waiting(tmp_path: Path) -> None:
     (waiting / "key.pem").write_bytes((other / "private/identity_ca.key.pem").read_bytes())
     before = (root / "public/identity_ca.cert.pem").read_bytes()
     (root / "private/incoming").chmod(0o770)
-    with pytest.raises(UnsafeKeystore, match="chmod go-rwx"):
+    with pytest.raises(UnsafeKeystore, match="chmod -R go-w"):
         provision(root, [policy("/a")], options=options())
     assert (root / "public/identity_ca.cert.pem").read_bytes() == before
 
