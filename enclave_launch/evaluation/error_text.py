@@ -7,6 +7,7 @@ nothing more. What Python raised in the user's own code keeps its class, as in a
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from types import TracebackType
@@ -21,11 +22,13 @@ from nodl.ament_index import PackageNotFoundError
 
 _OWN_PACKAGES = ("enclave_launch", "nodl", "keystore")
 
+_TYPE = re.compile(r"'<class '(\w+)'>'")  # upstream's "of type '<class 'str'>'"
+
 
 def error_text(error: BaseException) -> str:
     """One message: what is wrong and, where there is something to do about it, what."""
     error = getattr(error, "orig_exc", error)  # of a template: the complaint of the substitution in it
-    text = _text(error).strip()
+    text = _TYPE.sub(r"\1", _text(error).strip())
     return text + _next_step(error, text) if text else type(error).__name__
 
 

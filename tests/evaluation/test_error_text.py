@@ -25,6 +25,7 @@ def message(tmp_path: Path, name: str, text: str | bytes, **options: object) -> 
     ("content", "told"),
     [
         ('<node pkg="p" exec="e" foo="1"/>', "2: <node> Unexpected attribute(s) found in `node`: {'foo'}"),
+        ('<let name="x"/>', "2: <let> Attribute 'value' of type str not found in Entity 'let'"),
         ('<let name="x" value="$(nosub a)"/>', "2: <let> Unknown substitution: nosub"),
         ('<log message="a" if="maybe"/>', "but got 'maybe'"),
         ('<include file="$(dirname)/none.launch.xml"/>', "2: <include> No such file or directory: 'none.launch.xml'"),
