@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import os
+import stat
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
@@ -141,6 +142,8 @@ def _parse(path: str, name: str) -> SourceModule:
     is_package = os.path.basename(path) == "__init__.py"
     empty = ast.Module(body=[], type_ignores=[])
     try:
+        if not stat.S_ISREG(os.stat(path).st_mode):  # a pipe would wait for its other end
+            return SourceModule(name, path, empty, "", is_package, "is not a regular file")
         data = Path(path).read_bytes()
     except OSError as error:
         return SourceModule(name, path, empty, "", is_package, f"cannot be read: {error.strerror}")

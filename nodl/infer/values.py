@@ -379,15 +379,12 @@ def widen(old: Value, new: Value, texts_too: bool) -> Value:
         return old
     if isinstance(joined[0], Items) and old and isinstance(old[0], Items):
         return (_widen_items(old[0], joined[0], texts_too),)
-    kept: list[object] = []
-    texts: list[str | Text] = []
-    for atom in joined:
-        if type(atom) in (int, float) and not contains(old, atom):
-            return join(tuple(a for a in joined if type(a) not in (int, float)), ANY) if old else joined
-        if isinstance(atom, str | Text):
-            texts.append(atom)
-        else:
-            kept.append(atom)
+    if any(type(atom) in (int, float) and not contains(old, atom) for atom in joined):
+        if not old:
+            return joined
+        joined = join(tuple(atom for atom in joined if type(atom) not in (int, float)), ANY)
+    texts = [atom for atom in joined if isinstance(atom, str | Text)]
+    kept = [atom for atom in joined if not isinstance(atom, str | Text)]
     if texts_too and any(isinstance(atom, Sequence) and not contains(old, atom) for atom in kept):
         kept = [atom for atom in kept if not isinstance(atom, Sequence)]
         return join((*kept, *texts), unknown(TOO_MANY))  # containers in containers, without end

@@ -52,7 +52,10 @@ def run(args: argparse.Namespace) -> int:
     if args.output:
         _write(args.output, documents)
     else:
-        sys.stdout.write("".join(documents.values()))
+        sys.stdout.write(_encodable("".join(documents.values())))
+    if not system.nodes:
+        count = len(system.files)
+        print(f"secure-nodl infer: no node was found in {count} source file{'s' * (count != 1)}", file=sys.stderr)
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):
         print(f"{len(expanded.unresolved)} unresolved:", file=sys.stderr)
         for question in expanded.unresolved:
@@ -83,8 +86,13 @@ def _documents(
 def _write(folder: Path, documents: dict[str, str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in documents.items():
-        (folder / name).write_text(text, encoding="utf-8")
+        (folder / name).write_text(_encodable(text), encoding="utf-8")
         print(folder / name)
+
+
+def _encodable(text: str) -> str:
+    """Names of files need not be UTF-8; their odd bytes are shown as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
@@ -110,7 +118,9 @@ def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
 
     try:
         folder = Path(package_prefix(package, prefixes), "lib", package)
-    except (PackageNotFoundError, ValueError) as error:
+    except ValueError:
+        raise LookupError(f"no such file or folder: {package}") from None
+    except PackageNotFoundError as error:
         raise LookupError(f"'{package}' is neither a file or folder nor an installed package: {error}") from None
     files = sorted(p for p in folder.glob("*") if p.is_file() and os.access(p, os.X_OK))
     nodes: list[NodeInterface] = []

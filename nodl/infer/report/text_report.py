@@ -18,4 +18,4 @@ def to_text(system: ExpandedSystem, *, built_in: bool = False) -> str:
     if system.unresolved:
         lines.append(f"{len(system.unresolved)} unresolved:")
         lines.extend(f"  {question.source}: {question.why}" for question in system.unresolved)
-    return "\n".join(lines) + "\n"
+    return "".join(f"{line}\n" for line in lines)

@@ -1,0 +1,214 @@
+"""From a launch file to the permission: nodes without a manifest, installed as colcon installs them.
+
+The launch file sets the parameter that names the topic, the namespace and the remap rules; nothing is executed.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.errors import ManifestError
+from enclave_launch.flow import ResolveOptions, provision, resolve
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.policy.explanation import explain
+
+REPEATER = Path(__file__).parents[3] / "fixtures" / "programs" / "repeater.py"
+SITE = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
+PYTHON = "#!/usr/bin/python3\n"
+ENTRY_POINTS = "[console_scripts]\nrepeater = demo.repeater:main\n"
+LAUNCH = """
+<launch>
+  <group>
+    <push-ros-namespace namespace="robot1"/>
+    <node pkg="demo" exec="repeater" name="echo">
+      <param name="input" value="speech"/>
+      <remap from="speech_again" to="/loud/speech"/>
+    </node>
+  </group>
+</launch>
+"""
+SETUPTOOLS = """
+# EASY-INSTALL-ENTRY-SCRIPT: 'demo','console_scripts','repeater'
+import re
+import sys
+from importlib.metadata import distribution
+
+def importlib_load_entry_point(spec, group, name):
+    dist_name, _, _ = spec.partition('==')
+    matches = (e for e in distribution(dist_name).entry_points if e.group == group and e.name == name)
+    return next(matches).load()
+
+globals().setdefault('load_entry_point', importlib_load_entry_point)
+if __name__ == '__main__':
+    sys.argv[0] = re.sub(r'(-script\\.pyw?|\\.exe)?$', '', sys.argv[0])
+    sys.exit(load_entry_point('demo==0.0.0', 'console_scripts', 'repeater')())
+"""
+
+Launch = Callable[..., LaunchPlan]
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """An install prefix with an empty package ``demo``."""
+    prefix = tmp_path / "install"
+    index = prefix / "share/ament_index/resource_index/packages"
+    index.mkdir(parents=True)
+    (index / "demo").touch()
+    (prefix / "lib/demo").mkdir(parents=True)
+    (prefix / SITE).mkdir(parents=True)
+    return prefix
+
+
+def install_program(prefix: Path, content: str | bytes, name: str = "repeater") -> None:
+    program = prefix / "lib/demo" / name
+    program.write_bytes(content.encode() if isinstance(content, str) else content)
+    program.chmod(0o755)
+
+
+def install_module(folder: Path, metadata: str) -> Path:
+    """The package ``demo`` with module ``repeater``, and what names its entry point."""
+    (folder / "demo").mkdir(parents=True)
+    (folder / "demo/__init__.py").touch()
+    shutil.copy(REPEATER, folder / "demo/repeater.py")
+    (folder / metadata).mkdir()
+    (folder / metadata / "entry_points.txt").write_text(ENTRY_POINTS)
+    return folder / "demo/repeater.py"
+
+
+def as_console_script(prefix: Path, build: Path) -> Path:
+    install_program(prefix, PYTHON + SETUPTOOLS)
+    return install_module(prefix / SITE, "demo-0.0.0-py3.11.egg-info")
+
+
+def as_plain_script(prefix: Path, build: Path) -> Path:
+    install_program(prefix, PYTHON + REPEATER.read_text())
+    return prefix / "lib/demo/repeater"
+
+
+def as_linked_script(prefix: Path, build: Path) -> Path:
+    """``install(PROGRAMS ...)`` of ament_cmake under ``--symlink-install``."""
+    source = build / "repeater.py"
+    source.parent.mkdir(parents=True)
+    source.write_text(PYTHON + REPEATER.read_text())
+    source.chmod(0o755)
+    (prefix / "lib/demo/repeater").symlink_to(source)
+    return source
+
+
+def as_egg_link(prefix: Path, build: Path) -> Path:
+    """``--symlink-install`` of ament_python: ``setup.py develop`` into the build folder."""
+    install_program(prefix, PYTHON + SETUPTOOLS)
+    (prefix / SITE / "demo.egg-link").write_text(f"{build}\n.\n")
+    return install_module(build, "demo.egg-info")
+
+
+INSTALLED = [as_console_script, as_plain_script, as_linked_script, as_egg_link]
+
+
+@pytest.fixture
+def launch(tmp_path: Path, prefix: Path, monkeypatch: pytest.MonkeyPatch) -> Launch:
+    """The plan of a launch file, the prefix being all that is installed."""
+    for name in ("AMENT_PREFIX_PATH", "ROS_DISTRO", "ROS_DOMAIN_ID"):
+        monkeypatch.delenv(name, raising=False)
+
+    def plan(text: str = LAUNCH, **options: object) -> LaunchPlan:
+        file = tmp_path / "test.launch.xml"
+        file.write_text(text)
+        return resolve(file, options=ResolveOptions(prefixes=(prefix,), **options))  # type: ignore[arg-type]
+
+    return plan
+
+
+@pytest.mark.parametrize("install", INSTALLED)
+def test_the_permission_has_the_launch_files_value(
+    install: Callable[[Path, Path], Path], launch: Launch, prefix: Path, tmp_path: Path
+) -> None:
+    source = install(prefix, tmp_path / "build/demo")
+    plan = launch()
+    assert not plan.problems
+    granted = permissions(plan)
+    assert {("subscribe", "/robot1/speech"), ("publish", "/loud/speech")} <= granted
+    assert not [name for _, name in granted if "chatter" in name or "speech_again" in name]
+    explained = explain(plan.derived, "/loud/speech")
+    line = 1 + source.read_text().splitlines().index(
+        '        self.publisher = self.create_publisher(String, f"{heard}_again", 10)'
+    )
+    assert f"    node /robot1/echo: {source}:{line}: 'param:input_again'" in explained
+    assert any("remapped by speech_again:=/loud/speech" in each for each in explained)
+
+
+def permissions(plan: LaunchPlan) -> set[tuple[str, str]]:
+    (enclave,) = plan.derived.reasons.values()
+    return {(rule.operation.value, rule.expression) for rule in enclave}
+
+
+def test_without_inference_a_secure_start_is_refused(launch: Launch, prefix: Path, tmp_path: Path) -> None:
+    as_console_script(prefix, tmp_path / "build")
+    plan = launch(infer=False)
+    (problem,) = plan.problems
+    assert "demo/repeater" in problem
+    with pytest.raises(ManifestError, match="nothing was started or written"):
+        provision(plan, tmp_path / "keystore")
+    assert not (tmp_path / "keystore").exists()
+
+
+def test_a_compiled_node_without_a_manifest_says_how_to_write_one(launch: Launch, prefix: Path) -> None:
+    install_program(prefix, b"\x7fELF\x02\x01\x01", "compiled")
+    (problem,) = launch('<launch><node pkg="demo" exec="compiled"/></launch>').problems
+    assert "compiled program" in problem
+    assert f"{prefix}/share/demo/*.nodl.xml" in problem
+    assert "describe it in a manifest" in problem
+
+
+COMPUTED = """
+import sys
+import rclpy
+from std_msgs.msg import String
+rclpy.init()
+node = rclpy.create_node("computed")
+node.create_publisher(String, "sensors/" + sys.argv[1], 10)
+rclpy.spin(node)
+"""
+
+
+def test_a_name_known_in_part_is_an_error_unless_accepted(launch: Launch, prefix: Path) -> None:
+    install_program(prefix, PYTHON + COMPUTED, "computed")
+    text = '<launch><node pkg="demo" exec="computed" namespace="robot1"/></launch>'
+    (problem,) = launch(text).problems
+    assert f"{prefix}/lib/demo/computed:8" in problem
+    accepted = launch(text, accept_patterns=True)
+    assert not accepted.problems
+    assert ("publish", "/robot1/sensors/*") in permissions(accepted)
+    assert any("sensors/*" in warning for warning in accepted.warnings)
+
+
+def test_a_name_not_known_at_all_is_an_error_always(launch: Launch, prefix: Path) -> None:
+    install_program(prefix, PYTHON + COMPUTED.replace('"sensors/" + ', ""), "computed")
+    text = '<launch><node pkg="demo" exec="computed"/></launch>'
+    assert launch(text).problems
+    assert launch(text, accept_patterns=True).problems
+
+
+def test_the_command_line_says_the_same(prefix: Path, tmp_path: Path, launch: Launch) -> None:
+    as_egg_link(prefix, tmp_path / "build")
+    file = tmp_path / "test.launch.xml"
+    file.write_text(LAUNCH)
+
+    def secure_launch(*words: str) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "enclave_launch", "--prefix", str(prefix), *words, str(file)]
+        return subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, timeout=60, check=False)
+
+    explained = secure_launch("--explain", "/robot1/speech")
+    assert explained.returncode == 0
+    assert "demo/repeater.py:13" in explained.stdout
+    refused = secure_launch("--secure", "--keystore", str(tmp_path / "ks"), "--missing-nodl", "error")
+    assert refused.returncode != 0
+    assert "demo/repeater" in refused.stderr
+    assert "Traceback" not in refused.stderr
+    assert not (tmp_path / "ks").exists()
