@@ -34,6 +34,8 @@ from nodl.infer.values import (
     unknown,
 )
 
+MAX_DOTS = 8
+
 
 def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame) -> Value:
     held = obj.cells.get(name)
@@ -144,6 +146,8 @@ def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: F
 def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Frame) -> Value:
     if name == "__name__":
         return (atom.path.rpartition(".")[2],)
+    if atom.path.count(".") > MAX_DOTS:
+        return unknown(f"an attribute of {atom.path}")  # ``x = x.next`` in a loop would go on without end
     path = f"{atom.path}.{name}"
     module = imports.import_submodule(run, path, frame)
     if module is not None:

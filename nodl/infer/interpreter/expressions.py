@@ -223,7 +223,9 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     if isinstance(atom, External) and atom.path == "os.environ":
         return run.call(external("os.environ.get"), Arguments([key]), node, frame)
     if isinstance(atom, External):
-        return (atom,) if atom.path.startswith(("typing.", "builtins.")) else external(f"{atom.path}[]")
+        if atom.path.startswith(("typing.", "builtins.")) or atom.path.endswith("[]"):
+            return (atom,)
+        return external(f"{atom.path}[]")
     return (atom,) if isinstance(atom, Unknown) else ANY
 
 
