@@ -47,12 +47,16 @@ InterfaceLookup = Callable[["ResolvedProcess | ResolvedComponent"], "Found | Mis
 
 @dataclass(frozen=True, slots=True)
 class PlannedProcess:
-    """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes."""
+    """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes.
+
+    ``inferred``: their interfaces come from the program's source, for want of a manifest.
+    """
 
     process: ResolvedProcess
     enclave: EnclaveAssignment | None
     nodes: tuple[RunningNode, ...]
     missing: Missing | None = None
+    inferred: bool = False
 
     @property
     def name(self) -> str | None:
@@ -200,7 +204,7 @@ def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: Encl
     path = enclave.path if enclave else "/"
     role = _role(process)
     nodes = tuple(node_of_process(process, interface, path, role) for interface in found.interfaces)
-    return PlannedProcess(process, enclave, nodes)
+    return PlannedProcess(process, enclave, nodes, inferred=found.inferred)
 
 
 def _role(process: ResolvedProcess) -> Role:

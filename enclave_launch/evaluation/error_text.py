@@ -24,11 +24,13 @@ _OWN_PACKAGES = ("enclave_launch", "nodl", "keystore")
 
 _TYPE = re.compile(r"'<class '(\w+)'>'")  # upstream's "of type '<class 'str'>'"
 
+_PLACE = re.compile(r": line \d+(, column \d+)?$")  # at the end of what XML parsers say
+
 
 def error_text(error: BaseException) -> str:
     """One message: what is wrong and, where there is something to do about it, what."""
     error = getattr(error, "orig_exc", error)  # of a template: the complaint of the substitution in it
-    text = _TYPE.sub(r"\1", _text(error).strip())
+    text = _PLACE.sub("", _TYPE.sub(r"\1", _text(error).strip()))
     return text + _next_step(error, text) if text else type(error).__name__
 
 

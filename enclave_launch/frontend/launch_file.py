@@ -63,7 +63,7 @@ def read(file: str | bytes | os.PathLike[str] | TextIO) -> LaunchFile:
     Raises ``OSError``, ``UnicodeDecodeError``, ``LaunchFileTooLarge``.
     """
     if not isinstance(file, str | bytes | os.PathLike):
-        return LaunchFile(str(getattr(file, "name", "")), _limited(file.read(), "input"))
+        return LaunchFile(str(getattr(file, "name", "")), _limited(file.read()))
     path = os.fsdecode(file)
     status = os.stat(path)
     stamp = (path, status.st_ino, status.st_mtime_ns, status.st_size)
@@ -83,12 +83,12 @@ def forget() -> None:
 
 def _read_text(path: str) -> str:
     with open(path, encoding="utf-8") as file:
-        return _limited(file.read(MAX_CHARACTERS + 1), path)
+        return _limited(file.read(MAX_CHARACTERS + 1))
 
 
-def _limited(text: str, name: str) -> str:
+def _limited(text: str) -> str:
     if len(text) > MAX_CHARACTERS:
-        raise LaunchFileTooLarge(f"{name} has more than {MAX_CHARACTERS} characters")
+        raise LaunchFileTooLarge(f"the file has more than {MAX_CHARACTERS} characters")
     return text
 
 

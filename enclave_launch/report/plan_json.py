@@ -69,7 +69,7 @@ def _enclaves(plan: LaunchPlan) -> dict[str, dict[str, list[str]]]:
     for node in plan.nodes:
         nodes.setdefault(node.enclave, []).append(node.fqn)
     return {
-        enclave.path: {"nodes": sorted(nodes.get(enclave.path, [])), **allowed_names(enclave)}
+        enclave.path: {"nodes": sorted(set(nodes.get(enclave.path, []))), **allowed_names(enclave)}
         for enclave in plan.derived.policy.enclaves
     }
 

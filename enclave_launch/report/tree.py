@@ -48,15 +48,16 @@ def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) ->
 def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     process = item.process
     what = f"{process.package}/{process.executable}" if process.package else process.executable
-    names = " ".join(node.fqn for node in item.nodes) or item.fqn or ""
+    names = " ".join(dict.fromkeys(node.fqn for node in item.nodes)) or item.fqn or ""
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
+    source = ", inferred from its source" if item.inferred else ""
     place = (
         f"line {process.location.line}"
         if process.location.file == plan.launch_file
         else str(process.location)
     )
-    head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{event})"
+    head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{source}{event})"
     loaded: list[Branch] = [
         (f"component {component.component.package} {component.component.plugin} as {component.fqn}", ())
         for component in plan.components

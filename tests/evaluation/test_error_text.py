@@ -29,6 +29,7 @@ def message(tmp_path: Path, name: str, text: str | bytes, **options: object) -> 
         ('<let name="x" value="$(nosub a)"/>', "2: <let> Unknown substitution: nosub"),
         ('<log message="a" if="maybe"/>', "but got 'maybe'"),
         ('<include file="$(dirname)/none.launch.xml"/>', "2: <include> No such file or directory: 'none.launch.xml'"),
+        ("&nothing;", "a.launch.xml:2: malformed XML: undefined entity"),
         ("<node", "malformed XML: not well-formed (invalid token)"),
     ],
 )

@@ -1,0 +1,71 @@
+"""A plan for review says what is missing from it, whichever way it is printed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from .conftest import SecureLaunch
+
+Write = Callable[..., Path]
+COMPILED = b"\x7fELF\x02\x01\x01"
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """A package ``robot`` with a Python node ``hello`` and a compiled ``engine``, both without a manifest."""
+    prefix = tmp_path / "install"
+    for folder in ("share/ament_index/resource_index/packages", "share/robot", "lib/robot"):
+        (prefix / folder).mkdir(parents=True)
+    (prefix / "share/ament_index/resource_index/packages/robot").touch()
+    (prefix / "lib/robot/hello").write_text(
+        "#!/usr/bin/env python3\nimport rclpy\nfrom std_msgs.msg import String\n\nrclpy.init()\n"
+        "node = rclpy.create_node('hello')\nnode.create_publisher(String, 'greeting', 1)\nrclpy.spin(node)\n"
+    )
+    (prefix / "lib/robot/engine").write_bytes(COMPILED)
+    for program in ("hello", "engine"):
+        (prefix / "lib/robot" / program).chmod(0o755)
+    return prefix
+
+
+def test_the_tree_tells_what_was_inferred(secure_launch: SecureLaunch, write: Write, workspace: Path) -> None:
+    file = write('<node pkg="robot" exec="hello"/><node pkg="demo_nodes" exec="talker"/>')
+    tree = secure_launch("--dry-run", "--prefix", workspace, file).stdout
+    hello, talker = (line for line in tree.splitlines() if "robot/hello" in line or "demo_nodes/talker" in line)
+    assert "inferred from its source" in hello and "inferred" not in talker
+    assert "publish: /chatter /greeting" in tree
+
+
+@pytest.mark.parametrize("way", [("--format", "policy"), ("--explain", "/talker"), ("--dump-params",)])
+def test_what_is_not_known_is_told_beside_every_other_output(
+    way: tuple[str, ...], secure_launch: SecureLaunch, write: Write, workspace: Path
+) -> None:
+    file = write('<node pkg="demo_nodes" exec="talker"/><node pkg="robot" exec="engine"/>')
+    run = secure_launch("--dry-run", *way, "--prefix", workspace, file)
+    assert run.returncode == 0
+    assert "no NoDL manifest for robot/engine" in run.stderr
+    assert "robot/engine" not in run.stdout
+
+
+def test_a_policy_of_nothing_known_is_an_error(
+    secure_launch: SecureLaunch, write: Write, workspace: Path
+) -> None:
+    run = secure_launch(
+        "--dry-run", "--format", "policy", "--prefix", workspace, write('<node pkg="robot" exec="engine"/>')
+    )
+    assert (run.returncode, run.stdout) == (1, "")
+    assert "no NoDL manifest for robot/engine" in run.stderr and "there is no policy to print" in run.stderr
+
+
+def test_an_attribute_that_its_own_arguments_overrule_is_told(secure_launch: SecureLaunch, write: Write) -> None:
+    file = write('<node pkg="demo_nodes" exec="talker" ros_args="--enclave /mine" enclave="other"/>')
+    tree = secure_launch("--dry-run", file).stdout
+    assert "enclave /mine" in tree and "enclave attribute 'other' is not used" in tree
+
+
+def test_a_prefix_that_is_not_there_is_named(secure_launch: SecureLaunch) -> None:
+    run = secure_launch("--dry-run", "--prefix", "/no/such/prefix", "demo_nodes", "talker_listener.launch.xml")
+    assert run.returncode == 2
+    assert "--prefix /no/such/prefix: no such directory" in run.stderr
