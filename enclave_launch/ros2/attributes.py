@@ -6,7 +6,8 @@
 Upstream offers no hook for attributes of its own actions, so three methods are wrapped, once, and each does
 exactly what it did for those who do not use the attribute. Loaded through the entry point
 ``launch.frontend.launch_extension``, when the first XML or YAML file is parsed, and by our other
-extensions.
+extensions: in every ``ros2 launch`` of a workspace, so the rest of this project is imported where an
+attribute is used.
 """
 
 from __future__ import annotations
@@ -21,8 +22,7 @@ from launch.actions import ExecuteProcess
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
-from enclave_launch.evaluation.namespaces import enclave_scope, push_enclave_scope
-from enclave_launch.security_environment import OVERRIDE
+from enclave_launch.ros2.context import session_of
 
 ATTRIBUTE = "_enclave_launch_enclave"
 WRAPPED = "_enclave_launch_wrapped"
@@ -46,6 +46,8 @@ class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
         return cls, kwargs
 
     def execute(self, context: Any) -> None:
+        from enclave_launch.evaluation.namespaces import push_enclave_scope
+
         push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.enclave))
 
 
@@ -56,6 +58,8 @@ def enclave_attribute(action: Any, context: Any) -> str | None:
 
 
 def scope_in_force(context: Any) -> str | None:
+    from enclave_launch.evaluation.namespaces import enclave_scope
+
     return enclave_scope(context.launch_configurations)
 
 
@@ -93,6 +97,8 @@ def _overriding_enclave(init: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(init)
     def wrapped(self: Any, *args: Any, **kwargs: Any) -> None:
         if hasattr(self, ATTRIBUTE) and not isinstance(self, launch_ros.actions.Node):
+            from enclave_launch.security_environment import OVERRIDE
+
             given = kwargs.get("additional_env") or {}
             kwargs["additional_env"] = {**given, OVERRIDE: EnclaveOverride(self)}
         init(self, *args, **kwargs)
@@ -113,12 +119,12 @@ class EnclaveOverride(Substitution):  # type: ignore[misc]  # untyped without RO
         return "EnclaveOverride()"
 
     def perform(self, context: Any) -> str:
-        from enclave_launch.ros2.observation import observe_executable
-        from enclave_launch.ros2.session import session_of
-
         session = session_of(context)
         if session is None:
             return ""
+        from enclave_launch.ros2.observation import observe_executable
+        from enclave_launch.security_environment import OVERRIDE
+
         return session.enter(observe_executable(self._action, context)).environment.get(OVERRIDE, "")
 
 
@@ -150,10 +156,12 @@ def _reading_enclave_class(parse: Parse) -> Parse:
 def _pushing_enclave_scope(execute: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(execute)
     def wrapped(self: Any, context: Any) -> Any:
-        enclave = enclave_attribute(self, context)
-        push_enclave_scope(
-            context.launch_configurations, enclave, perform_substitutions(context, self.namespace)
-        )
+        if session_of(context) is not None:  # else nobody asks for the scope
+            from enclave_launch.evaluation.namespaces import push_enclave_scope
+
+            enclave = enclave_attribute(self, context)
+            namespace = perform_substitutions(context, self.namespace)
+            push_enclave_scope(context.launch_configurations, enclave, namespace)
         return execute(self, context)
 
     return wrapped

@@ -6,12 +6,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from launch.substitutions import TextSubstitution
 from launch_ros.actions.node import NodeActionExtension
 
 from enclave_launch.ros2 import attributes  # noqa: F401  # accepted by the time a node is executed, too
-from enclave_launch.ros2.observation import observe_components, observe_node
-from enclave_launch.ros2.session import session_of
+from enclave_launch.ros2.context import session_of
 
 
 class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # untyped without ROS
@@ -24,6 +22,10 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
         session = session_of(context)
         if session is None:
             return [], ros_specific_arguments
+        from launch.substitutions import TextSubstitution
+
+        from enclave_launch.ros2.observation import observe_components, observe_node
+
         process = observe_node(node_action, context, ros_specific_arguments)
         grant = session.enter(process, observe_components(node_action, context))
         return [[TextSubstitution(text=word)] for word in grant.arguments], ros_specific_arguments

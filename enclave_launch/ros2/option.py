@@ -19,9 +19,6 @@ from ros2launch.option import OptionExtension
 
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
-from enclave_launch.ros2.secured import check_installed, enclosed
-from enclave_launch.ros2.session import EnclaveSession, PlannedDoor
-from enclave_launch.runtime.gate import PlannedGate
 from enclave_launch.verb.options import add_policy_options, add_security_options, build_parser
 
 SECURE = "secure_enclaves"
@@ -50,6 +47,9 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
 
 def _secured(description: Any, args: argparse.Namespace) -> Any:
     from enclave_launch.flow import provision, resolve
+    from enclave_launch.ros2.secured import check_installed, enclosed
+    from enclave_launch.ros2.session import EnclaveSession, PlannedDoor
+    from enclave_launch.runtime.gate import PlannedGate
     from enclave_launch.secured import PlanProvider
     from enclave_launch.verb.secure_launch import resolve_options
     from enclave_launch.verb.security import expiry_notices, security_options

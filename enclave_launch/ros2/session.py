@@ -1,7 +1,6 @@
 """The enclaves of one secured launch under upstream's engine.
 
-Kept in the launch context, so that several launches in one program stay apart. ``enter`` is called for
-every process just before it starts and returns when its enclave is complete on disk.
+``enter`` is called for every process just before it starts and returns when its enclave is complete on disk.
 """
 
 from __future__ import annotations
@@ -15,10 +14,9 @@ from launch.event_handlers import OnShutdown
 from enclave_launch.errors import ProvisionError
 from enclave_launch.policy.launcher import LAUNCHER_NODE
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.ros2.context import KEY
 from enclave_launch.runtime.gate import Grant, PlannedGate
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
-
-KEY = "enclave_launch_session"
 
 
 class Doorkeeper(Protocol):
@@ -76,11 +74,6 @@ class EnclaveSession:
     def enter(self, process: ResolvedProcess, components: Sequence[ResolvedComponent] = ()) -> Grant:
         """:raises EnclaveLaunchError: not foreseen in the plan, or its enclave cannot be completed."""
         return self._door.admit(process, components)
-
-
-def session_of(context: Any) -> EnclaveSession | None:
-    session = context.get_locals_as_dict().get(KEY)
-    return session if isinstance(session, EnclaveSession) else None
 
 
 _NEEDS_PLAN = (

@@ -20,8 +20,10 @@ stand_ins.install()
 import launch, launch.actions
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 import enclave_launch.ros2.attributes as attributes
+from enclave_launch.ros2.context import KEY
 from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
 from enclave_launch.ros2.observation import observe_node
+from enclave_launch.runtime.gate import Grant
 
 seen = []
 def look(self, context, ros_specific_arguments, node_action):
@@ -34,6 +36,9 @@ def look(self, context, ros_specific_arguments, node_action):
 EnclaveNodeActionExtension.prepare_for_execute = look
 
 service = launch.LaunchService(noninteractive=True)
+class Session:
+    enter = staticmethod(lambda process: Grant())
+service.context.extend_globals({KEY: Session()})
 service.include_launch_description(launch.LaunchDescription([
     launch.actions.IncludeLaunchDescription(AnyLaunchDescriptionSource(sys.argv[1]))]))
 status = service.run()
@@ -168,3 +173,43 @@ def test_other_unknown_attributes_are_still_refused(workspace: Workspace) -> Non
     result = workspace.python(VISIT, str(file))
     assert "Unexpected attribute(s) found in `node`: {'enklave'}" in result.stdout
     assert json.loads(result.stdout.splitlines()[-1])["status"] == 1
+
+
+UNSECURED = """
+import sys
+import stand_ins
+stand_ins.install()
+import launch
+from launch.launch_description_sources import AnyLaunchDescriptionSource
+from launch.actions import IncludeLaunchDescription, OpaqueFunction
+import ros2launch.api.api
+import enclave_launch.ros2.option, enclave_launch.ros2.node_action
+
+def configurations(context):
+    print("CONFIGURATIONS", sorted(context.launch_configurations), sorted(context.get_locals_as_dict()))
+
+service = launch.LaunchService(noninteractive=True)
+include = IncludeLaunchDescription(AnyLaunchDescriptionSource(sys.argv[1]))
+service.include_launch_description(launch.LaunchDescription([include, OpaqueFunction(function=configurations)]))
+assert service.run() == 0
+ours = {name for name in sys.modules if name.split(".")[0] in ("enclave_launch", "nodl", "keystore")}
+heavy = {"enclave_launch.plan", "enclave_launch.flow", "enclave_launch.secured", "nodl.lookup", "keystore"}
+print("HEAVY", sorted(ours & heavy))
+"""
+
+
+def test_a_launch_without_secure_neither_computes_nor_imports_anything_of_ours(workspace: Workspace) -> None:
+    """The namespace is performed once, as upstream does: a command in it has effects."""
+    count = workspace.directory / "count"
+    file = workspace.add(
+        "plain.launch.xml",
+        f"""<launch>
+          <push_ros_namespace namespace="$(command 'sh -c &quot;echo x &gt;&gt; {count}; printf pushed&quot;')"/>
+          <node exec="/bin/true" name="a"/>
+        </launch>""",
+    )
+    result = workspace.python(UNSECURED, str(file))
+    assert result.returncode == 0, result.stdout
+    assert "HEAVY []" in result.stdout
+    assert "enclave" not in next(line for line in result.stdout.splitlines() if "CONFIGURATIONS" in line)
+    assert count.read_text() == "x\n"
