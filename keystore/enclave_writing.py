@@ -18,6 +18,7 @@ from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.policy import EnclavePolicy
 from keystore.store import Batch, Content, Link, Store
 from keystore.subject import SubjectScheme, borrowable, cannot_be_told_apart, common_name, subject_name
+from keystore.superseded import Superseded
 from keystore.trusted_documents import trusted_document
 from keystore.validity import Validity
 from keystore.view import KeystoreView
@@ -84,6 +85,15 @@ class EnclaveWriter:
         pem = safe_files.read_if_there(self._view.root, relative)
         facts = read_certificate(pem, printable(relative)) if pem else None
         return (facts.common_name if facts else None) or common_name(enclave, self._scheme)
+
+    def replaced(self, states: list[EnclaveState]) -> list[Superseded]:
+        """Certificates by the present CA that ``write`` will replace before they have ended."""
+        ca = self._view.ca(Role.IDENTITY)
+        return [
+            Superseded(state.enclave, state.facts.serial, state.facts.validity.not_after)
+            for state in states
+            if state.identity is not Identity.GOOD and state.facts is not None and state.facts.names_issuer(ca)
+        ]
 
     def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> tuple[str, ...]:
         """Add the enclave's missing files; returns what was done. Order: key, certificate, links,

@@ -24,6 +24,7 @@ SHARED_CA_CERT, SHARED_CA_KEY = "public/ca.cert.pem", "private/ca.key.pem"
 RETIRED = "private/retired"
 INCOMING = "private/incoming"
 NEXT = "private/next"
+SUPERSEDED = "private/superseded.json"
 
 KEY, CERT = "key.pem", "cert.pem"
 PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"

@@ -25,6 +25,7 @@ from keystore.provisioning import (
     inspect_wish,
 )
 from keystore.store import Store
+from keystore.superseded import remember
 from keystore.view import KeystoreView
 
 # Bounds what an interrupted run loses, and how often the disk is waited for.
@@ -43,7 +44,7 @@ def write_wishes(
         writer = EnclaveWriter(opened, view, options, now)
         states = [inspect_wish(view, name, wish, options, now) for name, wish in wishes.items()]
         writer.check_subjects(states)
-        reports = _write_all(opened, writer, states, wishes, options.progress)
+        reports = _write_all(opened, writer, states, wishes, options.progress, now)
     return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
 
 
@@ -90,6 +91,7 @@ def _write_all(
     states: list[EnclaveState],
     wishes: Mapping[str, Wish],
     progress: Progress | None,
+    now: datetime,
 ) -> tuple[EnclaveReport, ...]:
     """In batches: bounded loss when interrupted, few calls to make it durable."""
     reports = {state.enclave: EnclaveReport(state.enclave, ()) for state in states}
@@ -97,6 +99,7 @@ def _write_all(
     for start in range(0, len(todo), _BATCH):
         part = todo[start : start + _BATCH]
         with opened.batch() as batch:
+            remember(batch, KeystoreView(opened.root), writer.replaced(part), now)
             for position, state in enumerate(part, start + 1):
                 actions = writer.write(batch, state, wishes[state.enclave].permissions)
                 reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)

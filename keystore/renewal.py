@@ -25,7 +25,7 @@ from keystore.enclave_state import Identity
 from keystore.enclaves import keep
 from keystore.errors import InvalidInput, printable
 from keystore.provisioning import ProvisionOptions, ProvisionReport, Wish, bring_about, with_domains
-from keystore.revocation import renew_crl
+from keystore.revocation import renew_crl, revoke_replaced
 from keystore.store import Store
 from keystore.subject import SubjectScheme, scheme_of
 from keystore.validity import utc_now
@@ -41,6 +41,8 @@ class RenewOptions:
     within: timedelta = DEFAULT_WITHIN
     everything: bool = False
     new_keys: bool = False
+    revoke_old: bool = False
+    """Also revoke the certificates that these enclaves had before: for keys that somebody copied."""
     encrypt_ca_keys: bool = False
     provisioning: ProvisionOptions = field(default_factory=ProvisionOptions)
 
@@ -70,6 +72,11 @@ def renew(
     wishes = {name: _wish(view, name, named, chosen) for name in view.enclaves()}
     due = provisioning if named is not None else replace(provisioning, renew_within=chosen.within)
     report = bring_about(root, wishes, with_domains(root, due))
+    if chosen.revoke_old:
+        with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:
+            changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
+            count = revoke_replaced(opened, changed, provisioning.access, now)
+        repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
     return replace(report, created=(*repaired, *report.created))
 
 

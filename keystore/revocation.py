@@ -26,6 +26,7 @@ from keystore.errors import DamagedKeystore, InvalidInput, printable
 from keystore.expiry import crl_validity
 from keystore.signer import CaAccess
 from keystore.store import Link, Store
+from keystore.superseded import serials_of
 from keystore.validity import later, utc_now
 from keystore.view import KeystoreView, resolve_root
 
@@ -64,7 +65,8 @@ class RemoveReport:
 def remove(
     keystore: Path | str, names: Iterable[str], *, options: RemoveOptions | None = None
 ) -> RemoveReport:
-    """Revoke, publish the CRL to all remaining enclaves, then delete. Repeating completes an interrupted run.
+    """Revoke what they have and had, publish the CRL to all remaining enclaves, then delete. Repeating completes an
+    interrupted run.
 
     Enclaves below a removed one stay. Raises InvalidInput for an enclave that is not there.
     """
@@ -94,6 +96,8 @@ def _revoke(
     now = options.now or utc_now()
     serials = dict(revoked_serials(view))
     ca = view.ca(Role.IDENTITY)
+    for serial in serials_of(view, names):
+        serials.setdefault(serial, now)
     for name in names:
         pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(name)}/{layout.CERT}")
         try:
@@ -155,6 +159,26 @@ def link_crl(opened: Store, names: Iterable[str]) -> None:
             target = f"{layout.enclave_directory(name)}/{layout.ENCLAVE_CRL}"
             if safe_files.link_target(opened.root, target) != layout.crl_link(name):
                 batch.link(target, Link(layout.crl_link(name), layout.CRL))
+
+
+def revoke_replaced(opened: Store, names: Iterable[str], access: CaAccess, now: datetime) -> int:
+    """Revoke what these enclaves had before, not what they have now; how many certificates that adds."""
+    view = KeystoreView(opened.root)
+    present = {_serial(view, name) for name in view.enclaves()}
+    known = revoked_serials(view)
+    added = serials_of(view, names) - present - known.keys()
+    if added:
+        publish_crl(opened, {**known, **dict.fromkeys(added, now)}, access, now)
+        link_crl(opened, view.enclaves())
+    return len(added)
+
+
+def _serial(view: KeystoreView, name: str) -> int | None:
+    pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(name)}/{layout.CERT}")
+    try:
+        return certificate.read_pem(pem or b"").serial
+    except DerError:
+        return None
 
 
 def renew_crl(opened: Store, access: CaAccess, now: datetime, within: timedelta) -> bool:

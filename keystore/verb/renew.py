@@ -26,6 +26,9 @@ def describe(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--within", metavar="TIME", default="30d", help="what ends sooner is renewed (30d)")
     parser.add_argument("--all", action="store_true", help="renew every enclave")
     parser.add_argument("--new-keys", action="store_true", help="new private keys too, not only certificates")
+    parser.add_argument(
+        "--revoke-old", action="store_true", help="also revoke the certificates these enclaves had before"
+    )
     parser.add_argument("--ca", choices=("start", "switch", "finish"), help="a step of replacing CAs")
     parser.add_argument("--ca-role", choices=_ROLES, default="both", help="which CA to replace (both)")
     parser.add_argument("--ca-valid-for", metavar="TIME", default="10y", help="validity of new CAs (10y)")
@@ -58,6 +61,7 @@ def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> Provisio
         within=parse_duration(arguments.within),
         everything=arguments.all,
         new_keys=arguments.new_keys,
+        revoke_old=arguments.revoke_old,
         encrypt_ca_keys=arguments.encrypt_ca_keys,
         provisioning=options,
     )

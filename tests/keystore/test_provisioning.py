@@ -374,7 +374,7 @@ def test_private_parts_that_others_can_write_are_refused_with_the_repair(tmp_pat
     root = filled(tmp_path / "ks", ["/a"])
     path = root / private
     path.chmod(stat.S_IMODE(path.stat().st_mode) | 0o020)
-    with pytest.raises(UnsafeKeystore, match="chmod (-R go-w|go-rwx)"):
+    with pytest.raises(UnsafeKeystore, match=r"chmod (-R go-w|go-rwx)"):
         provision(root, [policy("/a", "/new"), policy("/b")], options=options())
 
 

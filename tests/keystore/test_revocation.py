@@ -16,7 +16,9 @@ from keystore.errors import DamagedKeystore, InvalidInput
 from keystore.expiry import status
 from keystore.provisioning import provision
 from keystore.renewal import RenewOptions, renew
-from keystore.revocation import RemoveOptions, remove
+from keystore.revocation import RemoveOptions, remove, revoke_replaced
+from keystore.signer import CaAccess
+from keystore.store import opened
 from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot
 
@@ -71,6 +73,45 @@ def test_openssl_refuses_the_removed_one(root: Path, tmp_path: Path) -> None:
     openssl(*check, root / "enclaves/a/cert.pem")
     with pytest.raises(AssertionError, match="certificate revoked"):
         openssl(*check, tmp_path / "stolen.pem")
+
+
+def test_what_an_enclave_had_before_is_revoked_with_it(root: Path, tmp_path: Path) -> None:
+    """A copy made before a renewal is as good as the present certificate, until both are revoked."""
+    shutil.copy(root / "enclaves/c/cert.pem", tmp_path / "first.pem")
+    for _ in range(2):
+        renew(root, ["/c"], options=RenewOptions(provisioning=options()))
+    assert not (root / "public/crl.pem").exists()
+    assert remove(root, ["/c"], options=quick()).revoked == 3
+    assert crl(root).get_revoked_certificate_by_serial_number(read_pem((tmp_path / "first.pem").read_bytes()).serial)
+    assert codes(root) == set()
+
+
+def test_a_key_that_was_copied_is_replaced_and_its_certificate_revoked(root: Path) -> None:
+    stolen = read_pem((root / "enclaves/c/cert.pem").read_bytes()).serial
+    for _ in range(2):
+        renew(root, ["/c"], options=RenewOptions(new_keys=True, revoke_old=True, provisioning=options()))
+    revoked = {entry.serial_number for entry in crl(root)}
+    assert stolen in revoked and len(revoked) == 2
+    assert read_pem((root / "enclaves/c/cert.pem").read_bytes()).serial not in revoked
+    assert codes(root) == set()
+
+
+def test_an_interrupted_replacement_does_not_revoke_what_is_in_use(root: Path) -> None:
+    """The record comes before the certificate: it may name one that was not replaced after all."""
+    before = (root / "enclaves/c/cert.pem").read_bytes()
+    renew(root, ["/c"], options=RenewOptions(provisioning=options()))
+    (root / "enclaves/c/cert.pem").write_bytes(before)
+    with opened(root, durable=False) as store:
+        assert revoke_replaced(store, ["/c"], CaAccess(), NOW) == 0
+
+
+def test_the_number_of_a_crl_only_grows(root: Path) -> None:
+    """Though the clock was set back."""
+    numbers = []
+    for name, moment in (("/c", NOW), ("/a/b", NOW - DAY), ("/a", NOW - DAY)):
+        remove(root, [name], options=quick(now=moment))
+        numbers.append(crl(root).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number)
+    assert numbers == sorted(set(numbers))
 
 
 def test_revocations_add_up(root: Path) -> None:
