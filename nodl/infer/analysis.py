@@ -132,12 +132,18 @@ def _creating_lines(module: SourceModule) -> list[int]:
 def settle(run: Run) -> None:
     """Call all callbacks until neither state nor findings change."""
     run.repeated += 1
+    in_vain: dict[tuple[object, int | None], tuple[int, int]] = {}  # the version that a callback left as it was
     for turn in range(MAX_ROUNDS):
-        stamp, known = run.state.stamp, len(run.callbacks)
-        for callback, arity in list(run.callbacks.items()):
+        before = run.state.version(), dict(run.callbacks)
+        for callback, arity in before[1].items():
+            version = run.state.version()
+            if in_vain.get((callback, arity)) == version:
+                continue
             run.state.forget()
             run.state.repeatedly(_called_back(run, callback, arity), turn >= WIDEN_TEXTS_FROM)
-        if run.state.stamp == stamp and len(run.callbacks) == known:
+            if run.state.version() == version:
+                in_vain[callback, arity] = version
+        if before == (run.state.version(), run.callbacks):
             break
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")

@@ -33,6 +33,7 @@ class State:
         self._trail: list[tuple[Cells, object, Value | None]] = []
         self._stamps = itertools.count(1)
         self.stamp = 0
+        self.learned = 0  # facts about objects that no branch takes back: opened to foreign code, one for many
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
 
@@ -55,6 +56,10 @@ class State:
     def forget(self) -> None:
         """Drop the trail; only between top-level steps, when nobody holds a mark."""
         self._trail.clear()
+
+    def version(self) -> tuple[int, int]:
+        """Equal versions, equal state."""
+        return self.stamp, self.learned
 
     def mark(self) -> int:
         return len(self._trail)

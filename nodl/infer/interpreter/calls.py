@@ -72,12 +72,12 @@ def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call
     """A call that leaves the state as it found it gives the same again while the state is the same."""
     key = (function, tuple(cells.values()), id(call.node) if run.context else 0)
     known = run.memo.get(key)
-    stamp = run.state.stamp
-    if known is not None and known[0] == stamp:
+    version = run.state.version()
+    if known is not None and known[0] == version:
         return known[1]
     result = _run_body(run, function, cells, call)
-    if run.state.stamp == stamp:
-        run.memo[key] = (stamp, result)
+    if run.state.version() == version:
+        run.memo[key] = (version, result)
     return result
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable
 
 from nodl.infer.interpreter.assign import assign
@@ -31,7 +32,7 @@ def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
     items = elements(run, run.evaluate(node.iter, frame), node, frame)
     before = frame.unsettled
     frame.unsettled = False
-    if items.exact is not None and len(items.exact) * run.unrolled <= _limit(run, items.exact):
+    if items.exact is not None and len(items.exact) * run.unrolled <= _limit(run, items.exact, node):
         run.unrolled *= len(items.exact) or 1
         passes = _unrolled(run, node, items.exact, frame)
         run.unrolled //= len(items.exact) or 1
@@ -46,9 +47,24 @@ def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
     return passes
 
 
-def _limit(run: Run, exact: tuple[Value, ...]) -> int:
-    numbers = run.repeated and all(len(element) == 1 and type(element[0]) is int for element in exact)
-    return MAX_UNROLLED_NUMBERS if numbers else MAX_UNROLLED
+def _limit(run: Run, exact: tuple[Value, ...], node: ast.For | ast.AsyncFor) -> int:
+    if not (run.repeated and all(len(element) == 1 and type(element[0]) is int for element in exact)):
+        return MAX_UNROLLED
+    return MAX_UNROLLED_NUMBERS if _may_name(node) else 1
+
+
+@functools.lru_cache(maxsize=4096)
+def _may_name(node: ast.For | ast.AsyncFor) -> bool:
+    """Whether the loop's number can become part of a text: one stands in the body, or the number is passed on."""
+    numbers = {name.id for name in ast.walk(node.target) if isinstance(name, ast.Name)}
+    for part in (inner for statement in node.body for inner in ast.walk(statement)):
+        if isinstance(part, ast.JoinedStr) or (isinstance(part, ast.Constant) and isinstance(part.value, str)):
+            return True
+        if isinstance(part, ast.Call):
+            given = (*part.args, *(keyword.value for keyword in part.keywords))
+            if any(isinstance(argument, ast.Name) and argument.id in numbers for argument in given):
+                return True
+    return False
 
 
 def _turn(run: Run, target: ast.expr, element: Value, body: list[ast.stmt], frame: Frame) -> bool:

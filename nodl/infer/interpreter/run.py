@@ -160,7 +160,7 @@ class Run:
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.summaries: dict[ast.AST, Any] = {}
         self.options = OptionDefaults()
-        self.memo: dict[tuple[object, ...], tuple[int, Value]] = {}
+        self.memo: dict[tuple[object, ...], tuple[tuple[int, int], Value]] = {}
         self.unstable = False  # a recursion learned something new since its outermost call asked
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
@@ -306,8 +306,9 @@ class Run:
         found = self._allocated.get(key)
         if found is None:
             found = self._allocated[key] = make()
-        else:
+        elif not found.summary:
             found.summary = True
+            self.state.learned += 1
         return found
 
     def tuple_of(self, parts: tuple[Value, ...]) -> Value:
@@ -354,7 +355,9 @@ class Run:
                 self.register_callback((atom,), None)
 
     def _escape_container(self, obj: Sequence | Dictionary, opened: bool, depth: int) -> None:
-        obj.escaped = obj.escaped or opened
+        if opened and not obj.escaped:
+            obj.escaped = True
+            self.state.learned += 1
         if depth < 3 and len(obj.cells) < 64:
             for value in list(obj.cells.values()):
                 for atom in value:

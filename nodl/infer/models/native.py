@@ -230,7 +230,9 @@ def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
     copied = run.allocate(call.node, "dict", Dictionary)
     for cell, value in list(owner.cells.items()):
         run.state.store(copied, cell, value)
-    copied.escaped = copied.escaped or owner.escaped
+    if owner.escaped and not copied.escaped:
+        copied.escaped = True
+        run.state.learned += 1
     return (copied,)
 
 
