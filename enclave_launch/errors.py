@@ -41,7 +41,8 @@ class LaunchFileError(EnclaveLaunchError):
         if self.location is None:
             return self.message
         element = f" <{self.location.element}>" if self.location.element else ""
-        chain = "".join(f"\n  included from {place}" for place in reversed(self.location.includes))
+        steps = [place for place in self.location.includes if place != str(self.location)]
+        chain = "".join(f"\n  included from {place}" for place in reversed(steps))
         return f"{self.location}:{element} {self.message}{chain}"
 
 

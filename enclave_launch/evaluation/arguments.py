@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_description import LaunchDescription
 
 MISSING_ARGUMENT = "Included launch description missing required argument"
+REQUIRED_ARGUMENT = "Required launch argument"
+"""How upstream's two texts about an argument that nobody gave begin."""
 
 
 @dataclass(slots=True)

@@ -16,7 +16,7 @@ from enclave_launch.description.launch.conditions.invalid_condition_expression_e
     InvalidConditionExpressionError,
 )
 from enclave_launch.errors import EnclaveLaunchError
-from enclave_launch.evaluation.arguments import MISSING_ARGUMENT
+from enclave_launch.evaluation.arguments import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.evaluation.host import MISSING_PREFIX
 from nodl.ament_index import PackageNotFoundError
 
@@ -79,7 +79,7 @@ def _next_step(error: BaseException, text: str) -> str:
             "\nsource its workspace (AMENT_PREFIX_PATH) or name the install prefix with --prefix; "
             "--allow-missing-packages goes on without it, for looking only"
         )
-    if text.startswith(MISSING_ARGUMENT):
+    if text.startswith((MISSING_ARGUMENT, REQUIRED_ARGUMENT)):
         return "\ngive it as NAME:=VALUE after the launch file (--show-args lists all), or in the include"
     if isinstance(error, OSError) and f"'{MISSING_PREFIX}/" in text:
         return "\nthat file is part of a package that is not installed here; this launch file reads it itself"

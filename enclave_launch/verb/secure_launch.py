@@ -98,8 +98,18 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
 
 
 def _launch_prefix(options: argparse.Namespace) -> Mapping[str, str]:
+    _check_pattern(options.launch_prefix_filter)
     given = {"launch-prefix": options.launch_prefix, "launch-prefix-filter": options.launch_prefix_filter}
     return {name: value for name, value in given.items() if value is not None}
+
+
+def _check_pattern(pattern: str | None) -> None:
+    import re
+
+    try:
+        re.compile(pattern or "")
+    except re.error as error:
+        raise UsageError(f"--launch-prefix-filter {pattern!r} is no regular expression: {error}") from error
 
 
 def _show_file(target: Target, options: argparse.Namespace) -> int:

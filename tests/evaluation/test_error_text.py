@@ -71,6 +71,13 @@ def test_a_missing_argument_says_how_to_give_it(tmp_path: Path) -> None:
     assert "NAME:=VALUE" in text
 
 
+def test_an_error_in_an_argument_of_an_include_stands_at_the_include(tmp_path: Path) -> None:
+    (tmp_path / "b.launch.xml").write_text("<launch/>")
+    content = '<include file="$(dirname)/b.launch.xml"><arg name="x" value="$(var unset)"/></include>'
+    text = message(tmp_path, "a.launch.xml", XML.format(content))
+    assert text == "a.launch.xml:2: <include> launch configuration 'unset' does not exist"
+
+
 def test_a_package_that_is_not_installed_says_what_to_do(tmp_path: Path) -> None:
     text = message(tmp_path, "a.launch.xml", XML.format('<node pkg="nowhere" exec="e"/>'))
     assert "2: <node> package 'nowhere' not found" in text

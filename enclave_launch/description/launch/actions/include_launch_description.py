@@ -109,6 +109,8 @@ class IncludeLaunchDescription(Action):
 
         check_required_arguments(description, self.__argument_names(context))
         arguments = [SetLaunchConfiguration(name, value) for name, value in self.__launch_arguments]
+        for argument in arguments:  # an error in one stands where the include stands
+            argument.source_location = self.source_location
         if context.host.release.has(Feature.SCOPED_FILE_LOCALS) and None not in before.values():
             from enclave_launch.description.launch.actions.opaque_function import OpaqueFunction
 
