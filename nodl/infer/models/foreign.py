@@ -10,6 +10,7 @@ import sys
 
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import builtin, native, ros, stdlib
+from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
 from nodl.infer.values import (
     ANY,
@@ -50,7 +51,9 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
 
 
 def is_node_class(path: str) -> bool:
-    return path.startswith("rclpy.") and path.endswith(("Node", ".LifecycleNode"))
+    if path.startswith("rclpy."):
+        return path.endswith(("Node", ".LifecycleNode"))
+    return library_node(path) is not None
 
 
 def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:

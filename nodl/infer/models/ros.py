@@ -9,6 +9,7 @@ from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import as_texts, text_value
 from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import (
     ENDPOINT_CALLS,
     HELPERS,
@@ -60,9 +61,12 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
     record = record_of_instance(run, instance, call)
     record.created = True
     record.source = call.source
-    name = call.args.at(0, "node_name")
-    record.names = join(record.names, name if name is not None else unknown("a node without a name"))
-    namespace = call.args.at(-1, "namespace")
+    library = library_node(path)
+    default: Value = (library.name,) if library else unknown("a node without a name")
+    record.names = join(record.names, call.args.at(0, "node_name") or default)
+    namespace = call.args.at(1 if library else -1, "namespace")
+    for fixed in library.endpoints if library else ():
+        record.add_endpoint(FoundEndpoint(fixed.kind, fixed.name, fixed.type, call.source))
     record.namespaces = join(record.namespaces, namespace or NONE)
     record.lifecycle = record.lifecycle or is_lifecycle(path)
     local = call.args.at(-1, "cli_args")
@@ -307,6 +311,25 @@ def _assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) 
                 run.findings.gap(call.source, f"parameters set in code are not known: {atom.why}")
 
 
+def _wait_until_active(run: Run, record: NodeRecord, call: Call) -> Value:
+    """``BasicNavigator.waitUntilNav2Active(navigator, localizer)`` asks both for their lifecycle state."""
+    for index, (keyword, default) in enumerate((("navigator", "bt_navigator"), ("localizer", "amcl"))):
+        for name in as_texts(call.args.at(index, keyword) or (default,)):
+            service = concatenate(name, "/get_state")
+            record.add_endpoint(
+                FoundEndpoint(EndpointKind.SERVICE_CLIENT, service, "lifecycle_msgs/srv/GetState", call.source)
+            )
+    return NONE
+
+
+def _manage_lifecycle(run: Run, record: NodeRecord, call: Call) -> Value:
+    """``BasicNavigator`` calls every lifecycle manager that it finds while it runs."""
+    name = unknown("the services of lifecycle managers that are found at run time")[0]
+    service_type = "nav2_msgs/srv/ManageLifecycleNodes"
+    record.add_endpoint(FoundEndpoint(EndpointKind.SERVICE_CLIENT, name, service_type, call.source))
+    return NONE
+
+
 NODE_METHODS: dict[str, NodeMethod] = {
     **{name: _endpoint_method(name) for name in NODE_ENDPOINTS},
     **{name: _callback_method(name) for name in NODE_CALLBACKS},
@@ -315,6 +338,9 @@ NODE_METHODS: dict[str, NodeMethod] = {
     "get_parameter": _get_parameter,
     "get_parameters": _get_parameters,
     "get_parameter_or": _get_parameter_or,
+    "waitUntilNav2Active": _wait_until_active,
+    "lifecycleStartup": _manage_lifecycle,
+    "lifecycleShutdown": _manage_lifecycle,
     "set_parameters": _set_parameters,
     "set_parameters_atomically": _set_parameters,
     "get_name": _own_name("name"),
@@ -411,6 +437,7 @@ _FUNCTIONS: dict[tuple[str, str], Callable[[Run, str, Call], Value]] = {
     ("rclpy", "create_node"): _node_class,
     ("rclpy", "Node"): _node_class,
     ("rclpy", "LifecycleNode"): _node_class,
+    ("nav2_simple_commander", "BasicNavigator"): lambda run, path, call: create_node(run, path, call),
     ("rclpy", "init"): _init,
     ("rclpy", "Parameter"): _parameter,
     ("rclpy", "AsyncParameterClient"): _parameter_client,

@@ -232,3 +232,35 @@ def test_code_made_at_run_time_is_a_gap(infer: Infer) -> None:
 def test_a_file_that_does_not_parse_is_a_gap(infer: Infer) -> None:
     system = infer("print 'python 2'\n")
     assert [gap.source.line for gap in system.gaps] == [1]
+
+
+NAVIGATOR = """
+from nav2_simple_commander.robot_navigator import BasicNavigator
+{definition}
+navigator = {call}
+navigator.waitUntilNav2Active(localizer="slam")
+"""
+
+
+@pytest.mark.parametrize(
+    ("definition", "call", "node"),
+    [
+        ("", "BasicNavigator()", "basic_navigator"),
+        ("", "BasicNavigator('mine', namespace='robot1')", "mine"),
+        ("class Mine(BasicNavigator):\n    def __init__(self):\n        super().__init__('sub')", "Mine()", "sub"),
+        ("class Mine(BasicNavigator):\n    pass", "Mine()", "basic_navigator"),
+    ],
+)
+def test_a_node_that_a_library_brings_along(
+    definition: str, call: str, node: str, infer: Callable[..., InferredSystem]
+) -> None:
+    (found,) = infer(NAVIGATOR.format(definition=definition, call=call)).nodes
+    names = {str(endpoint.name) for endpoint in found.endpoints}
+    assert found.name == node
+    assert {"navigate_to_pose", "amcl_pose", "bt_navigator/get_state", "slam/get_state"} <= names
+    assert found.namespace == ("/robot1" if "namespace" in call else "/")
+
+
+def test_lifecycle_managers_found_at_run_time_are_unknown(names: Callable[..., list[str]]) -> None:
+    text = "from nav2_simple_commander.robot_navigator import BasicNavigator\nBasicNavigator().lifecycleStartup()\n"
+    assert "?" in names(text)

@@ -1,0 +1,72 @@
+"""Nodes that a library brings along: their classes create interfaces of their own, which their users never name.
+
+Source: nav2_simple_commander/robot_navigator.py (humble to rolling; the union, since older releases have fewer).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nodl.infer.models.signatures import ACTION_CLIENT, CLIENT, PUBLISHER, SUBSCRIPTION, FixedEndpoint
+
+
+@dataclass(frozen=True, slots=True)
+class LibraryNode:
+    """A node class of a library. ``name``: what the node is called unless its user says otherwise."""
+
+    name: str
+    endpoints: tuple[FixedEndpoint, ...]
+
+
+_ACTIONS = {
+    "navigate_through_poses": "NavigateThroughPoses",
+    "navigate_to_pose": "NavigateToPose",
+    "follow_waypoints": "FollowWaypoints",
+    "follow_gps_waypoints": "FollowGPSWaypoints",
+    "follow_path": "FollowPath",
+    "compute_path_to_pose": "ComputePathToPose",
+    "compute_path_through_poses": "ComputePathThroughPoses",
+    "smooth_path": "SmoothPath",
+    "compute_route": "ComputeRoute",
+    "compute_and_track_route": "ComputeAndTrackRoute",
+    "spin": "Spin",
+    "backup": "BackUp",
+    "drive_on_heading": "DriveOnHeading",
+    "assisted_teleop": "AssistedTeleop",
+    "dock_robot": "DockRobot",
+    "undock_robot": "UndockRobot",
+    "follow_object": "FollowObject",
+}
+_SERVICES = {
+    "map_server/load_map": "LoadMap",
+    "global_costmap/clear_entirely_global_costmap": "ClearEntireCostmap",
+    "local_costmap/clear_entirely_local_costmap": "ClearEntireCostmap",
+    "local_costmap/clear_costmap_except_region": "ClearCostmapExceptRegion",
+    "local_costmap/clear_costmap_around_robot": "ClearCostmapAroundRobot",
+    "local_costmap/clear_costmap_around_pose": "ClearCostmapAroundPose",
+    "global_costmap/clear_costmap_around_pose": "ClearCostmapAroundPose",
+    "global_costmap/get_costmap": "GetCostmap",
+    "local_costmap/get_costmap": "GetCostmap",
+    "collision_monitor/toggle": "Toggle",
+}
+# Absolute in some releases, relative in others.
+_ABSOLUTE_ONCE = tuple(name for name in _SERVICES if name.startswith(("map_server", "global_", "local_")))
+_POSE = "geometry_msgs/msg/PoseWithCovarianceStamped"
+
+_NAVIGATOR = LibraryNode(
+    "basic_navigator",
+    (
+        *(FixedEndpoint(ACTION_CLIENT, name, f"nav2_msgs/action/{kind}") for name, kind in _ACTIONS.items()),
+        *(FixedEndpoint(CLIENT, name, f"nav2_msgs/srv/{kind}") for name, kind in _SERVICES.items()),
+        *(FixedEndpoint(CLIENT, f"/{name}", f"nav2_msgs/srv/{_SERVICES[name]}") for name in _ABSOLUTE_ONCE),
+        FixedEndpoint(SUBSCRIPTION, "amcl_pose", _POSE),
+        FixedEndpoint(PUBLISHER, "initialpose", _POSE),
+    ),
+)
+
+LIBRARY_NODES: dict[tuple[str, str], LibraryNode] = {("nav2_simple_commander", "BasicNavigator"): _NAVIGATOR}
+
+
+def library_node(path: str) -> LibraryNode | None:
+    """The node class at ``path``, by its top package and last name."""
+    return LIBRARY_NODES.get((path.partition(".")[0], path.rpartition(".")[2]))
