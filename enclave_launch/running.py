@@ -14,10 +14,10 @@ from enclave_launch.plan import LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
 from enclave_launch.runtime.service import RunOptions, run_launch, run_launch_async
-from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 
 if TYPE_CHECKING:
     from enclave_launch.flow import RunSettings
+    from enclave_launch.secured import ProvisionedLaunch
 
 
 def run_plan(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> int:
@@ -40,13 +40,15 @@ async def run_plan_async(launch: LaunchPlan | ProvisionedLaunch, settings: RunSe
 
 
 def _plan(launch: LaunchPlan | ProvisionedLaunch) -> LaunchPlan:
-    return launch.plan if isinstance(launch, ProvisionedLaunch) else launch
+    return launch if isinstance(launch, LaunchPlan) else launch.plan
 
 
 def _gate(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> EnclaveGate | None:
     """What stands before each process; ``None`` for a launch that was asked to run unsecured."""
     if isinstance(launch, LaunchPlan):
         return None
+    from enclave_launch.secured import PlanProvider  # brings the keystore: not for a launch without it
+
     evaluation = launch.plan.evaluation
     return PlannedGate(
         evaluation.processes,
@@ -62,7 +64,7 @@ def _options(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> R
     return RunOptions(
         noninteractive=settings.noninteractive,
         debug=settings.debug,
-        secrets=settings.secrets,
+        secrets=settings.secrets | (frozenset() if isinstance(launch, LaunchPlan) else launch.secret_variables),
         needs_ros_services=plan.launcher is not None,
         launch_configurations=plan.planner.source.launch_configurations,
         host_options=dict(plan.planner.source.host_options),

@@ -37,6 +37,12 @@ class ProvisionedLaunch:
     report: ProvisionReport
     options: ProvisionOptions
 
+    @property
+    def secret_variables(self) -> frozenset[str]:
+        """Environment variables with secrets of the CA: no process may see them."""
+        given = (self.options.access.passphrase, self.options.access.pin)
+        return frozenset(secret.variable for secret in given if secret is not None and secret.variable)
+
 
 def provision_policies(
     settings: SecuritySettings, policies: Iterable[EnclavePolicy], options: ProvisionOptions

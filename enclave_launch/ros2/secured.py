@@ -11,7 +11,7 @@ Every node gets its enclave and least permissions when its turn comes; what cann
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from launch import LaunchDescription
@@ -63,8 +63,17 @@ def enclosed(
     ]
     # rcl lets this variable of the user's shell win over --enclave.
     actions.append(UnsetEnvironmentVariable(OVERRIDE))
+    actions.extend(UnsetEnvironmentVariable(name) for name in _read_secrets(launch))
     actions.append(OpaqueFunction(function=session.install))
     return LaunchDescription([*actions, *description.entities])
+
+
+def _read_secrets(launch: ProvisionedLaunch) -> Iterable[str]:
+    """Variables that the processes must not inherit from us; read now, for what --allow-late signs later."""
+    for secret in (launch.options.access.passphrase, launch.options.access.pin):
+        if secret is not None and secret.variable and secret.variable in os.environ:
+            secret.value()
+            yield secret.variable
 
 
 def security_variables(settings: SecuritySettings) -> Mapping[str, str]:

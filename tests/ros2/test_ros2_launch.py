@@ -25,7 +25,7 @@ count=0
 for file in cert.pem key.pem governance.p7s permissions.p7s identity_ca.cert.pem permissions_ca.cert.pem; do
     [ -f "$ROS_SECURITY_KEYSTORE/enclaves$enclave/$file" ] && count=$((count + 1))
 done
-echo "enclave=$enclave files=$count enable=$ROS_SECURITY_ENABLE strategy=$ROS_SECURITY_STRATEGY"
+echo "enclave=$enclave files=$count enable=$ROS_SECURITY_ENABLE strategy=$ROS_SECURITY_STRATEGY secret=<$CA_WORD>"
 """
 
 MANIFEST = """<interface version="1">
@@ -117,6 +117,17 @@ def test_without_secure_nothing_changes_and_the_attribute_is_accepted(demo: Work
     assert status == 0, screen
     assert screen.count("enclave=none files=0 enable= strategy=") == 4
     assert not (demo.directory / "ks").exists()
+
+
+@pytest.mark.parametrize("secured", [True, False])
+def test_no_process_sees_the_passphrase_of_the_ca(
+    secured: bool, demo: Workspace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CA_WORD", "open sesame")
+    options = ["--secure", "--keystore", str(demo.directory / "ks"), "--ca-passphrase-env", "CA_WORD"]
+    status, screen = launch(demo, *(options if secured else []), "demo", "demo.launch.xml")
+    assert status == 0, screen
+    assert screen.count("secret=<>" if secured else "secret=<open sesame>") == 4
 
 
 def test_a_keystore_is_needed(demo: Workspace) -> None:

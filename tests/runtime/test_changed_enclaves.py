@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import asyncio
+import contextlib
+import io
 import os
 import shutil
 import subprocess
@@ -13,10 +16,20 @@ from typing import Any
 
 import pytest
 
-from enclave_launch import LaunchPlan, ProvisionedLaunch, ProvisionError, ResolveOptions, provision, resolve
+from enclave_launch import (
+    LaunchPlan,
+    ProvisionedLaunch,
+    ProvisionError,
+    ResolveOptions,
+    SecurityOptions,
+    provision,
+    resolve,
+    run_async,
+)
 from enclave_launch.process import RemapRule, ResolvedProcess
 from enclave_launch.secured import PlanProvider
-from keystore.provisioning import what_is_wrong
+from keystore.provisioning import ProvisionOptions, what_is_wrong
+from keystore.signer import CaAccess, Secret
 
 DEMO = Path(__file__).parents[2] / "fixtures/demo_ws"
 TALKER = '<node pkg="demo_nodes" exec="talker" name="talker"/>'
@@ -177,3 +190,17 @@ def test_the_cheap_look_is_repeated_only_for_files_that_were_touched(
     (keystore / "enclaves/key.pem").touch()
     respawn(provider)
     assert len(looks) == 2
+
+
+def test_no_process_sees_the_passphrase_that_the_keystore_was_opened_with(
+    tmp_path: Path, keystore: Path, monkeypatch: pytest.MonkeyPatch, ros_log_dir: Path
+) -> None:
+    monkeypatch.setenv("CA_WORD", "open sesame")
+    access = CaAccess(passphrase=Secret(variable="CA_WORD"))
+    plan = plan_of(tmp_path, '<executable cmd="env" enclave="/tool" output="screen"/>')
+    launch = provision(plan, keystore, options=SecurityOptions(keystore=ProvisionOptions(access=access)))
+    seen = io.StringIO()
+    with contextlib.redirect_stdout(seen):
+        assert asyncio.run(run_async(launch)) == 0
+    assert "ROS_SECURITY_ENCLAVE_OVERRIDE=/tool" in seen.getvalue()
+    assert "sesame" not in seen.getvalue() and os.environ["CA_WORD"] == "open sesame"
