@@ -35,12 +35,17 @@ def rclpy_available() -> bool:
     return importlib.util.find_spec("rclpy") is not None
 
 
+def require_rclpy() -> None:
+    """Raises ``RuntimeFailure`` that says what else works."""
+    if not rclpy_available():
+        raise RuntimeFailure(f"cannot run this launch file: {ALTERNATIVE}")
+
+
 class RosServices:
     """:raises RuntimeFailure: no rclpy; said before anything starts."""
 
     def __init__(self, grant: Grant | None, say: Callable[[Level, str], None]) -> None:
-        if not rclpy_available():
-            raise RuntimeFailure(f"cannot run this launch file: {ALTERNATIVE}")
+        require_rclpy()
         import rclpy
         import rclpy.executors
 

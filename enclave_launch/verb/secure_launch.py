@@ -190,9 +190,22 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None)
         return run(plan, options=settings)
     from enclave_launch.verb.security import expiry_notices, security_options
 
+    _check_before_keys_are_made(plan)
     launch = provision(plan, keystore, options=security_options(options))
     _warn((*launch.report.warnings, *expiry_notices(keystore, plan, options.warn_expiry)))
     return run(launch, options=settings)
+
+
+def _check_before_keys_are_made(plan: LaunchPlan) -> None:
+    """What ``run`` would refuse in any case, asked before the keystore is touched. Raises as ``run`` does."""
+    from enclave_launch.evaluation.programs import check_programs
+    from enclave_launch.runtime.ros_services import require_rclpy
+
+    if plan.problems:
+        return  # told first, by ``provision``
+    check_programs(plan.evaluation.processes)
+    if plan.launcher is not None:
+        require_rclpy()
 
 
 def _run_settings(options: argparse.Namespace) -> RunSettings:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 
@@ -69,3 +70,17 @@ def test_a_prefix_that_is_not_there_is_named(secure_launch: SecureLaunch) -> Non
     run = secure_launch("--dry-run", "--prefix", "/no/such/prefix", "demo_nodes", "talker_listener.launch.xml")
     assert run.returncode == 2
     assert "--prefix /no/such/prefix: no such directory" in run.stderr
+
+
+@pytest.mark.parametrize("content", ["container.launch.xml", "a program that is not there"])
+def test_no_keys_are_made_for_a_launch_that_cannot_run(
+    content: str, secure_launch: SecureLaunch, write: Write, tmp_path: Path
+) -> None:
+    """Loading components needs rclpy; these tests run without ROS."""
+    if importlib.util.find_spec("rclpy") is not None:
+        pytest.skip("ROS is sourced")
+    target = ["demo_nodes", content] if content.endswith(".xml") else [write('<executable cmd="no-such-program"/>')]
+    run = secure_launch("--secure", "--keystore", tmp_path / "ks", *target)
+    assert run.returncode == 1
+    assert "rclpy is not importable here" in run.stderr or "no-such-program" in run.stderr
+    assert not (tmp_path / "ks").exists()
