@@ -259,6 +259,13 @@ def _unforeseen(actions: Iterable[Unforeseeable]) -> list[str]:
     return [f"{action.location}: not foreseeable: {action.what}" for action in actions]
 
 
+def _alike(container: str, processes: Iterable[PlannedProcess]) -> str:
+    """A target is taken as it is written, without pushed namespaces (launch_ros load_composable_nodes.py)."""
+    last = "/" + container.rpartition("/")[2]
+    names = dict.fromkeys(node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last))
+    return f" (this launch file starts {' '.join(names)}: a target needs its full name)" if names else ""
+
+
 def _notes(
     processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent], launcher: RunningNode | None
 ) -> list[str]:
@@ -270,7 +277,7 @@ def _notes(
     ]
     notes += [
         f"{item.component.location}: container {item.component.container!r} of component {item.fqn} is not started by "
-        "this launch file; its permissions are not part of this plan"
+        f"this launch file; its permissions are not part of this plan{_alike(item.component.container, processes)}"
         for item in components
         if item.container is None
     ]

@@ -66,6 +66,17 @@ def test_an_attribute_that_its_own_arguments_overrule_is_told(secure_launch: Sec
     assert "enclave /mine" in tree and "enclave attribute 'other' is not used" in tree
 
 
+def test_a_target_that_forgets_the_pushed_namespace_is_told(secure_launch: SecureLaunch, write: Write) -> None:
+    file = write(
+        '<push_ros_namespace namespace="robot"/>'
+        '<node_container pkg="demo_nodes" exec="component_container" name="box" namespace=""/>'
+        '<load_composable_node target="box">'
+        '<composable_node pkg="demo_nodes" plugin="demo_nodes::Talker" name="talker"/></load_composable_node>'
+    )
+    tree = secure_launch("--dry-run", file).stdout
+    assert "container 'box'" in tree and "this launch file starts /robot/box: a target needs its full name" in tree
+
+
 def test_a_prefix_that_is_not_there_is_named(secure_launch: SecureLaunch) -> None:
     run = secure_launch("--dry-run", "--prefix", "/no/such/prefix", "demo_nodes", "talker_listener.launch.xml")
     assert run.returncode == 2
