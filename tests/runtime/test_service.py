@@ -6,11 +6,14 @@ Each case is a program of its own with a launch description, as users write them
 from __future__ import annotations
 
 import os
+import pty
 import re
+import select
 import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
@@ -230,6 +233,93 @@ def test_ctrl_c_twice_reaches_the_children_twice(tmp_path: Path) -> None:
     launch.process.send_signal(signal.SIGINT)
     assert launch.wait(4) == 0  # before the five seconds to SIGTERM
     assert "(SIGINT) again" in launch.screen
+
+
+COUNTING = (
+    "import signal, time\\n"
+    "count = 0\\n"
+    "def interrupted(*_):\\n"
+    "    global count; count += 1\\n"
+    "    print('interrupted', count, flush=True)\\n"
+    "signal.signal(signal.SIGINT, interrupted)\\n"
+    "print('up', flush=True)\\n"
+    "while not count: time.sleep(0.02)\\n"
+    "time.sleep(0.5)\\n"
+)
+
+
+def test_ctrl_c_in_a_terminal_reaches_each_child_once(tmp_path: Path) -> None:
+    """A terminal signals its whole foreground process group; children must not get that and ours as well."""
+    file = tmp_path / "test.launch.py"
+    file.write_text(
+        f'{PRELUDE}\ndef generate_launch_description():\n    return LaunchDescription([py("{COUNTING}")])\n'
+    )
+    program = PROGRAM.format(noninteractive=False, debug=False)
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.environ["ROS_LOG_DIR"] = str(tmp_path / "log")
+        os.execv(sys.executable, [sys.executable, "-c", program, str(file)])
+    try:
+        seen = read_until(terminal, b"[a-1] up")
+        os.write(terminal, b"\x03")
+        seen += read_until(terminal, None)
+    finally:
+        os.close(terminal)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0, seen
+    assert b"[a-1] interrupted 1" in seen
+    assert b"interrupted 2" not in seen
+    assert b"process has finished cleanly" in seen
+
+
+def read_until(terminal: int, text: bytes | None) -> bytes:
+    """What a program shows in its terminal, up to ``text`` or to its end."""
+    seen = b""
+    deadline = time.monotonic() + 20
+    while text is None or text not in seen:
+        assert select.select([terminal], [], [], max(0, deadline - time.monotonic()))[0], seen
+        try:
+            data = os.read(terminal, 1 << 16)
+        except OSError:  # nobody has it open any more
+            data = b""
+        if not data:
+            assert text is None, seen
+            break
+        seen += data
+    return seen
+
+
+def test_events_of_all_kinds_in_a_live_run(tmp_path: Path) -> None:
+    prelude = """
+        import asyncio
+        from launch import Event, LaunchDescription
+        class Mine(Event):
+            name = "mine"
+        async def later(context):
+            await asyncio.sleep(0.1)
+            context.emit_event_sync(Mine())
+        first = sh("echo one; sleep 0.3; printf two; exit 3")
+    """
+    actions = """
+        RegisterEventHandler(EventHandler(
+            matcher=lambda event: isinstance(event, Mine), entities=[LogInfo(msg="custom event")])),
+        RegisterEventHandler(OnProcessStart(target_action=first, on_start=[sh("echo from a handler", name="b")])),
+        RegisterEventHandler(OnProcessIO(
+            target_action=first, on_stdout=lambda event: LogInfo(msg=f"output {event.text}"))),
+        RegisterEventHandler(OnProcessExit(
+            target_action=first, on_exit=lambda event, context: LogInfo(msg=f"exit {event.returncode}"))),
+        RegisterEventHandler(OnExecutionComplete(target_action=first, on_completion=[LogInfo(msg="complete")])),
+        RegisterEventHandler(OnShutdown(on_shutdown=lambda event, context: LogInfo(msg=f"end: {event.reason}"))),
+        first,
+        OpaqueCoroutine(coroutine=later),
+        TimerAction(period=0.8, actions=[Shutdown(reason="enough")]),
+        TimerAction(period=60.0, actions=[LogInfo(msg="never")]),
+    """
+    status, lines = finished(tmp_path, f"*({actions})", prelude=prelude)
+    told = [line.removeprefix("[INFO] [launch.user]: ") for line in lines if "[launch.user]" in line]
+    assert sorted(told[:2]) == ["custom event", "output b'one\\n'"]
+    assert told[2:] == ["output b'two'", "exit 3", "complete", "end: enough"]
+    assert "[b-2] from a handler" in lines and "[a-1] two" in lines
+    assert status == 1
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT])
