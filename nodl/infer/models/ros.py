@@ -18,6 +18,7 @@ from nodl.infer.models.signatures import (
     PARAMETER_SERVICES,
     Argument,
     EndpointCall,
+    FixedEndpoint,
     Helper,
 )
 from nodl.infer.text import Input, NodePart, Text, concatenate, make_text
@@ -180,7 +181,15 @@ def _helper(run: Run, helper: Helper, call: Call) -> None:
                 switch = argument(call, fixed.unless)
                 if switch is not None and truth(switch) is True:
                     continue
-            record.add_endpoint(FoundEndpoint(fixed.kind, fixed.name, fixed.type, call.source))
+            for name in _fixed_names(fixed, call):
+                record.add_endpoint(FoundEndpoint(fixed.kind, name, fixed.type, call.source))
+
+
+def _fixed_names(fixed: FixedEndpoint, call: Call) -> Value:
+    if fixed.below is None:
+        return (fixed.name,)
+    above = argument(call, fixed.below) or unknown("a namespace that is not given")
+    return text_value(concatenate(text, fixed.name) for text in as_texts(above))
 
 
 # --- methods of a node --------------------------------------------------------------------------------------

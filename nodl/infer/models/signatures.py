@@ -1,7 +1,7 @@
 """The ROS 2 Python API as tables: which call makes which endpoint, and which argument holds what.
 
-Sources: rclpy ``node.py``, ``lifecycle``, ``action``, ``parameter_client.py``; tf2_ros_py; message_filters;
-diagnostic_updater; image_transport_py (branches humble to rolling). Positions count without ``self``.
+Sources (branches humble to rolling): rclpy ``node.py``, ``lifecycle``, ``action``, ``parameter_client.py``; tf2_ros_py;
+message_filters; diagnostic_updater; interactive_markers; image_transport_py. Positions count without ``self``.
 """
 
 from __future__ import annotations
@@ -51,6 +51,7 @@ class FixedEndpoint:
     name: str
     type: str
     unless: Argument | None = None  # not made when this argument is certainly true
+    below: Argument | None = None  # what this argument gives stands before the name
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +103,7 @@ ENDPOINT_CALLS: dict[tuple[str, str], EndpointCall] = {
     ),
 }
 
+_NAMESPACE = Argument(1, "namespace")
 _TF = FixedEndpoint(SUBSCRIPTION, "/tf", "tf2_msgs/msg/TFMessage", unless=Argument(-1, "static_only"))
 _TF_STATIC = FixedEndpoint(SUBSCRIPTION, "/tf_static", "tf2_msgs/msg/TFMessage")
 
@@ -118,6 +120,18 @@ HELPERS: dict[tuple[str, str], Helper] = {
     ),
     ("diagnostic_updater", "Updater"): Helper(
         _NODE, (FixedEndpoint(PUBLISHER, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"),)
+    ),
+    ("interactive_markers", "InteractiveMarkerServer"): Helper(
+        _NODE,
+        (
+            FixedEndpoint(
+                SERVER, "/get_interactive_markers", "visualization_msgs/srv/GetInteractiveMarkers", below=_NAMESPACE
+            ),
+            FixedEndpoint(PUBLISHER, "/update", "visualization_msgs/msg/InteractiveMarkerUpdate", below=_NAMESPACE),
+            FixedEndpoint(
+                SUBSCRIPTION, "/feedback", "visualization_msgs/msg/InteractiveMarkerFeedback", below=_NAMESPACE
+            ),
+        ),
     ),
     ("rclpy", "ParameterEventHandler"): Helper(
         _NODE, (FixedEndpoint(SUBSCRIPTION, "/parameter_events", "rcl_interfaces/msg/ParameterEvent"),)

@@ -264,3 +264,9 @@ def test_a_node_that_a_library_brings_along(
 def test_lifecycle_managers_found_at_run_time_are_unknown(names: Callable[..., list[str]]) -> None:
     text = "from nav2_simple_commander.robot_navigator import BasicNavigator\nBasicNavigator().lifecycleStartup()\n"
     assert "?" in names(text)
+
+
+def test_interactive_markers_lie_below_the_namespace_of_their_server(node_body: Callable[..., list[str]]) -> None:
+    server = "interactive_markers.InteractiveMarkerServer(self, self.declare_parameter('ns', 'm').value)"
+    found = node_body(server, before="import interactive_markers")
+    assert found == ["param:ns/feedback", "param:ns/get_interactive_markers", "param:ns/update"]
