@@ -6,7 +6,6 @@ warm path of a launch, and finding out which subject an enclave already has.
 
 from __future__ import annotations
 
-import binascii
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -89,8 +88,8 @@ def pem_blocks(pem: bytes) -> list[bytes]:
         if not end:
             raise der.DerError("a PEM block without its end line")
         try:
-            found.append(binascii.a2b_base64(body))
-        except binascii.Error as error:
+            found.append(der.from_base64(body))
+        except der.DerError as error:
             raise der.DerError("a PEM block that is not base64") from error
     return found
 

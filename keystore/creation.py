@@ -236,14 +236,18 @@ def check_can_serve(certificate_der: bytes, role: Role, now: datetime, place: st
     """Raises InvalidInput when DDS implementations would refuse what this CA signs."""
     from cryptography import x509
 
-    cert = x509.load_der_x509_certificate(certificate_der)
+    try:
+        cert = x509.load_der_x509_certificate(certificate_der)
+        extensions = cert.extensions
+    except (ValueError, x509.UnsupportedGeneralNameType, x509.DuplicateExtension):
+        raise InvalidInput(f"{place} is no usable certificate") from None
     facts = authority.read_certificate(authority.pem_certificate(certificate_der), place)
     if not facts.validity.covers(now):
         raise InvalidInput(f"{place} is not valid now")
     try:
-        if not cert.extensions.get_extension_for_class(x509.BasicConstraints).value.ca:
+        if not extensions.get_extension_for_class(x509.BasicConstraints).value.ca:
             raise InvalidInput(f"{place} is not a CA certificate (basicConstraints CA:FALSE)")
-        usage = cert.extensions.get_extension_for_class(x509.KeyUsage).value
+        usage = extensions.get_extension_for_class(x509.KeyUsage).value
     except x509.ExtensionNotFound as error:
         if error.oid == x509.OID_BASIC_CONSTRAINTS:
             raise InvalidInput(f"{place} is not a CA certificate (no basicConstraints)") from None

@@ -7,6 +7,7 @@ are accepted, which is all X.509 and CMS use (ITU-T X.690 section 10).
 
 from __future__ import annotations
 
+import binascii
 from datetime import datetime, timezone
 from typing import NamedTuple
 
@@ -122,3 +123,16 @@ def utc_time(moment: datetime) -> bytes:
     if moment.year < 2050:
         return encode(UTC_TIME, moment.strftime("%y%m%d%H%M%SZ").encode())
     return encode(GENERALIZED_TIME, moment.strftime("%Y%m%d%H%M%SZ").encode())
+
+
+_BASE64 = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/=\r\n"
+
+
+def from_base64(body: bytes) -> bytes:
+    """The content of a PEM block or S/MIME part; raises DerError for what OpenSSL refuses and Python skips."""
+    try:
+        if not body.translate(None, _BASE64):
+            return binascii.a2b_base64(body)
+    except binascii.Error:
+        pass
+    raise DerError("not base64")

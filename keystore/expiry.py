@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import binascii
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -124,8 +123,8 @@ def crl_validity(view: KeystoreView) -> Validity:
     place = printable(view.root / layout.CRL)
     try:
         body = pem.split(b"-----BEGIN X509 CRL-----")[1].split(b"-----END")[0]
-        fields = der.parse(binascii.a2b_base64(body)).children()[0].children()
+        fields = der.parse(der.from_base64(body)).children()[0].children()
         times = [part for part in fields if part.tag in (der.UTC_TIME, der.GENERALIZED_TIME)]
         return Validity(der.time_value(times[0]), der.time_value(times[1]))
-    except (IndexError, binascii.Error, der.DerError):
+    except (IndexError, der.DerError):
         raise DamagedKeystore(f"{place} is no CRL with an end") from None

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime
-from html import escape
 
 from keystore.domains import Domains
 from keystore.errors import printable
@@ -194,6 +193,13 @@ def _criteria(tag: str, topics: Topics) -> str:
 
 def _utc(moment: datetime) -> str:
     return moment.strftime("%Y-%m-%dT%H:%M:%S")
+
+
+def escape(text: str) -> str:
+    """As ``html.escape``, whose module costs every launch two milliseconds."""
+    for character, entity in (("&", "&amp;"), ("<", "&lt;"), (">", "&gt;"), ('"', "&quot;"), ("'", "&#x27;")):
+        text = text.replace(character, entity)
+    return text
 
 
 def _line(text: str) -> str:

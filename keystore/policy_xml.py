@@ -57,6 +57,8 @@ def read_policy(path: str | Path) -> PolicyDocument:
     Raises ``PolicyError`` (an ``InvalidInput``) with file:line.
     """
     file = Path(path)
+    if file.is_fifo():
+        raise PolicyError(f"cannot read policy {printable(file)}: it is a pipe, not a file")
     try:
         document = file.read_bytes()
     except OSError as error:

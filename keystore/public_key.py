@@ -25,6 +25,16 @@ def _load(spki: bytes) -> PublicKeyTypes:
     return load_der_public_key(spki)
 
 
+def _loaded(spki: bytes) -> PublicKeyTypes | None:
+    """None for what is no public key, or one of a kind that nobody knows."""
+    from cryptography.exceptions import UnsupportedAlgorithm
+
+    try:
+        return _load(spki)
+    except (ValueError, UnsupportedAlgorithm):
+        return None
+
+
 def signature_is_valid(spki: bytes, signature: bytes, data: bytes, algorithm: bytes | None = None) -> bool:
     """ECDSA or RSA PKCS#1 v1.5; ``spki`` is the DER SubjectPublicKeyInfo.
 
@@ -34,7 +44,7 @@ def signature_is_valid(spki: bytes, signature: bytes, data: bytes, algorithm: by
     from cryptography.hazmat.primitives import hashes
     from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
 
-    key = _load(spki)
+    key = _loaded(spki)
     larger = {_ECDSA_SHA384: hashes.SHA384(), _RSA_SHA384: hashes.SHA384(), _RSA_SHA512: hashes.SHA512()}
     digest = larger.get(algorithm or b"", hashes.SHA256())
     try:
@@ -53,7 +63,9 @@ def key_kind(spki: bytes) -> str:
     """``P-256``, ``P-384``, ``RSA-2048`` and so on."""
     from cryptography.hazmat.primitives.asymmetric import ec, rsa
 
-    key = _load(spki)
+    key = _loaded(spki)
     if isinstance(key, ec.EllipticCurvePublicKey):
         return {"secp256r1": "P-256", "secp384r1": "P-384"}.get(key.curve.name, key.curve.name)
+    if key is None:
+        return "damaged"
     return f"RSA-{key.key_size}" if isinstance(key, rsa.RSAPublicKey) else type(key).__name__

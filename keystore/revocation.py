@@ -209,13 +209,14 @@ def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
     """Raises DamagedKeystore when it is unreadable or not signed by the identity CA."""
     from cryptography import x509
+    from cryptography.exceptions import UnsupportedAlgorithm
 
     place = printable(view.root / layout.CRL)
     try:
         crl = x509.load_pem_x509_crl(safe_files.read(view.root, layout.CRL))
         key = x509.load_der_x509_certificate(view.ca(Role.IDENTITY).der).public_key()
         valid = crl.is_signature_valid(key)  # type: ignore[arg-type]
-    except (ValueError, TypeError):
+    except (ValueError, TypeError, UnsupportedAlgorithm):
         raise DamagedKeystore(f"{place} is no readable CRL; remove it and revoke again") from None
     if not valid:
         raise DamagedKeystore(f"{place} is not signed by the identity CA; remove it and revoke again")

@@ -139,14 +139,17 @@ def read(p7s: bytes, place: str) -> SignedDocument:
     The outer header may carry any boundary (ours, ``cryptography``'s, ``openssl smime``'s).
     """
     lines = p7s.replace(b"\r\n", b"\n")
-    boundary = _boundary(lines.partition(b"\n\n")[0])
+    header = lines.partition(b"\n\n")[0]
+    boundary = _boundary(header) if b"multipart/signed" in header else b""
     parts = lines.split(b"\n--" + boundary) if boundary else []
     if len(parts) < 3 or not parts[1].startswith(b"\n"):
         raise DamagedKeystore(f"{place} is not a detached S/MIME message (multipart/signed)")
-    encoded = parts[2].partition(b"\n\n")[2]
+    head, _, encoded = parts[2].partition(b"\n\n")
+    if b"pkcs7-signature" not in head:  # where OpenSSL looks
+        raise DamagedKeystore(f"{place} carries no PKCS#7 signature")
     try:
-        pkcs7 = binascii.a2b_base64(encoded)
-    except binascii.Error:
+        pkcs7 = der.from_base64(encoded)
+    except der.DerError:
         raise DamagedKeystore(f"{place}: its signature is not base64") from None
     return SignedDocument(parts[1][1:].replace(b"\n", b"\r\n"), pkcs7)
 

@@ -74,9 +74,10 @@ def _check_certificate(view: KeystoreView, role: Role, facts: CertificateFacts, 
 
 def issued_by(facts: CertificateFacts, ca: CertificateFacts) -> bool:
     """Whether ``ca`` signed this certificate: name and signature."""
-    body, algorithm, signature = der.parse(facts.der).children()
-    if not facts.names_issuer(ca):
+    parts = der.parse(facts.der).children()
+    if len(parts) != 3 or not facts.names_issuer(ca):
         return False
+    body, algorithm, signature = parts
     # A BIT STRING starts with the count of unused bits.
     return signature_is_valid(ca.public_key, signature.content[1:], body.whole, algorithm.whole)
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import base64
 import os
+import re
 import shlex
 import shutil
 import subprocess
@@ -83,6 +85,34 @@ def junk_among_retired(root: Path) -> None:
     (root / "private/retired/x.key.pem").write_bytes(b"-----BEGIN PRIVATE KEY-----")
 
 
+CURVE = bytes.fromhex("06082a8648ce3d030107")
+"""The object identifier of P-256, as it stands in keys and certificates."""
+
+
+def der_changed(name: str, old: bytes, new: bytes) -> Plant:
+    def plant(root: Path) -> None:
+        begin, body, end = re.split(rb"\n(?=-----END)|(?<=-----)\n", (root / name).read_bytes().strip())
+        der = base64.b64decode(body)
+        assert old in der
+        (root / name).write_bytes(b"\n".join((begin, base64.b64encode(der.replace(old, new)), end, b"")))
+
+    return plant
+
+
+def private_half(root: Path) -> None:
+    """The public half beside it stays, which is all a quick look compares."""
+    der = base64.b64decode(b"".join((root / "enclaves/a/key.pem").read_bytes().splitlines()[1:-1]))
+    start = der.index(b"\x04\x20") + 2
+    der_changed("enclaves/a/key.pem", der[start : start + 32], bytes(reversed(der[start : start + 32])))(root)
+
+
+def stray_characters(root: Path) -> None:
+    """Python's base64 skips them, OpenSSL refuses the file."""
+    document = root / "enclaves/a/permissions.p7s"
+    head, _, tail = document.read_bytes().rpartition(b"base64\r\n")
+    document.write_bytes(head + b"base64\r\n" + tail.replace(b"A", b"A\x96", 1))
+
+
 PLANTED: dict[str, tuple[str, Plant]] = {
     "lost key": ("missing", lose("enclaves/a/key.pem")),
     "lost certificate": ("missing", lose("enclaves/a/cert.pem")),
@@ -92,6 +122,9 @@ PLANTED: dict[str, tuple[str, Plant]] = {
     "lost key and certificate": ("incomplete", lose("enclaves/b/key.pem", "enclaves/b/cert.pem")),
     "certificate garbled": ("certificate", write("enclaves/a/cert.pem")),
     "key garbled": ("key", write("enclaves/a/key.pem")),
+    "private half garbled": ("key", private_half),
+    "certificate of no known curve": ("wrong-ca", der_changed("enclaves/a/cert.pem", CURVE, b"\0" * len(CURVE))),
+    "signature with stray characters": ("permissions", stray_characters),
     "permissions garbled": ("permissions", write("enclaves/a/permissions.p7s")),
     "permissions.xml garbled": ("twin-differs", write("enclaves/a/permissions.xml")),
     "another's certificate": ("wrong-subject", damages.swap_certificates),
