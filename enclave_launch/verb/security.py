@@ -10,7 +10,6 @@ from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.flow import SecurityOptions
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.security_environment import environment_domains
-from keystore.creation import CreateOptions
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError
 from keystore.expiry import expires_soon
@@ -29,11 +28,15 @@ def security_options(options: argparse.Namespace) -> SecurityOptions:
 
 
 def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
-    subjects = SubjectScheme.COMPATIBLE if options.compatible_subjects else None
+    subjects, creation = None, None
+    if options.compatible_subjects:
+        from keystore.creation import CreateOptions  # much to import, and rarely needed
+
+        subjects, creation = SubjectScheme.COMPATIBLE, CreateOptions(subjects=SubjectScheme.COMPATIBLE)
     return ProvisionOptions(
         domains=domains(options),
         create=not options.no_create_keystore,
-        creation=CreateOptions(subjects=subjects or SubjectScheme.EXACT),
+        creation=creation,
         valid_until=parse_end(options.valid_for, utc_now()) if options.valid_for else None,
         subjects=subjects,
         access=CaAccess(passphrase=_passphrase(options)),
