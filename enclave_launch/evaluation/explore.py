@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch.events.process import ProcessStarted
 from enclave_launch.description.launch.events.shutdown import Shutdown
 from enclave_launch.description.launch.events.timer_event import TimerEvent
-from enclave_launch.evaluation.error_text import error_text
 from enclave_launch.evaluation.events import chain, run_handler
 from enclave_launch.evaluation.location import location_of, place_of
 from enclave_launch.evaluation.suppositions import process_event_arguments
@@ -139,6 +138,8 @@ class Explorer:
 
     def _note_failure(self, event: Event, error: Exception) -> None:
         """A handler that fails would end the launch at that moment; before it, nobody can be sure."""
+        from enclave_launch.evaluation.error_text import error_text
+
         place = place_of(error) or location_of(event, self._context)
         what = f"what {event.name.rpartition('.')[2]} {event.subject()}".rstrip()
         self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))

@@ -6,8 +6,10 @@ repeated includes then read and parse once. Only text and immutable trees are ke
 
 from __future__ import annotations
 
+import errno
 import io
 import os
+import stat
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any, TextIO, TypeVar
@@ -66,6 +68,8 @@ def read(file: str | bytes | os.PathLike[str] | TextIO) -> LaunchFile:
         return LaunchFile(str(getattr(file, "name", "")), _limited(file.read()))
     path = os.fsdecode(file)
     status = os.stat(path)
+    if stat.S_ISFIFO(status.st_mode):
+        raise OSError(errno.EINVAL, "A pipe, not a file", path)  # reading could wait for ever
     stamp = (path, status.st_ino, status.st_mtime_ns, status.st_size)
     kept = _kept.get(stamp)
     if kept is not None:

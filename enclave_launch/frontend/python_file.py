@@ -6,7 +6,9 @@ would run it. Nothing is written: no ``__pycache__`` beside the launch file.
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 import traceback
 from functools import lru_cache
 from importlib.machinery import SourceFileLoader
@@ -27,7 +29,9 @@ def run(path: str, *, allowed: bool) -> ModuleType:
 
     Raises ``PythonRefused`` unless ``allowed``, ``OSError``, ``SyntaxError``, and whatever the file raises.
     """
-    os.stat(path)  # a missing file is reported as such even where Python is refused
+    status = os.stat(path)  # a missing file is reported as such even where Python is refused
+    if stat.S_ISFIFO(status.st_mode):
+        raise OSError(errno.EINVAL, "A pipe, not a file", path)
     if not allowed:
         raise PythonRefused(f"'{path}' would have to be run as Python, which --no-python refuses")
     loader = _Loader(MODULE_NAME, path)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -44,7 +45,10 @@ def resource_key(package: str, name: str) -> str:
 
 def _read(file: str) -> bytes:
     try:
-        if os.path.getsize(file) > _MAX_BYTES:
+        status = os.stat(file)
+        if stat.S_ISFIFO(status.st_mode):
+            raise InvalidNoDLError.at(SourceRef(file), "is a pipe, not a file")  # reading could wait for ever
+        if status.st_size > _MAX_BYTES:
             raise InvalidNoDLError.at(SourceRef(file), f"larger than the allowed {_MAX_BYTES} bytes")
         with open(file, "rb") as stream:
             return stream.read()

@@ -115,6 +115,8 @@ def package_root(document: Path) -> Path:
 
 def _read(path: Path, source: SourceRef) -> bytes:
     try:
+        if not path.is_file() and path.exists() and not path.is_dir():
+            raise IncludeError.at(source, f"cannot read {path}: not a regular file")
         if os.path.getsize(path) > MAX_BYTES:
             raise IncludeError.at(source, f"{path} is larger than the allowed {MAX_BYTES} bytes")
         return path.read_bytes()

@@ -45,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         nodes, missing = _of_package(ManifestLookup(prefixes), arguments.subject, arguments.names)
     if arguments.format == "json":
         print(json.dumps([_plain(node) for node in nodes], indent=2))
-    else:
+    elif nodes:
         print("\n".join(line for node in nodes for line in _lines(node)))
     for text in missing:
         print(text, file=sys.stderr)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -76,6 +77,14 @@ def test_an_error_in_an_argument_of_an_include_stands_at_the_include(tmp_path: P
     content = '<include file="$(dirname)/b.launch.xml"><arg name="x" value="$(var unset)"/></include>'
     text = message(tmp_path, "a.launch.xml", XML.format(content))
     assert text == "a.launch.xml:2: <include> launch configuration 'unset' does not exist"
+
+
+@pytest.mark.parametrize("name", ["b.launch.xml", "b.launch.py"])
+def test_a_pipe_is_no_launch_file(tmp_path: Path, name: str) -> None:
+    """Nobody may ever write to it."""
+    os.mkfifo(tmp_path / name)
+    text = message(tmp_path, "a.launch.xml", XML.format(f'<include file="$(dirname)/{name}"/>'))
+    assert text == f"a.launch.xml:2: <include> A pipe, not a file: '{name}'"
 
 
 def test_a_package_that_is_not_installed_says_what_to_do(tmp_path: Path) -> None:
