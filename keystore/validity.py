@@ -105,7 +105,12 @@ def parse_moment(text: str) -> datetime:
 
 def parse_end(text: str, now: datetime) -> datetime:
     """``--valid-for``: a duration from now or an ISO date."""
-    return later(now, parse_duration(text)) if _DURATION.match(text.strip()) else parse_moment(text)
+    if _DURATION.match(text.strip()):
+        return later(now, parse_duration(text))
+    try:
+        return parse_moment(text)
+    except InvalidInput as error:
+        raise InvalidInput(f"{error}, or a duration such as 90d") from None
 
 
 def utc_now() -> datetime:

@@ -22,6 +22,7 @@ from keystore.validity import parse_duration, parse_end, utc_now
 def security_options(options: argparse.Namespace) -> SecurityOptions:
     """Raises ``UsageError`` for a value that is not what its option takes."""
     try:
+        parse_duration(options.warn_expiry)  # used after provisioning, refused before
         return SecurityOptions(strategy=options.strategy, keystore=_provision_options(options))
     except InvalidInput as error:
         raise UsageError(str(error)) from error
