@@ -26,6 +26,7 @@ from keystore.provisioning import (
 )
 from keystore.store import Store
 from keystore.superseded import remember
+from keystore.validity import DEFAULT_LIFETIME, Validity
 from keystore.view import KeystoreView
 
 # Bounds what an interrupted run loses, and how often the disk is waited for.
@@ -36,6 +37,9 @@ def write_wishes(
     root: Path, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
 ) -> ProvisionReport:
     """Complete the keystore, then every enclave that is not as wished."""
+    # An impossible validity is refused before a keystore is made for it.
+    lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
+    Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
     with _locked(root, options) as opened:
         done, warnings = _complete_keystore(opened, options, now)
         view = KeystoreView(root)

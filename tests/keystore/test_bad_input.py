@@ -106,6 +106,12 @@ def test_governance_yaml(name: str) -> None:
         parse_governance_yaml(YAML[name], "g.yaml")
 
 
+def test_no_keystore_is_made_for_an_impossible_validity(tmp_path: Path) -> None:
+    with pytest.raises(InvalidInput, match="already have ended"):
+        provision(tmp_path / "ks", [policy("/a")], options=options(valid_until=NOW.replace(year=2001)))
+    assert not (tmp_path / "ks").exists()
+
+
 def test_ends_are_capped_and_in_utc() -> None:
     assert parse_end("999999y", NOW).year == 2262
     assert parse_end("2040-01-01T00:00:00+02:00", NOW).isoformat() == "2039-12-31T22:00:00+00:00"
