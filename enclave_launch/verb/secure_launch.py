@@ -126,8 +126,11 @@ def _show_file(target: Target, options: argparse.Namespace) -> int:
 
 def _show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
     text = _plan_text(plan, options, keystore)
-    if options.format == "policy" or options.dump_params or options.explain:  # the tree and the JSON hold them
-        _warn((*plan.problems, *plan.warnings))
+    told = (*plan.problems, *plan.warnings)
+    if options.explain and told:
+        _warn((f"problems: {len(plan.problems)}, warnings: {len(plan.warnings)}; --dry-run shows them",))
+    elif options.format == "policy" or options.dump_params:  # the tree and the JSON hold them
+        _warn(told)
     machine_readable = options.dump_params or (options.format != "tree" and not options.explain)
     sys.stdout.write(text if machine_readable else _with_short_paths(text))
     gc.freeze()  # the process ends now: no last search for garbage among all that was read

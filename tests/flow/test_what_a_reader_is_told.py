@@ -39,7 +39,7 @@ def test_the_tree_tells_what_was_inferred(secure_launch: SecureLaunch, write: Wr
     assert "publish: /chatter /greeting" in tree
 
 
-@pytest.mark.parametrize("way", [("--format", "policy"), ("--explain", "/talker"), ("--dump-params",)])
+@pytest.mark.parametrize("way", [("--format", "policy"), ("--dump-params",)])
 def test_what_is_not_known_is_told_beside_every_other_output(
     way: tuple[str, ...], secure_launch: SecureLaunch, write: Write, workspace: Path
 ) -> None:
@@ -48,6 +48,15 @@ def test_what_is_not_known_is_told_beside_every_other_output(
     assert run.returncode == 0
     assert "no NoDL manifest for robot/engine" in run.stderr
     assert "robot/engine" not in run.stdout
+
+
+def test_an_explanation_tells_that_more_is_to_be_read(
+    secure_launch: SecureLaunch, write: Write, workspace: Path
+) -> None:
+    file = write('<node pkg="demo_nodes" exec="talker"/><node pkg="robot" exec="engine"/>')
+    run = secure_launch("--explain", "/talker", "--prefix", workspace, file)
+    assert "publish /chatter" in run.stdout
+    assert run.stderr == "secure-launch: warning: problems: 1, warnings: 0; --dry-run shows them\n"
 
 
 def test_a_policy_of_nothing_known_is_an_error(
