@@ -6,6 +6,7 @@ sros2/policy/schemas/policy.xsd. Reading and writing the XML is ``keystore.polic
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from enum import Enum
 
@@ -64,3 +65,15 @@ class Policy:
     """Enclaves sorted by path, each path once."""
 
     enclaves: tuple[EnclavePolicy, ...]
+
+    def wildcards(self) -> dict[str, tuple[str, ...]]:
+        """Enclave -> what it is allowed by wildcard: granted because somebody wrote it, and worth saying."""
+        found = {enclave.path: tuple(sorted(set(_wildcards(enclave)))) for enclave in self.enclaves}
+        return {path: expressions for path, expressions in found.items() if expressions}
+
+
+def _wildcards(enclave: EnclavePolicy) -> Iterator[str]:
+    for profile in enclave.profiles:
+        for rule in profile.rules:
+            if rule.qualifier is Qualifier.ALLOW and any(character in rule.expression for character in "*?["):
+                yield rule.expression

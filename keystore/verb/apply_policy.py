@@ -25,6 +25,10 @@ def run(arguments: argparse.Namespace) -> int:
 
     document = read_policy(arguments.policy)
     common.warn(document.warnings)
+    common.warn(
+        f"enclave {enclave} is granted by wildcard: {', '.join(expressions)}"
+        for enclave, expressions in document.policy.wildcards().items()
+    )
     domains = Domains.parse(arguments.domain_id) if arguments.domain_id else None
     report = apply_policy(
         arguments.keystore, document.policy, options=common.provision_options(arguments, domains=domains)

@@ -161,3 +161,14 @@ def test_no_bar_without_a_terminal(tmp_path: Path) -> None:
         [sys.executable, "-m", "keystore.verb", "create", str(tmp_path / "ks")], capture_output=True, text=True
     )
     assert done.returncode == 0 and done.stderr == ""
+
+
+@pytest.mark.parametrize(("written", "said"), [("chatter", ""), ("camera/*", "camera/*"), ("imu[12]", "imu[12]")])
+def test_each_wildcard_of_a_policy_is_said(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], written: str, said: str
+) -> None:
+    (tmp_path / "wide.xml").write_text(POLICY.replace("<topic>chatter<", f"<topic>{written}<"))
+    assert main(["apply-policy", str(root), str(tmp_path / "wide.xml")]) == 0
+    assert capsys.readouterr().err == (
+        f"secure-keystore: warning: enclave /talker is granted by wildcard: {said}\n" if said else ""
+    )
