@@ -13,6 +13,7 @@ from typing import Protocol
 
 MAX_PARTS = 24
 MAX_PRODUCT = 64
+MAX_LENGTH = 4096  # characters of a known text; no name is longer
 
 # str methods that are applied later, when an input's value is known.
 DEFERRED_METHODS = frozenset(
@@ -92,6 +93,8 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
     for piece in pieces:
         if piece == "":
             continue
+        if isinstance(piece, str) and len(piece) > MAX_LENGTH:
+            piece = Hole("a very long text")
         last = merged[-1] if merged else None
         if isinstance(piece, str) and isinstance(last, str):
             merged[-1] = last + piece
@@ -111,7 +114,7 @@ def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
 
 
 def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
-    if isinstance(left, str) and isinstance(right, str):
+    if isinstance(left, str) and isinstance(right, str) and len(left) + len(right) <= MAX_LENGTH:
         return left + right
     return text_of((*pieces_of(left), *pieces_of(right)))
 

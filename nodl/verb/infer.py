@@ -77,7 +77,8 @@ def _documents(
     if chosen == "text":
         from nodl.infer.report.text_report import to_text
 
-        return {"inferred.txt": to_text(expanded, built_in=args.builtin)}
+        text = to_text(expanded, built_in=args.builtin)
+        return {"inferred.txt": text.replace(os.path.join(os.getcwd(), ""), "")}  # as a person would name the files
     from nodl.infer.report.nodl_report import to_v1, to_v2
 
     return to_v1(system) if chosen == "v1" else to_v2(system)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Sequences
 
 from nodl.infer.interpreter.run import Arguments, Frame, Run
-from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
+from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenate, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -86,7 +86,7 @@ def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: o
 
 def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
     if len(left) == 1 and len(right) == 1 and type(left[0]) is str and type(right[0]) is str:
-        return (left[0] + right[0],)
+        return (concatenate(left[0], right[0]),)
     texts_left = [atom for atom in left if isinstance(atom, str | Text)]
     texts_right = [atom for atom in right if isinstance(atom, str | Text)]
     sequences = [atom for atom in (*left, *right) if isinstance(atom, Sequence)]
@@ -192,13 +192,16 @@ def _formatted(run: Run, part: ast.FormattedValue, frame: Frame) -> list[TextAto
     return formatted(value, spec if isinstance(spec, str) else None)
 
 
+_WIDE = re.compile(r"\d{4}")  # a width or precision that makes texts of no use, and of any size
+
+
 def formatted(value: Value, spec: str | None) -> list[TextAtom]:
     """``format(value, spec)`` for constants; what depends on the rest is a hole."""
     if spec == "":
         return as_texts(value)
     texts: list[TextAtom] = []
     for atom in value:
-        if spec is not None and isinstance(atom, str | int | float):
+        if spec is not None and isinstance(atom, str | int | float) and not _WIDE.search(spec):
             try:
                 texts.append(format(atom, spec))
                 continue
@@ -252,7 +255,7 @@ def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
         return as_texts(value)
     texts: list[TextAtom] = []
     for atom in value:
-        if isinstance(atom, str | int | float):
+        if isinstance(atom, str | int | float) and not _WIDE.search(match["flags"]):
             try:
                 texts.append(f"%{match['flags']}{match['type']}" % atom)
                 continue

@@ -8,7 +8,7 @@ from nodl.infer.interpreter.iterate import elements, keys_of, values_of
 from nodl.infer.interpreter.loops import store_item
 from nodl.infer.interpreter.operators import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.text import Hole, Text, TextAtom, edited, make_text
+from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, make_text
 from nodl.infer.values import (
     ANY,
     BOOLEAN,
@@ -77,6 +77,9 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
 def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ...], call: Call) -> Value:
     if name not in _PURE and name not in _SPLITS:
         return unknown(f"the result of str.{name}()")
+    size = len(text) + sum(len(each) if isinstance(each, str) else 0 for each in arguments)
+    if size > MAX_LENGTH or any(type(each) is int and each > MAX_LENGTH for each in arguments):
+        return unknown(f"the result of str.{name}() of a very long text")
     try:
         result = getattr(text, name)(*arguments)
     except (TypeError, ValueError, OverflowError):

@@ -74,8 +74,9 @@ def _json(path: Path) -> str:
 
 
 def test_a_budget_ends_at_the_same_step_whatever_the_clock_says(
-    tmp_path: Path, request: pytest.FixtureRequest
+    tmp_path: Path, request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr("nodl.infer.interpreter.run.MAX_STEPS", 60_000)  # keeps the test short
     program = tmp_path / "endless.py"
     program.write_text(_ENDLESS)
     plain = _json(program)
@@ -105,6 +106,30 @@ def test_a_huge_literal_costs_little_and_is_said(tmp_path: Path) -> None:
     assert [gap.why for gap in system.gaps] == ["the file is too large to be a program"]
 
 
-def test_nested_comprehensions_are_bounded(names: Callable[..., list[str]]) -> None:
-    loops = " ".join(f"for {name} in range(60)" for name in "abcde")
-    assert names(f"NAMES = [a + b + c + d + e {loops}]") == []
+def test_nested_comprehensions_are_bounded(
+    names: Callable[..., list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nodl.infer.interpreter.run.MAX_STEPS", 60_000)
+    loops = " ".join(f"for {name} in range(60)" for name in "abcd")
+    assert names(f"NAMES = [a + b + c + d {loops}]") == []
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        "x = 'a'\n" + "x = x + x\n" * 60,
+        "x = 'a'\n" + "x = f'{x}{x}'\n" * 60,
+        "x = 'a'\n" + "x = x.replace('a', 'aaaaaaaa')\n" * 20,
+        "x = 'a'.ljust(10 ** 4 * 10 ** 4 * 10 ** 3)",
+        "x = 'a'.ljust(99999999999)",
+        "x = f'{1:>99999999999}'",
+        "x = '%99999999999d' % 1",
+        "x = '{:99999999999}'.format(1)",
+        "x = ''.join(['a' * 200] * 64) * 200",
+        "x = 9 ** 9 ** 9 ** 9\nx = 1 << 99999999999",
+    ],
+)
+def test_no_text_or_number_grows_without_end(body: str, names: Callable[..., list[str]]) -> None:
+    text = f"import rclpy\n{body}\nnode = rclpy.create_node('n')\nnode.create_publisher(object, str(x), 1)\n"
+    (name,) = names(text)
+    assert len(name) < 20_000
