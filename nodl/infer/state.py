@@ -33,7 +33,7 @@ class State:
         self._trail: list[tuple[Cells, object, Value | None]] = []
         self._stamps = itertools.count(1)
         self.stamp = 0
-        self.learned = 0  # facts about objects that no branch takes back: opened to foreign code, one for many
+        self.learned = 0  # containers opened to foreign code, which no branch takes back
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
 

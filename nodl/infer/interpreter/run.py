@@ -306,9 +306,8 @@ class Run:
         found = self._allocated.get(key)
         if found is None:
             found = self._allocated[key] = make()
-        elif not found.summary:
-            found.summary = True
-            self.state.learned += 1
+        else:
+            found.summary = True  # what was stored before is still there: weak updates only add to it
         return found
 
     def tuple_of(self, parts: tuple[Value, ...]) -> Value:
