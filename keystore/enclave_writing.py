@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from datetime import datetime
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -54,7 +55,11 @@ class EnclaveWriter:
         """Of new certificates; permissions take over what their certificate got."""
         cas = [self._view.ca(role).validity for role in Role]
         if not all(ca.covers(self._now) for ca in cas):
-            raise DamagedKeystore("a CA of this keystore is expired: secure-keystore renew KEYSTORE --ca start")
+            root = shlex.quote(str(self._view.root))
+            raise DamagedKeystore(
+                "a CA of this keystore is expired, or not yet valid (is the clock right?); to replace it: "
+                f"secure-keystore renew {root} --ca start"
+            )
         options = self._options
         lifetime = self._view.settings.lifetime if options.lifetime is None else options.lifetime
         asked = Validity.starting(self._now, lifetime, until=options.valid_until, backdate=options.backdate)

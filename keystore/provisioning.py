@@ -21,6 +21,7 @@ from keystore.domains import Domains
 from keystore.enclave_name import validate_enclave_name
 from keystore.enclave_state import EnclaveState, Identity, PermissionsSource, inspect
 from keystore.errors import InvalidInput, NotAKeystore, printable
+from keystore.expiry import crl_validity
 from keystore.governance_file import governance_domains, governance_stands
 from keystore.permissions import permissions_document
 from keystore.policy import EnclavePolicy
@@ -121,7 +122,8 @@ def what_is_wrong(
     now = chosen.now or utc_now()
     state = inspect_wish(view, policy.path, Wish(policy_source(policy, chosen)), chosen, now)
     governance = () if governance_stands(view, chosen.domains) else ("the governance is not what it was",)
-    return (*state.reasons, *governance) if not state.is_good or governance else ()
+    crl = () if _crl_stands(view, now) else ("the CRL has ended",)
+    return (*(() if state.is_good else state.reasons), *governance, *crl)
 
 
 def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
@@ -177,7 +179,13 @@ def _all_stand(
     view: KeystoreView, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
 ) -> bool:
     states = (inspect_wish(view, name, wish, options, now) for name, wish in wishes.items())
-    return governance_stands(view, options.domains) and all(state.is_good for state in states)
+    stand = governance_stands(view, options.domains) and _crl_stands(view, now)
+    return stand and all(state.is_good for state in states)
+
+
+def _crl_stands(view: KeystoreView, now: datetime) -> bool:
+    """A CRL that has ended keeps every participant from starting."""
+    return not view.has_crl or crl_validity(view).covers(now)
 
 
 def inspect_wish(

@@ -24,6 +24,7 @@ from keystore.provisioning import (
     Wish,
     inspect_wish,
 )
+from keystore.revocation import renew_crl
 from keystore.store import Store
 from keystore.superseded import remember
 from keystore.validity import DEFAULT_LIFETIME, Validity
@@ -72,6 +73,8 @@ def _complete_keystore(
     done = list(report.actions)
     if renew_governance(opened, domains, options.access, now):
         done.append(f"governance signed for domains {domains}")
+    if renew_crl(opened, options.access, now, options.renew_within):
+        done.append("CRL published again")
     return done, list(report.warnings)
 
 

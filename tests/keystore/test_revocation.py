@@ -114,6 +114,16 @@ def test_the_number_of_a_crl_only_grows(root: Path) -> None:
     assert numbers == sorted(set(numbers))
 
 
+def test_a_launch_renews_a_crl_that_has_ended(root: Path) -> None:
+    remove(root, ["/c"], options=quick(now=NOW - 300 * DAY))
+    later = NOW + 100 * DAY
+    wished = [policy("/a")]
+    assert provision(root, wished, options=options(now=later)).created == ("CRL published again",)
+    assert not provision(root, wished, options=options(now=later)).changed
+    assert len(crl(root)) == 1
+    assert codes(root, now=later) == set()
+
+
 def test_revocations_add_up(root: Path) -> None:
     remove(root, ["/c"], options=quick(now=NOW))
     assert remove(root, ["/a", "/a/b"], options=quick(now=NOW + DAY)).revoked == 3
