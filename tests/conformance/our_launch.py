@@ -104,9 +104,12 @@ def _recorded(logs: list[tuple[str, str]]) -> Iterator[None]:
 
     logger, recorder = logging.getLogger("launch.user"), Recorder()
     logger.addHandler(recorder)
-    level, logger.level = logger.level, logging.DEBUG
+    level, disabled = logger.level, logger.disabled
+    logger.setLevel(logging.DEBUG)  # not by attribute: a logger remembers what it is enabled for
+    logger.disabled = False
     try:
         yield
     finally:
-        logger.level = level
+        logger.setLevel(level)
+        logger.disabled = disabled
         logger.removeHandler(recorder)
