@@ -20,15 +20,8 @@ if TYPE_CHECKING:
         ProvisionError,
         RuntimeFailure,
     )
-    from enclave_launch.flow import (
-        ResolveOptions,
-        RunSettings,
-        SecurityOptions,
-        provision,
-        resolve,
-        run,
-        run_async,
-    )
+    from enclave_launch.flow import provision, resolve, run, run_async
+    from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.secured import ProvisionedLaunch
 
@@ -39,9 +32,9 @@ _HOMES = {
     "ManifestError": "errors",
     "ProvisionError": "errors",
     "RuntimeFailure": "errors",
-    "ResolveOptions": "flow",
-    "RunSettings": "flow",
-    "SecurityOptions": "flow",
+    "ResolveOptions": "options",
+    "RunSettings": "options",
+    "SecurityOptions": "options",
     "provision": "flow",
     "resolve": "flow",
     "run": "flow",

@@ -4,78 +4,26 @@
     launch = provision(plan, "keystore")                keys, certificates, signed permissions
     status = run(launch)                                every process starts with its enclave
 
-``run`` also takes a bare plan and then starts it unsecured, as ``secure-launch`` without ``--secure`` does; inside a
-running event loop await ``run_async``. Errors are ``EnclaveLaunchError``; ``str(error)`` is for a person.
+``run`` also takes a bare plan, or what ``evaluate_launch`` gives, and then starts it unsecured, as ``secure-launch``
+without ``--secure`` does; inside a running event loop await ``run_async``. Errors are ``EnclaveLaunchError``;
+``str(error)`` is for a person.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from enclave_launch.enclave import EnclaveScope
-from enclave_launch.errors import ManifestError, UsageError
-from enclave_launch.plan import LaunchPlan, LaunchSource, Planner, PlanOptions
-from enclave_launch.policy import PolicyOptions
+from enclave_launch.errors import ManifestError
+from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
+from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner
 from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.process import Evaluation
     from enclave_launch.secured import ProvisionedLaunch
-    from keystore.policy_xml import PolicyDocument
-    from keystore.provisioning import ProvisionOptions
-
-
-@dataclass(frozen=True, slots=True)
-class ResolveOptions:
-    """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
-    else the newest; ``manifests`` win where NoDL definitions conflict."""
-
-    prefixes: tuple[Path, ...] = ()
-    manifests: tuple[Path, ...] = ()
-    policy: Path | None = None
-    distro: str | None = None
-    enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
-    infer: bool = True
-    accept_patterns: bool = False
-    allow_missing_packages: bool = False
-    no_python: bool = False
-    launch_configurations: Mapping[str, str] = field(default_factory=dict)
-
-    def host_options(self) -> dict[str, object]:
-        """What the evaluation's host is told, in a dry run and live alike."""
-        return {
-            "distro": self.distro,
-            "allow_missing_packages": self.allow_missing_packages,
-            "no_python": self.no_python,
-        }
-
-    def plan_options(self) -> PlanOptions:
-        """Raises ``UsageError`` for a policy file that cannot be used."""
-        document = _read_policy(self.policy) if self.policy else None
-        return PlanOptions(self.enclave_scope, PolicyOptions(self.accept_patterns, document))
-
-
-def _read_policy(path: Path) -> PolicyDocument:
-    from keystore.errors import KeystoreError
-    from keystore.policy_xml import read_policy
-
-    try:
-        return read_policy(path)
-    except KeystoreError as error:
-        raise UsageError(str(error)) from error
-
-
-@dataclass(frozen=True, slots=True)
-class SecurityOptions:
-    """How to provision: the keystore's own options (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
-    the strategy that the processes are told."""
-
-    strategy: str = "Enforce"
-    keystore: ProvisionOptions | None = None
 
 
 def resolve(
@@ -89,10 +37,29 @@ def resolve(
     Raises ``LaunchFileError`` (file, line, element, include chain) and ``ManifestError``. What a secure start must
     refuse is in ``plan.problems``.
     """
-    from enclave_launch.evaluation.evaluate import evaluate
-    from enclave_launch.evaluation.host import PlanHost
     from enclave_launch.interfaces import InterfaceFinder
     from nodl.ament_index import search_prefixes
+
+    chosen = options or ResolveOptions()
+    evaluated = evaluate_launch(launch_file, arguments, options=chosen)
+    with ament_prefixes(evaluated.source.prefixes):
+        finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
+        plan = Planner(evaluated.source, finder, chosen.plan_options()).plan(evaluated.evaluation)
+    return replace(plan, warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)))
+
+
+def evaluate_launch(
+    launch_file: str | os.PathLike[str],
+    arguments: Sequence[tuple[str, str]] = (),
+    *,
+    options: ResolveOptions | None = None,
+) -> EvaluatedLaunch:
+    """The first half of ``resolve``: what would start, without enclaves; all that an unsecured ``run`` needs.
+
+    Raises ``LaunchFileError`` as ``resolve``.
+    """
+    from enclave_launch.evaluation.evaluate import evaluate
+    from enclave_launch.evaluation.host import PlanHost
 
     chosen = options or ResolveOptions()
     source = LaunchSource(
@@ -109,9 +76,7 @@ def resolve(
             host=PlanHost(**source.host_options),
             launch_configurations=source.launch_configurations,
         )
-        finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
-        plan = Planner(source, finder, chosen.plan_options()).plan(evaluation)
-        return replace(plan, warnings=(*plan.warnings, *_missing_programs(evaluation)))
+    return EvaluatedLaunch(source, evaluation)
 
 
 def _missing_programs(evaluation: Evaluation) -> list[str]:
@@ -144,29 +109,23 @@ def provision(
     return ProvisionedLaunch(plan, settings, report, wanted)
 
 
-@dataclass(frozen=True, slots=True)
-class RunSettings:
-    """How to run. ``secrets``: environment variables that no process of the launch sees."""
-
-    noninteractive: bool = False
-    debug: bool = False
-    allow_late: bool = False
-    secrets: frozenset[str] = frozenset()
-
-
-def run(launch: LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None) -> int:
+def run(
+    launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None
+) -> int:
     """Start what was planned and stay until all has ended; handles SIGINT and SIGTERM. Gives the exit status.
 
     Before anything is started raises ``RuntimeFailure`` when something it needs is not there, and ``LaunchFileError``
     for a program that cannot be executed.
     """
-    from enclave_launch.running import run_plan
+    from enclave_launch.running import run_launched
 
-    return run_plan(launch, options or RunSettings())
+    return run_launched(launch, options or RunSettings())
 
 
-async def run_async(launch: LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None) -> int:
+async def run_async(
+    launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None
+) -> int:
     """The same inside a running event loop; signals stay the caller's, cancelling ends every process first."""
-    from enclave_launch.running import run_plan_async
+    from enclave_launch.running import run_launched_async
 
-    return await run_plan_async(launch, options or RunSettings())
+    return await run_launched_async(launch, options or RunSettings())

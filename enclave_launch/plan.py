@@ -110,6 +110,10 @@ class LaunchPlan:
     warnings: tuple[str, ...] = ()
 
     @property
+    def evaluated(self) -> EvaluatedLaunch:
+        return EvaluatedLaunch(self.planner.source, self.evaluation)
+
+    @property
     def launch_file(self) -> str:
         return self.planner.source.launch_file
 
@@ -144,6 +148,14 @@ class LaunchSource:
     prefixes: tuple[str, ...] = ()
     launch_configurations: Mapping[str, str] = field(default_factory=dict)
     host_options: Mapping[str, object] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class EvaluatedLaunch:
+    """What a launch file would start, before anything is decided about enclaves."""
+
+    source: LaunchSource
+    evaluation: Evaluation
 
 
 @dataclass(frozen=True, slots=True)
@@ -262,7 +274,9 @@ def _unforeseen(actions: Iterable[Unforeseeable]) -> list[str]:
 def _alike(container: str, processes: Iterable[PlannedProcess]) -> str:
     """A target is taken as it is written, without pushed namespaces (launch_ros load_composable_nodes.py)."""
     last = "/" + container.rpartition("/")[2]
-    names = dict.fromkeys(node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last))
+    names = dict.fromkeys(
+        node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last)
+    )
     return f" (this launch file starts {' '.join(names)}: a target needs its full name)" if names else ""
 
 
@@ -285,7 +299,9 @@ def _notes(
         f"{item.process.location}: {item.process.process_name} has --enclave {item.enclave.path} in its own ROS "
         f"arguments; its enclave attribute {item.process.enclave.attribute!r} is not used"
         for item in processes
-        if item.enclave and item.process.enclave.argument is not None and item.process.enclave.attribute is not None
+        if item.enclave
+        and item.process.enclave.argument is not None
+        and item.process.enclave.attribute is not None
     ]
     if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
         notes.append(f"enclave {launcher.enclave} is shared with the launcher itself")

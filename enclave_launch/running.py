@@ -7,45 +7,50 @@ plan. Starts processes; nothing comes after.
 from __future__ import annotations
 
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Union
 
 from enclave_launch.evaluation.programs import check_programs
-from enclave_launch.plan import LaunchPlan
+from enclave_launch.plan import EvaluatedLaunch, LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
 from enclave_launch.runtime.service import RunOptions, run_launch, run_launch_async
 
 if TYPE_CHECKING:
-    from enclave_launch.flow import RunSettings
+    from enclave_launch.options import RunSettings
     from enclave_launch.secured import ProvisionedLaunch
 
 
-def run_plan(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> int:
+Launch = Union[EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
+
+
+def run_launched(launch: Launch, settings: RunSettings) -> int:
     """Block until all is over. Before anything was started raises ``RuntimeFailure``, and ``LaunchFileError``
     for a program that is not there."""
-    source = _plan(launch).planner.source
+    source = _evaluated(launch).source
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
-        check_programs(_plan(launch).evaluation.processes)
+        check_programs(_evaluated(launch).evaluation.processes)
         return run_launch(source.launch_file, source.arguments, gate=gate, options=options)
 
 
-async def run_plan_async(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> int:
+async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     """The same inside a running event loop."""
-    source = _plan(launch).planner.source
+    source = _evaluated(launch).source
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
-        check_programs(_plan(launch).evaluation.processes)
+        check_programs(_evaluated(launch).evaluation.processes)
         return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
 
 
-def _plan(launch: LaunchPlan | ProvisionedLaunch) -> LaunchPlan:
-    return launch if isinstance(launch, LaunchPlan) else launch.plan
+def _evaluated(launch: Launch) -> EvaluatedLaunch:
+    if isinstance(launch, EvaluatedLaunch):
+        return launch
+    return launch.evaluated if isinstance(launch, LaunchPlan) else launch.plan.evaluated
 
 
-def _gate(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> EnclaveGate | None:
+def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
     """What stands before each process; ``None`` for a launch that was asked to run unsecured."""
-    if isinstance(launch, LaunchPlan):
+    if isinstance(launch, (EvaluatedLaunch, LaunchPlan)):
         return None
     from enclave_launch.secured import PlanProvider  # brings the keystore: not for a launch without it
 
@@ -59,13 +64,14 @@ def _gate(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> Encl
     )
 
 
-def _options(launch: LaunchPlan | ProvisionedLaunch, settings: RunSettings) -> RunOptions:
-    plan = _plan(launch)
+def _options(launch: Launch, settings: RunSettings) -> RunOptions:
+    evaluated = _evaluated(launch)
+    own = frozenset[str]() if isinstance(launch, (EvaluatedLaunch, LaunchPlan)) else launch.secret_variables
     return RunOptions(
         noninteractive=settings.noninteractive,
         debug=settings.debug,
-        secrets=settings.secrets | (frozenset() if isinstance(launch, LaunchPlan) else launch.secret_variables),
-        needs_ros_services=plan.launcher is not None,
-        launch_configurations=plan.planner.source.launch_configurations,
-        host_options=dict(plan.planner.source.host_options),
+        secrets=settings.secrets | own,
+        needs_ros_services=bool(evaluated.evaluation.launcher_calls),
+        launch_configurations=evaluated.source.launch_configurations,
+        host_options=dict(evaluated.source.host_options),
     )

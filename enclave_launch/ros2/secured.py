@@ -21,6 +21,7 @@ from enclave_launch import flow
 from enclave_launch.errors import UsageError
 from enclave_launch.evaluation.distro import choose_release
 from enclave_launch.interfaces import InterfaceFinder
+from enclave_launch.options import ResolveOptions, SecurityOptions
 from enclave_launch.plan import LaunchSource, Planner
 from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
@@ -36,15 +37,15 @@ def secured(
     description: LaunchDescription,
     keystore: str | os.PathLike[str],
     *,
-    resolve_options: flow.ResolveOptions | None = None,
-    security_options: flow.SecurityOptions | None = None,
+    resolve_options: ResolveOptions | None = None,
+    security_options: SecurityOptions | None = None,
 ) -> LaunchDescription:
     """``description`` in a new one that secures it. The keystore is created if it does not exist.
 
     :raises ProvisionError: the keystore cannot be used.
     :raises UsageError: this package is not installed, so that launch does not find its extension.
     """
-    options = resolve_options or flow.ResolveOptions()
+    options = resolve_options or ResolveOptions()
     check_installed()
     release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes())
     finder = InterfaceFinder(search_prefixes(), options.manifests, options.infer)

@@ -15,7 +15,7 @@ from enclave_launch.verb.options import build_parser
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from enclave_launch.flow import ResolveOptions, RunSettings
+    from enclave_launch.options import ResolveOptions, RunSettings
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.verb.target import Target
 
@@ -47,10 +47,11 @@ def _main(options: argparse.Namespace) -> int:
         with ament_prefixes(options.prefix):
             return _show_file(target, options)
     keystore = _keystore(options)
-    plan = _resolve(target, options)
     if _only_looking(options):
-        return _show_plan(plan, options, keystore)
-    return _launch(plan, options, keystore)
+        return _show_plan(_resolve(target, options), options, keystore)
+    if keystore is None:
+        return _launch_plainly(target, options)
+    return _launch(_resolve(target, options), options, keystore)
 
 
 def _check_prefixes(prefixes: Iterable[Path]) -> None:
@@ -81,7 +82,7 @@ def _resolve(target: Target, options: argparse.Namespace) -> LaunchPlan:
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:
     from enclave_launch.enclave import EnclaveScope
-    from enclave_launch.flow import ResolveOptions
+    from enclave_launch.options import ResolveOptions
 
     return ResolveOptions(
         prefixes=tuple(options.prefix),
@@ -184,19 +185,23 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
-    from enclave_launch.flow import provision, run
+def _launch_plainly(target: Target, options: argparse.Namespace) -> int:
+    """Without enclaves nobody has to know what the nodes say to each other."""
+    from enclave_launch.flow import evaluate_launch, run
 
-    _warn(plan.warnings)
-    settings = _run_settings(options)
-    if keystore is None:
-        return run(plan, options=settings)
+    launch = evaluate_launch(target.launch_file, target.arguments, options=resolve_options(options))
+    return run(launch, options=_run_settings(options))
+
+
+def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int:
+    from enclave_launch.flow import provision, run
     from enclave_launch.verb.security import expiry_notices, security_options
 
+    _warn(plan.warnings)
     _check_before_keys_are_made(plan)
     launch = provision(plan, keystore, options=security_options(options))
     _warn((*launch.report.warnings, *expiry_notices(keystore, plan, options.warn_expiry)))
-    return run(launch, options=settings)
+    return run(launch, options=_run_settings(options))
 
 
 def _check_before_keys_are_made(plan: LaunchPlan) -> None:
@@ -212,7 +217,7 @@ def _check_before_keys_are_made(plan: LaunchPlan) -> None:
 
 
 def _run_settings(options: argparse.Namespace) -> RunSettings:
-    from enclave_launch.flow import RunSettings
+    from enclave_launch.options import RunSettings
 
     if options.show_all_subprocesses_output:
         os.environ["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] = "both"

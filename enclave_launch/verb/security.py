@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 
 from enclave_launch.errors import ProvisionError, UsageError
-from enclave_launch.flow import SecurityOptions
+from enclave_launch.options import SecurityOptions
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.security_environment import environment_domains
 from keystore.domains import Domains

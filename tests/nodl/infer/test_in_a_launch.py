@@ -14,7 +14,8 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.errors import ManifestError
-from enclave_launch.flow import ResolveOptions, provision, resolve
+from enclave_launch.flow import provision, resolve
+from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.policy.explanation import explain
 

@@ -1,0 +1,78 @@
+"""What callers of the flow may choose, one type for each of its calls. ``None`` and the defaults are what
+``secure-launch`` does without options.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from enclave_launch.enclave import EnclaveScope
+from enclave_launch.errors import UsageError
+from enclave_launch.plan import PlanOptions
+from enclave_launch.policy import PolicyOptions
+
+if TYPE_CHECKING:
+    from keystore.policy_xml import PolicyDocument
+    from keystore.provisioning import ProvisionOptions
+
+
+@dataclass(frozen=True, slots=True)
+class ResolveOptions:
+    """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
+    else the newest; ``manifests`` win where NoDL definitions conflict."""
+
+    prefixes: tuple[Path, ...] = ()
+    manifests: tuple[Path, ...] = ()
+    policy: Path | None = None
+    distro: str | None = None
+    enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
+    infer: bool = True
+    accept_patterns: bool = False
+    allow_missing_packages: bool = False
+    no_python: bool = False
+    launch_configurations: Mapping[str, str] = field(default_factory=dict)
+
+    def host_options(self) -> dict[str, object]:
+        """What the evaluation's host is told, in a dry run and live alike."""
+        return {
+            "distro": self.distro,
+            "allow_missing_packages": self.allow_missing_packages,
+            "no_python": self.no_python,
+        }
+
+    def plan_options(self) -> PlanOptions:
+        """Raises ``UsageError`` for a policy file that cannot be used."""
+        document = _read_policy(self.policy) if self.policy else None
+        return PlanOptions(self.enclave_scope, PolicyOptions(self.accept_patterns, document))
+
+
+def _read_policy(path: Path) -> PolicyDocument:
+    from keystore.errors import KeystoreError
+    from keystore.policy_xml import read_policy
+
+    try:
+        return read_policy(path)
+    except KeystoreError as error:
+        raise UsageError(str(error)) from error
+
+
+@dataclass(frozen=True, slots=True)
+class SecurityOptions:
+    """How to provision: the keystore's own options (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
+    the strategy that the processes are told."""
+
+    strategy: str = "Enforce"
+    keystore: ProvisionOptions | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RunSettings:
+    """How to run. ``secrets``: environment variables that no process of the launch sees."""
+
+    noninteractive: bool = False
+    debug: bool = False
+    allow_late: bool = False
+    secrets: frozenset[str] = frozenset()
