@@ -1,6 +1,6 @@
 """``python -m tests.conformance [GROUP...]``: record in the case files what real launch does, per distribution.
 
-Needs the sources of real launch (see ``real_launch``). Rewrites only the ``expect`` sections.
+Needs the sources of real launch (see ``upstream``). Rewrites only the ``expect`` sections.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from . import case_files, public_api, real_launch
+from . import case_files, public_api, upstream
 
 
 def main(groups: list[str]) -> None:
@@ -22,12 +22,12 @@ def main(groups: list[str]) -> None:
 def record(path: Path) -> None:
     cases = case_files.load(path)
     answers = {
-        distro: real_launch.run_all(cases, distro)
+        distro: upstream.run_all(cases, distro)
         for distro in case_files.DISTROS
-        if real_launch.sources(distro) is not None
+        if upstream.sources(distro) is not None
     }
     if not answers:
-        raise SystemExit("no sources of real launch given: see tests/conformance/real_launch.py")
+        raise SystemExit("no sources of real launch given: see tests/conformance/upstream.py")
     blocks = ("\n" + path.read_text(encoding="utf-8")).split("\n=== ")
     number = 0
     for index, block in enumerate(blocks[1:], start=1):
@@ -45,7 +45,7 @@ def record_api() -> None:
     """Write ``public_api.txt``: one line for each name, with the distributions that have it so."""
     lines: dict[str, list[str]] = {}
     for distro in case_files.DISTROS:
-        for name, parameters in real_launch.api(distro).items():
+        for name, parameters in upstream.api(distro).items():
             lines.setdefault(public_api.line(name, parameters), []).append(distro)
     everywhere = list(case_files.DISTROS)
     text = "".join(

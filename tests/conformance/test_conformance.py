@@ -1,7 +1,7 @@
 """Our evaluation against what real launch did, case by case (see ``case_files``).
 
 The expectations were recorded by ``python -m tests.conformance`` with launch 1.0.7 (humble), 3.4.3 (jazzy) and
-3.7.1 (rolling). With the sources of real launch at hand (``real_launch.py``) they are checked against it again.
+3.7.1 (rolling). With the sources of real launch at hand (``upstream.py``) they are checked against it again.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from . import case_files, our_launch, real_launch
+from . import case_files, our_launch, upstream
 from .case_files import DISTROS, Case
 
 CASES = case_files.load_all()
@@ -45,10 +45,10 @@ def test_every_case_has_an_expectation_of_its_own() -> None:
 @pytest.mark.real_launch
 @pytest.mark.parametrize("distro", DISTROS)
 def test_the_expectations_are_real_launchs(distro: str) -> None:
-    if real_launch.sources(distro) is None:
+    if upstream.sources(distro) is None:
         pytest.skip(f"no sources of real launch for {distro}")
     recorded = [case for case in CASES if case.expected(distro) is not None]
-    answers = real_launch.run_all(recorded, distro)
+    answers = upstream.run_all(recorded, distro)
     different = {
         _named(case): (answer, case.expected(distro))
         for case, answer in zip(recorded, answers, strict=True)
