@@ -64,8 +64,12 @@ void carry_out(const Job& job, uint32_t domain) {
       continue;
     }
     const std::string& topic = words.at(1);
-    const bool allowed =
-        words.at(0) == "publish" ? participant.publish(topic) : participant.subscribe(topic);
+    const auto attempt = [&] {
+      return words.at(0) == "publish" ? participant.publish(topic) : participant.subscribe(topic);
+    };
+    // Permissions refuse every time. Once in some ten thousand endpoints Fast DDS 2.9.1 on a busy machine failed
+    // for another reason: only a repeated refusal counts.
+    const bool allowed = attempt() || attempt();
     answer(job.label, words.at(0), topic, verdict(allowed));
   }
 }
