@@ -96,7 +96,7 @@ def provision(
 
     Raises ``ManifestError`` for a plan with problems (nothing is written then) and ``ProvisionError``.
     """
-    from enclave_launch.secured import ProvisionedLaunch, provision_policies
+    from enclave_launch.secured import ProvisionedLaunch, file_stamp, provision_policies
     from enclave_launch.security_environment import SecuritySettings, environment_domains
     from keystore.provisioning import ProvisionOptions
 
@@ -105,8 +105,10 @@ def provision(
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
     wanted = chosen.keystore or ProvisionOptions(domains=environment_domains(os.environ))
-    report = provision_policies(settings, plan.derived.policy.enclaves, wanted)
-    return ProvisionedLaunch(plan, settings, report, wanted)
+    enclaves = plan.derived.policy.enclaves
+    stamps = {enclave.path: file_stamp(settings.keystore, enclave.path) for enclave in enclaves}
+    report = provision_policies(settings, enclaves, wanted)
+    return ProvisionedLaunch(plan, settings, report, wanted, stamps)
 
 
 def run(

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from enclave_launch.errors import ProvisionError
 from enclave_launch.plan import LaunchPlan, PlannedProcess
@@ -27,15 +27,20 @@ from keystore.errors import KeystoreError
 from keystore.policy import EnclavePolicy
 from keystore.provisioning import ProvisionOptions, ProvisionReport, provision, what_is_wrong
 
+Stamp = tuple[tuple[str, int, int, int], ...]
+"""What any change to an enclave's files changes: name, inode, size and change time (which nobody can set back)."""
+
 
 @dataclass(frozen=True, slots=True)
 class ProvisionedLaunch:
-    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it."""
+    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it. ``stamps``: the
+    files of each enclave as they were just before provisioning looked at them."""
 
     plan: LaunchPlan
     settings: SecuritySettings
     report: ProvisionReport
     options: ProvisionOptions
+    stamps: Mapping[str, Stamp] = field(default_factory=dict)
 
     @property
     def secret_variables(self) -> frozenset[str]:
@@ -54,13 +59,29 @@ def provision_policies(
         raise ProvisionError(str(error)) from error
 
 
+def file_stamp(keystore: str, enclave: str) -> Stamp:
+    """Empty for an enclave that is not there."""
+    try:
+        with os.scandir(os.path.join(keystore, layout.enclave_directory(enclave))) as entries:
+            files = [
+                (entry.name, entry.stat()) for entry in entries if not entry.is_dir(follow_symlinks=False)
+            ]
+    except OSError:
+        return ()
+    return tuple(sorted((name, status.st_ino, status.st_size, status.st_ctime_ns) for name, status in files))
+
+
 class PlanProvider:
     """Lets processes start whose enclave is what was provisioned, and hands out what rcl reads."""
 
     def __init__(self, launch: ProvisionedLaunch):
         self._launch = launch
-        self._seen: dict[str, tuple[EnclavePolicy, tuple[tuple[str, int, int, int], ...]]] = {}
         self._follow(launch.plan)
+        self._seen = {
+            path: (policy, launch.stamps[path])
+            for path, policy in self._policies.items()
+            if launch.stamps.get(path)
+        }
 
     @property
     def plan(self) -> LaunchPlan:
@@ -119,10 +140,9 @@ class PlanProvider:
 
         Nodes that share an enclave, and restarts, pay for a look at its files only while nobody touches those.
         """
-        enclave = policy.path
-        if self._seen.get(enclave) == (policy, self._files(enclave)):
+        enclave, keystore = policy.path, self._launch.settings.keystore
+        if self._seen.get(enclave) == (policy, file_stamp(keystore, enclave)):
             return
-        keystore = self._launch.settings.keystore
         try:
             wrong = what_is_wrong(keystore, policy, options=self._launch.options)
         except KeystoreError as error:
@@ -134,22 +154,7 @@ class PlanProvider:
                 f"enclave {enclave} in {keystore} is no longer what was provisioned for this launch: "
                 f"{'; '.join(wrong)}. {_who_changed_it(wrong)}"
             )
-        self._seen[enclave] = (policy, self._files(enclave))
-
-    def _files(self, enclave: str) -> tuple[tuple[str, int, int, int], ...]:
-        """What any change to the enclave's files changes: name, inode, size and change time (which nobody can set back)
-        of each."""
-        directory = os.path.join(self._launch.settings.keystore, layout.enclave_directory(enclave))
-        try:
-            with os.scandir(directory) as entries:
-                files = [
-                    (entry.name, entry.stat()) for entry in entries if not entry.is_dir(follow_symlinks=False)
-                ]
-        except OSError:
-            return ()
-        return tuple(
-            sorted((name, status.st_ino, status.st_size, status.st_ctime_ns) for name, status in files)
-        )
+        self._seen[enclave] = (policy, file_stamp(keystore, enclave))
 
     def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
         variables = dict(secured_environment(planned, self._launch.settings))
