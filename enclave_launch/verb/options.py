@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-DISTROS = ("humble", "jazzy", "kilted", "lyrical", "rolling")
+from enclave_launch.evaluation.distro import Distro
 
 DESCRIPTION = """\
 Launch a ROS 2 launch file (XML, YAML or Python), with or without ROS installed.
@@ -177,7 +177,7 @@ def _add_evaluation(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--distro",
-        choices=DISTROS,
+        choices=[distro.value for distro in Distro],
         help="ROS distribution to behave like (default: ROS_DISTRO, else the newest)",
     )
     group.add_argument(
