@@ -15,9 +15,9 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from keystore import certificate
-from keystore.certificate import CertificateFacts
-from keystore.der import DerError
-from keystore.errors import DamagedKeystore, InvalidInput, SigningUnavailable
+from keystore.certificate import CertificateFacts, read_certificate
+from keystore.errors import InvalidInput, SigningUnavailable
+from keystore.role import Role
 from keystore.signer import FileSigner, Secret, Signer
 from keystore.validity import Validity
 
@@ -25,13 +25,6 @@ if TYPE_CHECKING:
     from cryptography import x509
 
     from keystore.signer import PrivateKey, PublicKey
-
-
-class Role(str, Enum):
-    """Which CA; the value is the stem of its file names."""
-
-    IDENTITY = "identity_ca"
-    PERMISSIONS = "permissions_ca"
 
 
 class Curve(str, Enum):
@@ -60,22 +53,6 @@ def authority_of(cert_pem: bytes, signer: Signer, place: str) -> Authority:
     if spki(signer.public_key()) != facts.public_key:
         raise SigningUnavailable(f"{place} and the private key beside it do not belong together")
     return Authority(facts, signer)
-
-
-def read_certificate(pem: bytes, place: str) -> CertificateFacts:
-    """The first certificate of a PEM file; raises DamagedKeystore naming ``place``."""
-    try:
-        return certificate.read_pem(pem)
-    except DerError as error:
-        raise DamagedKeystore(f"{place} is no usable certificate: {error}") from None
-
-
-def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
-    """Every certificate of a PEM file (a trust bundle during a CA roll-over)."""
-    try:
-        return [certificate.read_der(block) for block in certificate.pem_blocks(pem)]
-    except DerError as error:
-        raise DamagedKeystore(f"{place} is no usable certificate: {error}") from None
 
 
 def spki(key: PublicKey) -> bytes:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 from keystore import der
+from keystore.errors import DamagedKeystore
 from keystore.validity import Validity
 
 _COMMON_NAME = der.object_identifier("2.5.4.3")
@@ -108,6 +109,22 @@ def read_der(data: bytes) -> CertificateFacts:
         return _read(data)
     except (IndexError, ValueError) as error:
         raise error if isinstance(error, der.DerError) else der.DerError(str(error)) from error
+
+
+def read_certificate(pem: bytes, place: str) -> CertificateFacts:
+    """The first certificate of a PEM file; raises DamagedKeystore naming ``place``."""
+    try:
+        return read_pem(pem)
+    except der.DerError as error:
+        raise DamagedKeystore(f"{place} is no usable certificate: {error}") from None
+
+
+def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
+    """Every certificate of a PEM file (a trust bundle during a CA roll-over)."""
+    try:
+        return [read_der(block) for block in pem_blocks(pem)]
+    except der.DerError as error:
+        raise DamagedKeystore(f"{place} is no usable certificate: {error}") from None
 
 
 def _read(data: bytes) -> CertificateFacts:

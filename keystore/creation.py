@@ -15,11 +15,13 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from keystore import authority, layout, lock, safe_files, smime, store
-from keystore.authority import Authority, Curve, Role
+from keystore.authority import Authority, Curve
+from keystore.certificate import read_certificate
 from keystore.domains import Domains
 from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printable
 from keystore.governance import Governance, governance_document, parse_governance
 from keystore.governance_file import covers, governance_stands
+from keystore.role import Role
 from keystore.settings import Settings
 from keystore.signer import CaAccess, FileSigner, Secret, open_signer
 from keystore.store import Content, Store
@@ -175,7 +177,7 @@ def authority_kind(made: Authority) -> str:
 
 
 def _refuse_other_ca(opened: Store, role: Role, imported: ImportedCa) -> None:
-    given = authority.read_certificate(_read_given(imported.certificate), printable(imported.certificate))
+    given = read_certificate(_read_given(imported.certificate), printable(imported.certificate))
     if given.der != KeystoreView(opened.root).ca(role).der:
         raise InvalidInput(
             f"the keystore has another {role.value} already; a CA is replaced with: "
@@ -241,7 +243,7 @@ def check_can_serve(certificate_der: bytes, role: Role, now: datetime, place: st
         extensions = cert.extensions
     except (ValueError, x509.UnsupportedGeneralNameType, x509.DuplicateExtension):
         raise InvalidInput(f"{place} is no usable certificate") from None
-    facts = authority.read_certificate(authority.pem_certificate(certificate_der), place)
+    facts = read_certificate(authority.pem_certificate(certificate_der), place)
     if not facts.validity.covers(now):
         raise InvalidInput(f"{place} is not valid now")
     try:

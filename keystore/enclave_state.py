@@ -17,10 +17,10 @@ from datetime import datetime
 from enum import Enum
 
 from keystore import certificate, layout, safe_files, smime
-from keystore.authority import Role
 from keystore.certificate import CertificateFacts
 from keystore.der import DerError
 from keystore.errors import DamagedKeystore, UnsafeKeystore, printable
+from keystore.role import Role
 from keystore.subject import SubjectScheme, common_name, subject_name
 from keystore.validity import Validity
 from keystore.view import KeystoreView

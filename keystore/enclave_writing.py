@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from keystore import layout, safe_files, store
-from keystore.authority import Authority, IdentityIssuer, Role
+from keystore.authority import Authority, IdentityIssuer
 from keystore.creation import sign_document
 from keystore.enclave_state import EnclaveState, Identity, PermissionsSource
 from keystore.errors import DamagedKeystore, InvalidInput, KeystoreError, printable
@@ -17,6 +17,7 @@ from keystore.identity import certify, new_identity, public_half
 from keystore.permissions import permissions_document
 from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.policy import EnclavePolicy
+from keystore.role import Role
 from keystore.store import Batch, Content, Link, Store
 from keystore.subject import SubjectScheme, borrowable, cannot_be_told_apart, common_name, subject_name
 from keystore.superseded import Superseded
@@ -84,7 +85,7 @@ class EnclaveWriter:
             )
 
     def _present_name(self, enclave: str) -> str:
-        from keystore.authority import read_certificate
+        from keystore.certificate import read_certificate
 
         relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
         pem = safe_files.read_if_there(self._view.root, relative)

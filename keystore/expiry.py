@@ -9,9 +9,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from keystore import certificate, der, layout, safe_files, smime
-from keystore.authority import Role
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import DamagedKeystore, InvalidInput, printable
+from keystore.role import Role
 from keystore.validity import Validity, later, parse_moment, utc_now
 from keystore.view import KeystoreView, resolve_root
 

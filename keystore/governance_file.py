@@ -5,9 +5,9 @@ from __future__ import annotations
 import re
 
 from keystore import layout, safe_files, smime
-from keystore.authority import Role
 from keystore.domains import Domains
 from keystore.errors import DamagedKeystore, printable
+from keystore.role import Role
 from keystore.view import KeystoreView
 
 _IDS = re.compile(rb"<id>\s*(\d{1,3})\s*</id>|<min>\s*(\d{1,3})\s*</min>\s*<max>\s*(\d{1,3})\s*</max>")

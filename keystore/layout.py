@@ -10,8 +10,8 @@ All paths here are POSIX text relative to the keystore, so that they read the sa
 
 from __future__ import annotations
 
-from keystore.authority import Role
 from keystore.enclave_name import segments, validate_enclave_name
+from keystore.role import Role
 
 PUBLIC, PRIVATE, ENCLAVES = "public", "private", "enclaves"
 STAGING = ".staging"

@@ -10,7 +10,6 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore import store
-from keystore.authority import Role
 from keystore.creation import CreateOptions, complete, renew_governance
 from keystore.enclave_name import check_distinct
 from keystore.enclave_state import EnclaveState
@@ -25,6 +24,7 @@ from keystore.provisioning import (
     inspect_wish,
 )
 from keystore.revocation import renew_crl
+from keystore.role import Role
 from keystore.store import Store
 from keystore.superseded import remember
 from keystore.validity import DEFAULT_LIFETIME, Validity

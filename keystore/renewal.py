@@ -16,7 +16,6 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from keystore import certificate, layout, rollover, safe_files, store
-from keystore.authority import Role
 from keystore.certificate import CertificateFacts
 from keystore.creation import install_incoming, mirror_governance
 from keystore.der import DerError
@@ -26,6 +25,7 @@ from keystore.enclaves import keep
 from keystore.errors import InvalidInput, printable
 from keystore.provisioning import ProvisionOptions, ProvisionReport, Wish, bring_about, with_domains
 from keystore.revocation import renew_crl, revoke_replaced
+from keystore.role import Role
 from keystore.store import Store
 from keystore.subject import SubjectScheme, scheme_of
 from keystore.validity import utc_now

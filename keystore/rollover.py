@@ -23,13 +23,15 @@ from enum import Enum
 from pathlib import Path
 
 from keystore import authority, layout, safe_files, store
-from keystore.authority import Authority, Role, pem_certificate
+from keystore.authority import Authority, pem_certificate
+from keystore.certificate import read_certificate
 from keystore.copies import refresh_copies
 from keystore.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
 from keystore.enclaves import keep
 from keystore.errors import InvalidInput
 from keystore.provisioning import ProvisionOptions, ProvisionReport, Wish, bring_about, with_domains
 from keystore.revocation import drop_crl
+from keystore.role import Role
 from keystore.store import Content, Store
 from keystore.validity import Validity, utc_now
 from keystore.view import KeystoreView, resolve_root
@@ -122,7 +124,7 @@ def _switch(opened: Store, role: Role, options: ProvisionOptions, now: datetime,
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
     key = safe_files.read_private(opened.root, f"{_waiting(role)}/{layout.KEY}")
     bundle = new
-    if authority.read_certificate(new, _waiting(role)).der != view.ca(role).der:
+    if read_certificate(new, _waiting(role)).der != view.ca(role).der:
         old = retire(opened, role)
         bundle = new if role is Role.IDENTITY and view.has_crl else new + old
         put_incoming(opened, role, bundle, layout.KEY, key)

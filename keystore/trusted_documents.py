@@ -10,9 +10,9 @@ import os
 from collections.abc import Iterator
 
 from keystore import layout, safe_files, smime
-from keystore.authority import Role, read_certificates
-from keystore.certificate import CertificateFacts
+from keystore.certificate import CertificateFacts, read_certificates
 from keystore.errors import printable
+from keystore.role import Role
 from keystore.view import KeystoreView
 
 

@@ -12,8 +12,8 @@ from functools import cached_property
 from pathlib import Path
 
 from keystore import layout, safe_files
-from keystore.authority import Authority, Role, authority_of, read_certificates
-from keystore.certificate import CertificateFacts
+from keystore.authority import Authority, authority_of
+from keystore.certificate import CertificateFacts, read_certificates
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import (
     DamagedKeystore,
@@ -23,6 +23,7 @@ from keystore.errors import (
     StorageError,
     printable,
 )
+from keystore.role import Role
 from keystore.settings import Settings
 from keystore.signer import CaAccess, open_signer
 

@@ -39,10 +39,11 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.authority import Curve, Role
+    from keystore.authority import Curve
     from keystore.creation import CreateOptions, ImportedCa, create_keystore
     from keystore.domains import Domains
     from keystore.governance_yaml import load_governance_yaml
+    from keystore.role import Role
     from keystore.subject import SubjectScheme
     from keystore.validity import DEFAULT_LIFETIME, parse_end, utc_now
 

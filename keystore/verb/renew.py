@@ -69,8 +69,8 @@ def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> Provisio
 
 
 def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
-    from keystore.authority import Role
     from keystore.errors import InvalidInput
+    from keystore.role import Role
     from keystore.rollover import Step, roll_over
 
     if arguments.enclaves:

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from keystore import certificate, layout, safe_files, smime
-from keystore.authority import Role
 from keystore.certificate import CertificateFacts
 from keystore.der import DerError
 from keystore.enclave_state import key_matches
@@ -16,6 +15,7 @@ from keystore.identity import public_half
 from keystore.permissions_read import Grant, parse_permissions
 from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.public_key import key_kind
+from keystore.role import Role
 from keystore.signer import load_private_key
 from keystore.subject import (
     SubjectScheme,

@@ -8,9 +8,9 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from keystore import layout, safe_files
-from keystore.authority import Role
 from keystore.enclave_name import check_distinct, validate_enclave_name
 from keystore.errors import InvalidEnclaveName, printable
+from keystore.role import Role
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 

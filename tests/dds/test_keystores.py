@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 import keystore
-from keystore.authority import Role
 from keystore.domains import Domains
 from keystore.governance import DomainRule, Governance, Protection, TopicRule
+from keystore.role import Role
 from keystore.rollover import Step, roll_over
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe

@@ -15,11 +15,11 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from keystore.authority import Role
 from keystore.creation import CreateOptions, create_keystore
 from keystore.errors import KeystoreError
 from keystore.renewal import RenewOptions, renew
 from keystore.revocation import RemoveOptions, remove
+from keystore.role import Role
 from keystore.rollover import Step, roll_over
 from tests.keystore.kit import filled, options
 

@@ -12,9 +12,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keystore import authority, certificate, der
-from keystore.authority import Authority, Curve, IdentityIssuer, Role
+from keystore.authority import Authority, Curve, IdentityIssuer
 from keystore.errors import InvalidInput, SigningUnavailable
 from keystore.identity import new_identity
+from keystore.role import Role
 from keystore.validity import Validity
 from tests.keystore.kit import DAY, NOW, openssl
 

@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from keystore import authority
-from keystore.authority import Authority, Curve, Role
+from keystore.authority import Authority, Curve
 from keystore.creation import CreateOptions, ImportedCa, create_keystore
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, NotAKeystore, SigningUnavailable
 from keystore.governance import DomainRule, Governance, Protection
 from keystore.provisioning import provision
+from keystore.role import Role
 from keystore.signer import CaAccess, FileSigner, Secret
 from keystore.validity import Validity
 from keystore.verification import verify

@@ -11,12 +11,12 @@ from pathlib import Path
 import pytest
 
 from keystore import authority
-from keystore.authority import Role
 from keystore.creation import ImportedCa
 from keystore.errors import InvalidInput, SigningUnavailable
 from keystore.pkcs11_signer import Pkcs11Signer, parse_uri
 from keystore.provisioning import provision
 from keystore.revocation import RemoveOptions, remove
+from keystore.role import Role
 from keystore.signer import CaAccess, Secret
 from keystore.validity import Validity, utc_now
 from keystore.verification import verify

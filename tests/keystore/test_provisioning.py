@@ -14,13 +14,13 @@ from pathlib import Path
 import pytest
 
 from keystore import layout
-from keystore.authority import Role
 from keystore.domains import Domains
 from keystore.enclaves import apply_policy, create_enclave, list_enclaves
 from keystore.errors import InvalidEnclaveName, InvalidInput, NotAKeystore, UnsafeKeystore
 from keystore.permissions_read import parse_permissions
 from keystore.policy import EnclavePolicy, Policy
 from keystore.provisioning import provision
+from keystore.role import Role
 from keystore.subject import SubjectScheme
 from keystore.trusted_documents import trusted_document
 from keystore.verification import verify

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from keystore import layout
-from keystore.authority import Role, read_certificates
+from keystore.certificate import read_certificates
 from keystore.creation import CreateOptions
 from keystore.enclaves import create_enclave, list_enclaves
 from keystore.errors import DamagedKeystore, InvalidInput
@@ -16,6 +16,7 @@ from keystore.permissions_read import parse_permissions
 from keystore.provisioning import provision
 from keystore.renewal import RenewOptions, renew
 from keystore.revocation import RemoveOptions, remove
+from keystore.role import Role
 from keystore.rollover import Step, roll_over
 from keystore.trusted_documents import trusted_document
 from keystore.verification import Severity, verify

@@ -13,9 +13,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keystore import authority, certificate, smime
-from keystore.authority import Authority, Curve, IdentityIssuer, Role
+from keystore.authority import Authority, Curve, IdentityIssuer
 from keystore.errors import DamagedKeystore, InvalidInput
 from keystore.identity import new_identity
+from keystore.role import Role
 from keystore.signer import FileSigner, load_private_key
 from keystore.validity import Validity
 from tests.keystore.kit import DAY, NOW, openssl

@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from keystore import smime
-from keystore.authority import Role
 from keystore.domains import Domains
 from keystore.errors import NotAKeystore
 from keystore.permissions import permissions_document
 from keystore.provisioning import provision
+from keystore.role import Role
 from keystore.signer import CaAccess
 from keystore.validity import Validity
 from keystore.verification import Severity, verify
