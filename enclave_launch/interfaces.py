@@ -7,8 +7,8 @@ ament index, manifests and Python sources; next is the plan.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 from enclave_launch.errors import ManifestError
 from enclave_launch.plan import Found, Missing
@@ -26,8 +26,7 @@ _CONTAINER_NODE_NAME = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class _Subject:
+class _Subject(NamedTuple):
     """What is asked for: an executable or a plugin of a package."""
 
     package: str | None
@@ -38,17 +37,14 @@ class _Subject:
         return f"{self.package or '(no package)'}/{self.executable or self.plugin}"
 
 
-@dataclass
 class InterfaceFinder:
     """Answers for one launch, each question once. ``infer``: look at the source of nodes without a manifest."""
 
-    prefixes: Sequence[str]
-    manifests: Sequence[Path] = ()
-    infer: bool = True
-    _known: dict[_Subject, Found | Missing] = field(default_factory=dict)
-
-    def __post_init__(self) -> None:
-        self._lookup = ManifestLookup(self.prefixes, self.manifests)
+    def __init__(self, prefixes: Sequence[str], manifests: Sequence[Path] = (), infer: bool = True) -> None:
+        self._prefixes = prefixes
+        self._may_infer = infer
+        self._lookup = ManifestLookup(prefixes, manifests)
+        self._known: dict[_Subject, Found | Missing] = {}
 
     def __call__(self, started: ResolvedProcess | ResolvedComponent) -> Found | Missing:
         """Raises ``ManifestError`` for manifests that are broken or contradict each other."""
@@ -75,12 +71,12 @@ class InterfaceFinder:
 
     def _infer(self, subject: _Subject, manifest: Lookup) -> Found | Missing:
         searched = "looked at " + ", ".join(manifest.searched)
-        if not self.infer or subject.package is None:
+        if not self._may_infer or subject.package is None:
             return Missing(str(subject), f"{searched}; {_NEXT_STEP}")
         from nodl.infer.executable import infer_executable
 
         inferred = infer_executable(
-            subject.package, executable=subject.executable, plugin=subject.plugin, prefixes=self.prefixes
+            subject.package, executable=subject.executable, plugin=subject.plugin, prefixes=self._prefixes
         )
         if not inferred.interfaces:
             return Missing(str(subject), f"{searched}; {inferred.why}; {_NEXT_STEP}")

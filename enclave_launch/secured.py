@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import NamedTuple
 
 from enclave_launch.errors import ProvisionError
 from enclave_launch.plan import LaunchPlan, PlannedProcess
@@ -31,8 +32,7 @@ Stamp = tuple[tuple[str, int, int, int], ...]
 """What any change to an enclave's files changes: name, inode, size and change time (which nobody can set back)."""
 
 
-@dataclass(frozen=True, slots=True)
-class ProvisionedLaunch:
+class ProvisionedLaunch(NamedTuple):
     """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it. ``stamps``: the
     files of each enclave as they were just before provisioning looked at them."""
 
@@ -40,7 +40,7 @@ class ProvisionedLaunch:
     settings: SecuritySettings
     report: ProvisionReport
     options: ProvisionOptions
-    stamps: Mapping[str, Stamp] = field(default_factory=dict)
+    stamps: Mapping[str, Stamp]
 
     @property
     def secret_variables(self) -> frozenset[str]:

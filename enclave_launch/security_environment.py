@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from enclave_launch.enclave import Reason
 from enclave_launch.errors import UsageError
@@ -35,8 +35,7 @@ def environment_domains(environment: Mapping[str, str]) -> Domains:
     return Domains.single(int(text))
 
 
-@dataclass(frozen=True, slots=True)
-class SecuritySettings:
+class SecuritySettings(NamedTuple):
     """``keystore``: absolute path of the keystore's root (rcl appends ``enclaves`` itself)."""
 
     keystore: str

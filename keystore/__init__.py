@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from keystore.bundle import PublicFiles as PublicFiles
     from keystore.bundle import export as export
+    from keystore.ca_access import CaAccess as CaAccess
+    from keystore.ca_access import Secret as Secret
     from keystore.creation import CreateOptions as CreateOptions
     from keystore.creation import CreateReport as CreateReport
     from keystore.creation import ImportedCa as ImportedCa
@@ -43,8 +45,6 @@ if TYPE_CHECKING:
     from keystore.revocation import remove as remove
     from keystore.rollover import Step as Step
     from keystore.rollover import roll_over as roll_over
-    from keystore.signer import CaAccess as CaAccess
-    from keystore.signer import Secret as Secret
     from keystore.subject import SubjectScheme as SubjectScheme
     from keystore.verification import Finding as Finding
     from keystore.verification import Severity as Severity
@@ -76,8 +76,8 @@ _HOMES = {
     "remove": "revocation",
     "Step": "rollover",
     "roll_over": "rollover",
-    "CaAccess": "signer",
-    "Secret": "signer",
+    "CaAccess": "ca_access",
+    "Secret": "ca_access",
     "Expiry": "expiry",
     "StatusReport": "expiry",
     "expires_soon": "expiry",

@@ -15,10 +15,11 @@ from enum import Enum
 from typing import TYPE_CHECKING
 
 from keystore import certificate
+from keystore.ca_access import Secret
 from keystore.certificate import CertificateFacts, read_certificate
 from keystore.errors import InvalidInput, SigningUnavailable
 from keystore.role import Role
-from keystore.signer import FileSigner, Secret, Signer
+from keystore.signer import FileSigner, Signer
 from keystore.validity import Validity
 
 if TYPE_CHECKING:

@@ -129,9 +129,7 @@ def _enclave_files(view: KeystoreView, enclave: str, public: PublicFiles) -> Ite
         )
     key = safe_files.read_private(view.root, f"{directory}/{layout.KEY}")
     yield ExportedFile(f"{directory}/{layout.KEY}", store.PRIVATE_MODE, key)
-    links = layout.enclave_links(enclave)
-    if view.has_crl:
-        links[layout.ENCLAVE_CRL] = layout.crl_link(enclave)
+    links = layout.enclave_links(enclave, crl=view.has_crl)
     if public is PublicFiles.COPY and enclave == "/":
         links[layout.ENCLAVE_GOVERNANCE] = ""
     for name, target in links.items():

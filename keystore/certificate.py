@@ -6,8 +6,8 @@ warm path of a launch, and finding out which subject an enclave already has.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from functools import cached_property
+from functools import lru_cache
+from typing import NamedTuple
 
 from keystore import der
 from keystore.errors import DamagedKeystore
@@ -24,51 +24,42 @@ _EXTENSIONS = 0xA3
 _BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
 
 
-@dataclass(frozen=True)
-class CertificateFacts:
-    """``issuer``, ``subject`` and ``public_key`` are DER. Extensions are read when first asked for: most
-    questions before a launch do not concern them."""
+class CertificateFacts(NamedTuple):
+    """``issuer``, ``subject`` and ``public_key`` are DER. Extensions are read when asked for: most questions
+    before a launch do not concern them."""
 
-    der: bytes = field(repr=False)
+    der: bytes
     serial: int
-    issuer: bytes = field(repr=False)
-    subject: bytes = field(repr=False)
+    issuer: bytes
+    subject: bytes
     common_name: str | None
     name_parts: int
     validity: Validity
-    public_key: bytes = field(repr=False)
-    extensions: bytes = field(repr=False)
+    public_key: bytes
+    extensions: bytes
     """DER of the Extensions sequence, empty without any."""
 
-    @cached_property
-    def _by_oid(self) -> dict[bytes, bytes]:
-        """Unreadable extensions count as absent: the cautious reading, a certificate that may do anything."""
-        try:
-            return _extensions(self.extensions)
-        except der.DerError:
-            return {}
+    def __repr__(self) -> str:
+        return f"CertificateFacts({self.common_name!r}, serial={self.serial})"
 
-    @cached_property
+    @property
     def subject_key_id(self) -> bytes | None:
-        try:
-            return der.parse(self._by_oid[_SUBJECT_KEY_ID]).content
-        except (KeyError, der.DerError):
-            return None
+        return _subject_key_id(self.extensions)
 
-    @cached_property
+    @property
     def authority_key_id(self) -> bytes | None:
         """The keyIdentifier [0] of AuthorityKeyIdentifier."""
         try:
-            parts = der.parse(self._by_oid[_AUTHORITY_KEY_ID]).children()
+            parts = der.parse(_by_oid(self.extensions)[_AUTHORITY_KEY_ID]).children()
         except (KeyError, der.DerError):
             return None
         return next((part.content for part in parts if part.tag == 0x80), None)
 
-    @cached_property
+    @property
     def can_sign_mail(self) -> bool:
         """Whether OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
         try:
-            return _can_sign_mail(self._by_oid)
+            return _can_sign_mail(_by_oid(self.extensions))
         except der.DerError:
             return True
 
@@ -130,7 +121,6 @@ def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
 def _read(data: bytes) -> CertificateFacts:
     fields = der.parse(data).expect(der.SEQUENCE).children()[0].children()
     _, serial, _, issuer, validity, subject, public_key, *rest = fields
-    not_before, not_after = validity.children()
     names = [part for group in subject.children() for part in group.children()]
     holder = next((part for part in rest if part.tag == _EXTENSIONS), None)
     return CertificateFacts(
@@ -140,10 +130,32 @@ def _read(data: bytes) -> CertificateFacts:
         subject=subject.whole,
         common_name=_common_name(names),
         name_parts=len(names),
-        validity=Validity(der.time_value(not_before), der.time_value(not_after)),
+        validity=_validity(validity.whole),
         public_key=public_key.whole,
         extensions=holder.content if holder is not None else b"",
     )
+
+
+@lru_cache(maxsize=64)  # enclaves that were made together have the same
+def _validity(sequence: bytes) -> Validity:
+    not_before, not_after = der.parse(sequence).children()
+    return Validity(der.time_value(not_before), der.time_value(not_after))
+
+
+@lru_cache(maxsize=8)  # the CAs', which are compared with those of every enclave
+def _subject_key_id(extensions: bytes) -> bytes | None:
+    try:
+        return der.parse(_by_oid(extensions)[_SUBJECT_KEY_ID]).content
+    except (KeyError, der.DerError):
+        return None
+
+
+def _by_oid(extensions: bytes) -> dict[bytes, bytes]:
+    """Unreadable extensions count as absent: the cautious reading, a certificate that may do anything."""
+    try:
+        return _extensions(extensions)
+    except der.DerError:
+        return {}
 
 
 def _extensions(sequence: bytes) -> dict[bytes, bytes]:

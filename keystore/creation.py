@@ -16,6 +16,7 @@ from pathlib import Path
 
 from keystore import authority, layout, lock, safe_files, smime, store
 from keystore.authority import Authority, Curve
+from keystore.ca_access import CaAccess, Secret
 from keystore.certificate import read_certificate
 from keystore.domains import Domains
 from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printable
@@ -23,7 +24,7 @@ from keystore.governance import Governance, governance_document, parse_governanc
 from keystore.governance_file import covers, governance_stands
 from keystore.role import Role
 from keystore.settings import Settings
-from keystore.signer import CaAccess, FileSigner, Secret, open_signer
+from keystore.signer import FileSigner, open_signer
 from keystore.store import Content, Store
 from keystore.subject import SubjectScheme
 from keystore.trusted_documents import trusted_document

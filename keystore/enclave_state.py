@@ -12,9 +12,9 @@ import os
 import shlex
 import stat
 from collections.abc import Callable
-from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
+from typing import NamedTuple
 
 from keystore import certificate, layout, safe_files, smime
 from keystore.certificate import CertificateFacts
@@ -41,9 +41,11 @@ class Identity(Enum):
     PAIR = "pair"  # no key: both anew
 
 
-@dataclass(frozen=True, slots=True)
-class EnclaveState:
-    """``reasons`` are for reports; all empty and GOOD means nothing to do."""
+class EnclaveState(NamedTuple):
+    """``reasons`` are for reports; all empty and GOOD means nothing to do.
+
+    ``validity``: from when until when certificate and permissions hold, where they were seen to say the same.
+    """
 
     enclave: str
     identity: Identity
@@ -52,6 +54,7 @@ class EnclaveState:
     links: tuple[str, ...]
     lax_key: bool
     reasons: tuple[str, ...]
+    validity: Validity | None = None
 
     @property
     def is_good(self) -> bool:
@@ -70,23 +73,26 @@ def inspect(
     Raises UnsafeKeystore for links, owners and modes that let others in.
     """
     directory = layout.enclave_directory(enclave)
+    wanted_links = layout.enclave_links(enclave, crl=view.has_crl)
     if not _is_there(view, directory):
-        links = tuple(_wanted_links(view, enclave))
-        return EnclaveState(enclave, Identity.PAIR, None, True, links, False, (NEW,))
+        return EnclaveState(enclave, Identity.PAIR, None, True, tuple(wanted_links), False, (NEW,))
     reasons: list[str] = []
     lax = _key_mode(view, directory)
     identity, facts = _identity(view, enclave, directory, now, due, reasons)
     if lax:
         reasons.append("the private key was readable by others")
-    permissions = identity is not Identity.GOOD or not _permissions_stand(
-        view, directory, facts, wanted, reasons
-    )
+    validity = None
+    permissions = identity is not Identity.GOOD or facts is None
+    if identity is Identity.GOOD and facts is not None and facts.common_name is not None:
+        expected = wanted(subject_name(facts.common_name), facts.validity)
+        permissions = not _permissions_stand(view, directory, expected, reasons)
+        validity = facts.validity if expected is not None and not permissions else None
     links = tuple(
-        name for name in _wanted_links(view, enclave) if not _link_stands(view, enclave, directory, name)
+        name for name, target in wanted_links.items() if not _link_stands(view, f"{directory}/{name}", target)
     )
     if links and reasons != [NEW]:
         reasons.append(f"{', '.join(links)} missing or out of step")
-    return EnclaveState(enclave, identity, facts, permissions, links, lax is True, tuple(reasons))
+    return EnclaveState(enclave, identity, facts, permissions, links, lax is True, tuple(reasons), validity)
 
 
 def _is_there(view: KeystoreView, directory: str) -> bool:
@@ -149,7 +155,9 @@ def _certificate_problem(
 ) -> str | None:
     if facts is None:
         return "the certificate cannot be read"
-    if facts.common_name not in {common_name(enclave, scheme) for scheme in SubjectScheme} | {enclave}:
+    if facts.common_name != enclave and all(
+        facts.common_name != common_name(enclave, scheme) for scheme in SubjectScheme
+    ):
         return "the certificate names another subject"
     if not facts.names_issuer(view.ca(Role.IDENTITY)):
         return "the certificate is by another CA"
@@ -189,14 +197,11 @@ def _key_matches_slowly(key_pem: bytes, facts: CertificateFacts) -> bool:
 
 
 def _permissions_stand(
-    view: KeystoreView,
-    directory: str,
-    facts: CertificateFacts | None,
-    wanted: PermissionsSource,
-    reasons: list[str],
+    view: KeystoreView, directory: str, expected: bytes | None, reasons: list[str]
 ) -> bool:
+    """Whether exactly ``expected`` is signed by our CA, None: whatever it is."""
     signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
-    if signed is None or facts is None or facts.common_name is None:
+    if signed is None:
         reasons.append("no permissions")
         return False
     try:
@@ -207,27 +212,23 @@ def _permissions_stand(
     if not present.embeds(view.ca(Role.PERMISSIONS).der):
         reasons.append("the permissions are signed by another CA")
         return False
-    expected = wanted(subject_name(facts.common_name), facts.validity) or present.document
-    if present.document != expected:
+    document = present.document
+    if expected is not None and document != expected:
         reasons.append(OTHER_PERMISSIONS)
         return False
     twin = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS_XML}")
     # A deployed enclave has none: nothing reads it but people.
-    if twin is None or twin.replace(b"\r\n", b"\n") == present.document:
+    if twin is None or twin.replace(b"\r\n", b"\n") == document:
         return True
     reasons.append("permissions.xml differs from what is signed")
     return False
 
 
-def _wanted_links(view: KeystoreView, enclave: str) -> list[str]:
-    links = list(layout.enclave_links(enclave))
-    return [*links, layout.ENCLAVE_CRL] if view.has_crl else links
-
-
-def _link_stands(view: KeystoreView, enclave: str, directory: str, name: str) -> bool:
-    relative = f"{directory}/{name}"
-    target = safe_files.link_target(view.root, relative)
-    if target is not None:
-        return target in safe_files.allowed_targets(relative)
+def _link_stands(view: KeystoreView, relative: str, target: str) -> bool:
+    """A link to ``target``, or what a file system without links has instead: a copy."""
+    present = safe_files.link_target(view.root, relative)
+    if present is not None:
+        return present == target
     copy = safe_files.read_if_there(view.root, relative)
+    name = relative.rpartition("/")[2]
     return copy is not None and copy == safe_files.read_if_there(view.root, layout.link_source(name))

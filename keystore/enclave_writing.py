@@ -107,7 +107,7 @@ class EnclaveWriter:
         entries: dict[str, Content | Link] = {}
         actions: list[str] = []
         named = self._identity(state, entries, actions)
-        links = layout.enclave_links(state.enclave) | {layout.ENCLAVE_CRL: layout.crl_link(state.enclave)}
+        links = layout.enclave_links(state.enclave, crl=True)
         for name in state.links:
             entries[name] = Link(links[name], layout.link_source(name))
         if state.permissions:

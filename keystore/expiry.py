@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import NamedTuple
 
 from keystore import certificate, der, layout, safe_files, smime
+from keystore.crl_file import crl_validity
 from keystore.enclave_name import validate_enclave_name
-from keystore.errors import DamagedKeystore, InvalidInput, printable
+from keystore.errors import DamagedKeystore, InvalidInput
 from keystore.role import Role
 from keystore.validity import Validity, later, parse_moment, utc_now
 from keystore.view import KeystoreView, resolve_root
@@ -18,8 +19,7 @@ from keystore.view import KeystoreView, resolve_root
 _DATES = re.compile(rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_")
 
 
-@dataclass(frozen=True, slots=True)
-class Expiry:
+class Expiry(NamedTuple):
     """``what``: ``identity CA``, ``permissions CA``, ``certificate``, ``permissions`` or ``CRL``; ``enclave``
     for the two that belong to one."""
 
@@ -28,19 +28,19 @@ class Expiry:
     enclave: str | None
     not_before: datetime
 
-    def ends_within(self, now: datetime, margin: timedelta) -> bool:
-        return self.not_after <= later(now, margin)
-
     def is_valid(self, now: datetime) -> bool:
         return self.not_before <= now <= self.not_after
+
+    def is_due(self, now: datetime, limit: datetime) -> bool:
+        """It has ended or has not begun at ``now``, or ends by ``limit``."""
+        return self.not_after <= limit or not self.is_valid(now)
 
     @property
     def subject(self) -> str:
         return f"{self.what} of {self.enclave}" if self.enclave else self.what
 
 
-@dataclass(frozen=True, slots=True)
-class StatusReport:
+class StatusReport(NamedTuple):
     """``expiries``: everything with an end, the earliest first."""
 
     keystore: Path
@@ -50,16 +50,17 @@ class StatusReport:
 
     def due(self, margin: timedelta) -> tuple[Expiry, ...]:
         """What has ended, has not begun, or ends within ``margin``."""
-        return tuple(
-            one for one in self.expiries if one.ends_within(self.now, margin) or not one.is_valid(self.now)
-        )
+        limit = later(self.now, margin)
+        return tuple(one for one in self.expiries if one.is_due(self.now, limit))
 
 
 def status(keystore: Path | str, *, now: datetime | None = None) -> StatusReport:
     """Raises NotAKeystore, DamagedKeystore for what cannot be read."""
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
-    return _report(view, view.enclaves(), now or utc_now())
+    names = view.enclaves()
+    ordered = sorted(_expiries(view, names, {}), key=_order)
+    return StatusReport(view.root, now or utc_now(), tuple(names), tuple(ordered))
 
 
 def expires_soon(
@@ -67,28 +68,40 @@ def expires_soon(
     within: timedelta,
     *,
     enclaves: Iterable[str] | None = None,
+    known: Mapping[str, Validity] | None = None,
     now: datetime | None = None,
 ) -> tuple[Expiry, ...]:
-    """What ends within ``within`` (or has ended), for the CAs and these enclaves (None: all)."""
+    """What ends within ``within`` (or has ended), for the CAs and these enclaves (None: all).
+
+    ``known``: enclaves that need not be read again, with the validity of their certificate and permissions, as
+    ``ProvisionReport.validities`` gives them.
+    """
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     names = view.enclaves() if enclaves is None else [validate_enclave_name(name) for name in enclaves]
-    return _report(view, names, now or utc_now()).due(within)
+    moment = now or utc_now()
+    limit = later(moment, within)
+    due = [one for one in _expiries(view, names, known or {}) if one.is_due(moment, limit)]
+    return tuple(sorted(due, key=_order))
 
 
-def _report(view: KeystoreView, names: list[str], now: datetime) -> StatusReport:
-    ordered = sorted(_expiries(view, names), key=lambda one: (one.not_after, one.what, one.enclave or ""))
-    return StatusReport(view.root, now, tuple(names), tuple(ordered))
+def _order(one: Expiry) -> tuple[datetime, str, str]:
+    return one.not_after, one.what, one.enclave or ""
 
 
-def _expiries(view: KeystoreView, names: Iterable[str]) -> Iterator[Expiry]:
+def _expiries(
+    view: KeystoreView, names: Iterable[str], known: Mapping[str, Validity]
+) -> Iterator[Expiry]:
     for role in Role:
         for ca in view.ca_bundle(role):
             yield _expiry(role.value.replace("_ca", " CA"), None, ca.validity)
     if view.has_crl:
         yield _expiry("CRL", None, crl_validity(view))
     for name in names:
-        yield from _enclave_expiries(view, name)
+        if name in known:
+            yield from (_expiry(what, name, known[name]) for what in ("certificate", "permissions"))
+        else:
+            yield from _enclave_expiries(view, name)
 
 
 def _enclave_expiries(view: KeystoreView, name: str) -> Iterator[Expiry]:
@@ -115,16 +128,3 @@ def _permissions_validity(signed: bytes, place: str) -> Validity:
         return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))
     except (KeyError, UnicodeDecodeError, InvalidInput):
         raise DamagedKeystore(f"{place} states no validity") from None
-
-
-def crl_validity(view: KeystoreView) -> Validity:
-    """thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1)."""
-    pem = safe_files.read(view.root, layout.CRL)
-    place = printable(view.root / layout.CRL)
-    try:
-        body = pem.split(b"-----BEGIN X509 CRL-----")[1].split(b"-----END")[0]
-        fields = der.parse(der.from_base64(body)).children()[0].children()
-        times = [part for part in fields if part.tag in (der.UTC_TIME, der.GENERALIZED_TIME)]
-        return Validity(der.time_value(times[0]), der.time_value(times[1]))
-    except (IndexError, der.DerError):
-        raise DamagedKeystore(f"{place} is no CRL with an end") from None

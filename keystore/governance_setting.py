@@ -6,13 +6,13 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from keystore import layout, lock, safe_files, store
+from keystore.ca_access import CaAccess
 from keystore.copies import refresh_copies
 from keystore.creation import write_governance
 from keystore.errors import DamagedKeystore
 from keystore.governance import Governance, governance_document
 from keystore.governance_file import governance_stands, signed_governance
 from keystore.role import Role
-from keystore.signer import CaAccess
 from keystore.validity import utc_now
 from keystore.view import KeystoreView, resolve_root
 

@@ -10,6 +10,9 @@ All paths here are POSIX text relative to the keystore, so that they read the sa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache
+
 from keystore.enclave_name import segments, validate_enclave_name
 from keystore.role import Role
 
@@ -58,17 +61,28 @@ def enclave_directory(enclave: str) -> str:
     return "/".join((ENCLAVES, *segments(validate_enclave_name(enclave))))
 
 
-def enclave_links(enclave: str) -> dict[str, str]:
-    """Link name -> relative target of an enclave directory; the root enclave shares ``governance.p7s``."""
-    depth = len(segments(enclave))
+def enclave_links(enclave: str, *, crl: bool = False) -> dict[str, str]:
+    """Link name -> relative target of an enclave directory; the root enclave shares ``governance.p7s``.
+
+    ``crl``: with the link that each enclave has once the keystore revokes something.
+    """
+    links = dict(_links(len(segments(enclave))))
+    if not crl:
+        del links[ENCLAVE_CRL]
+    return links
+
+
+@cache  # a keystore has enclaves by the hundred at a few depths
+def _links(depth: int) -> Mapping[str, str]:
     links = {f"{role.value}.cert.pem": "../" * (depth + 1) + ca_cert(role) for role in Role}
     if depth:
         links[ENCLAVE_GOVERNANCE] = "../" * depth + "governance.p7s"
+    links[ENCLAVE_CRL] = "../" * (depth + 1) + CRL
     return links
 
 
 def crl_link(enclave: str) -> str:
-    return "../" * (len(segments(enclave)) + 1) + CRL
+    return _links(len(segments(enclave)))[ENCLAVE_CRL]
 
 
 def link_source(name: str) -> str:

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
+from keystore.ca_access import Secret
 from keystore.errors import InvalidInput, SigningUnavailable
-from keystore.signer import Secret
 
 if TYPE_CHECKING:
     from keystore.signer import PublicKey

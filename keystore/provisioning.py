@@ -14,18 +14,18 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from keystore import layout
+from keystore.ca_access import CaAccess
+from keystore.crl_file import crl_validity
 from keystore.domains import Domains
 from keystore.enclave_name import validate_enclave_name
 from keystore.enclave_state import EnclaveState, Identity, PermissionsSource, inspect
 from keystore.errors import InvalidInput, NotAKeystore, printable
-from keystore.expiry import crl_validity
 from keystore.governance_file import governance_domains, governance_stands
 from keystore.permissions import permissions_document
 from keystore.policy import EnclavePolicy
-from keystore.signer import CaAccess
 from keystore.subject import SubjectScheme
 from keystore.validity import DEFAULT_BACKDATE, Validity, later, utc_now
 from keystore.view import KeystoreView, resolve_root
@@ -63,25 +63,24 @@ class ProvisionOptions:
     now: datetime | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Wish:
+class Wish(NamedTuple):
     """What one enclave should have: these permissions, and at least this renewal of its identity."""
 
     permissions: PermissionsSource
     identity: Identity = Identity.GOOD
 
 
-@dataclass(frozen=True, slots=True)
-class EnclaveReport:
-    """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; or none."""
+class EnclaveReport(NamedTuple):
+    """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; or none. ``validity``: of
+    certificate and permissions, where they were found to stand."""
 
     enclave: str
     actions: tuple[str, ...]
     reasons: tuple[str, ...] = ()
+    validity: Validity | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ProvisionReport:
+class ProvisionReport(NamedTuple):
     keystore: Path
     created: tuple[str, ...]
     """What was done to the keystore itself, in words."""
@@ -91,6 +90,11 @@ class ProvisionReport:
     @property
     def changed(self) -> bool:
         return bool(self.created) or any(report.actions for report in self.enclaves)
+
+    @property
+    def validities(self) -> Mapping[str, Validity]:
+        """Of the enclaves that were found to stand."""
+        return {report.enclave: report.validity for report in self.enclaves if report.validity is not None}
 
 
 def provision(
@@ -157,8 +161,8 @@ def bring_about(root: Path, wishes: Mapping[str, Wish], options: ProvisionOption
     now = options.now or utc_now()
     view = KeystoreView(root)
     if view.is_complete:
-        if not _interrupted(root) and _all_stand(view, wishes, options, now):
-            return ProvisionReport(root, (), tuple(EnclaveReport(name, ()) for name in wishes))
+        if not _interrupted(root) and (states := _standing(view, wishes, options, now)) is not None:
+            return ProvisionReport(root, (), tuple(as_found(state) for state in states))
     elif not options.create:
         raise NotAKeystore(
             f"{printable(root)} is not a complete keystore, and creating it was forbidden; "
@@ -175,12 +179,23 @@ def _interrupted(root: Path) -> bool:
     return os.path.lexists(root / layout.INCOMING)
 
 
-def _all_stand(
+def as_found(state: EnclaveState) -> EnclaveReport:
+    """Nothing was done."""
+    return EnclaveReport(state.enclave, (), (), state.validity)
+
+
+def _standing(
     view: KeystoreView, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
-) -> bool:
-    states = (inspect_wish(view, name, wish, options, now) for name, wish in wishes.items())
-    stand = governance_stands(view, options.domains) and _crl_stands(view, now)
-    return stand and all(state.is_good for state in states)
+) -> list[EnclaveState] | None:
+    """None unless everything is as wished."""
+    if not (governance_stands(view, options.domains) and _crl_stands(view, now)):
+        return None
+    states = []
+    for name, wish in wishes.items():
+        states.append(inspect_wish(view, name, wish, options, now))
+        if not states[-1].is_good:
+            return None
+    return states
 
 
 def _crl_stands(view: KeystoreView, now: datetime) -> bool:
@@ -194,4 +209,4 @@ def inspect_wish(
     state = inspect(view, enclave, wish.permissions, now, later(now, options.renew_within))
     if wish.identity is Identity.GOOD or state.identity is Identity.PAIR:
         return state
-    return replace(state, identity=wish.identity, permissions=True, reasons=(*state.reasons, "asked for"))
+    return state._replace(identity=wish.identity, permissions=True, reasons=(*state.reasons, "asked for"))

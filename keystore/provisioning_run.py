@@ -21,6 +21,7 @@ from keystore.provisioning import (
     ProvisionOptions,
     ProvisionReport,
     Wish,
+    as_found,
     inspect_wish,
 )
 from keystore.revocation import renew_crl
@@ -101,7 +102,7 @@ def _write_all(
     now: datetime,
 ) -> tuple[EnclaveReport, ...]:
     """In batches: bounded loss when interrupted, few calls to make it durable."""
-    reports = {state.enclave: EnclaveReport(state.enclave, ()) for state in states}
+    reports = {state.enclave: as_found(state) for state in states}
     todo = [state for state in states if not state.is_good]
     for start in range(0, len(todo), _BATCH):
         part = todo[start : start + _BATCH]

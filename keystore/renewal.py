@@ -77,7 +77,7 @@ def renew(
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
             count = revoke_replaced(opened, changed, provisioning.access, now)
         repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
-    return replace(report, created=(*repaired, *report.created))
+    return report._replace(created=(*repaired, *report.created))
 
 
 def _refuse_unknown(root: Path, named: list[str] | None) -> None:

@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING
 
 from keystore import certificate, layout, lock, safe_files, store
 from keystore.authority import IdentityIssuer
+from keystore.ca_access import CaAccess
+from keystore.crl_file import crl_validity
 from keystore.der import DerError
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import DamagedKeystore, InvalidInput, printable
-from keystore.expiry import crl_validity
 from keystore.role import Role
-from keystore.signer import CaAccess
 from keystore.store import Link, Store
 from keystore.superseded import serials_of
 from keystore.validity import later, utc_now

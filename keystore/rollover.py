@@ -70,7 +70,7 @@ def roll_over(
         return ProvisionReport(root, tuple(text for text in done if text), ())
     wishes = {name: Wish(keep) for name in KeystoreView(root).enclaves()}
     report = bring_about(root, wishes, with_domains(root, chosen))
-    return replace(report, created=(*(text for text in done if text), *report.created))
+    return report._replace(created=(*(text for text in done if text), *report.created))
 
 
 def _start(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:

@@ -101,9 +101,7 @@ def allowed_targets(relative: str) -> tuple[str, ...]:
     if not relative.startswith(layout.ENCLAVES + "/") or name not in layout.ENCLAVE_FILES:
         return ()
     enclave = "/" + directory.removeprefix(layout.ENCLAVES).lstrip("/")
-    if name == layout.ENCLAVE_CRL:
-        return (layout.crl_link(enclave),)
-    target = layout.enclave_links(enclave).get(name)
+    target = layout.enclave_links(enclave, crl=True).get(name)
     return (target,) if target else ()
 
 

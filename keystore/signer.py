@@ -8,22 +8,17 @@ passphrases stay inside these objects: no ``repr``, message or attribute shows t
 
 from __future__ import annotations
 
-import os
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from keystore.errors import InvalidInput, SigningUnavailable, printable
+from keystore.errors import SigningUnavailable
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric import ec, rsa
 
+    from keystore.ca_access import CaAccess, Secret
+
     PublicKey = ec.EllipticCurvePublicKey | rsa.RSAPublicKey
     PrivateKey = ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey
-
-_MAX_SECRET = 1023  # what OpenSSL takes for an encrypted key
-
 
 class Signer(Protocol):
     """Signs with SHA-256: ECDSA in DER form, or RSA PKCS#1 v1.5, after the kind of ``public_key()``."""
@@ -32,54 +27,6 @@ class Signer(Protocol):
 
     def sign(self, data: bytes) -> bytes:
         """The signature over ``data``; raises SigningUnavailable."""
-
-
-@dataclass(frozen=True, slots=True)
-class Secret:
-    """A passphrase or PIN by reference: exactly one of a file, an open descriptor or an environment variable.
-
-    Never given on the command line, where every user of the machine could read it.
-    """
-
-    file: Path | None = None
-    descriptor: int | None = None
-    variable: str | None = None
-    _read: list[bytes] = field(default_factory=list, repr=False, compare=False)
-
-    def value(self) -> bytes:
-        """The secret without its trailing newline, read once; raises InvalidInput."""
-        if not self._read:
-            self._read.append(self._fetch())
-        return self._read[0]
-
-    def _fetch(self) -> bytes:
-        try:
-            if self.file is not None:
-                content = self.file.read_bytes()[: _MAX_SECRET + 3]
-            elif self.descriptor is not None:
-                content = _read_all(self.descriptor)
-            else:
-                content = os.fsencode(os.environ[self.variable or ""])
-        except (OSError, KeyError, ValueError, OverflowError) as error:
-            reason = error.strerror if isinstance(error, OSError) else "not set"
-            raise InvalidInput(f"cannot read the passphrase from {self._place()}: {reason}") from None
-        content = content.removesuffix(b"\n").removesuffix(b"\r")
-        if not content or len(content) > _MAX_SECRET:
-            raise InvalidInput(f"the passphrase in {self._place()} is empty or over {_MAX_SECRET} bytes")
-        return content
-
-    def _place(self) -> str:
-        if self.file is not None:
-            return printable(self.file)
-        return f"descriptor {self.descriptor}" if self.descriptor is not None else f"${self.variable}"
-
-
-def _read_all(descriptor: int) -> bytes:
-    """To its end: a pipe may give the secret in pieces."""
-    content = b""
-    while len(content) <= _MAX_SECRET + 2 and (piece := os.read(descriptor, _MAX_SECRET + 3)):
-        content += piece
-    return content
 
 
 class FileSigner:
@@ -154,13 +101,3 @@ def open_signer(reference: bytes, place: str, access: CaAccess) -> Signer:
             reference.split()[0].decode("ascii", "replace"), access.pin, access.environment
         )
     return FileSigner(load_private_key(reference, access.passphrase, place))
-
-
-@dataclass(frozen=True, slots=True)
-class CaAccess:
-    """How to get at the CA keys, for every function that signs."""
-
-    passphrase: Secret | None = None
-    pin: Secret | None = None
-    environment: Mapping[str, str] = field(default_factory=lambda: os.environ, repr=False)
-    """Where PKCS11_MODULE_PATH is looked up when a ``pkcs11:`` URI names no module."""

@@ -14,16 +14,15 @@ canonicalise line ends, so the file itself may be stored with either.
 from __future__ import annotations
 
 import binascii
-from dataclasses import dataclass, field
 from datetime import datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from keystore import der
 from keystore.errors import DamagedKeystore, InvalidInput
-from keystore.signer import Signer
 
 if TYPE_CHECKING:
     from keystore.certificate import CertificateFacts
+    from keystore.signer import Signer
 
 _TEXT_HEADER = b"Content-Type: text/plain\r\n\r\n"
 _SHA256 = der.encode(der.SEQUENCE, der.object_identifier("2.16.840.1.101.3.4.2.1"))
@@ -115,13 +114,12 @@ def _multipart(content: bytes, pkcs7: bytes) -> bytes:
     ))  # fmt: skip
 
 
-@dataclass(frozen=True, slots=True)
-class SignedDocument:
+class SignedDocument(NamedTuple):
     """A ``.p7s`` taken apart, nothing checked yet."""
 
-    content: bytes = field(repr=False)
+    content: bytes
     """The signed bytes in canonical form: text/plain header and CRLF line ends."""
-    pkcs7: bytes = field(repr=False)
+    pkcs7: bytes
 
     @property
     def document(self) -> bytes:
@@ -180,8 +178,7 @@ def check(signed: SignedDocument, authorities: list[CertificateFacts], place: st
     raise DamagedKeystore(f"{place}: signed by someone who is not the permissions CA of this keystore")
 
 
-@dataclass(frozen=True, slots=True)
-class _SignerInfo:
+class _SignerInfo(NamedTuple):
     issuer: bytes
     serial: int
     attributes: bytes

@@ -8,8 +8,8 @@ and no promise of an expiry more precise than that on Fast DDS.
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from datetime import datetime, timedelta, timezone
+from typing import NamedTuple
 
 from keystore.errors import InvalidInput, printable
 
@@ -25,24 +25,24 @@ _UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days", "w": "weeks
 _DURATION = re.compile(r"([0-9]{1,6})([smhdwy])\Z")
 
 
-@dataclass(frozen=True, slots=True)
-class Validity:
-    """Both ends in UTC, whole seconds (X.509 has no fractions), ``not_after`` capped to 2262-04-11."""
-
+class _Ends(NamedTuple):
     not_before: datetime
     not_after: datetime
 
-    def __post_init__(self) -> None:
-        for name in ("not_before", "not_after"):
-            moment: datetime = getattr(self, name)
-            if moment.tzinfo is None:
-                raise ValueError(f"{name} needs a time zone")
-            whole = moment.astimezone(timezone.utc).replace(microsecond=0)
-            object.__setattr__(self, name, min(whole, LATEST))
-        if self.not_after <= self.not_before:
-            raise InvalidInput(
-                f"a validity ends ({iso(self.not_after)}) before it begins ({iso(self.not_before)})"
-            )
+
+class Validity(_Ends):
+    """Both ends in UTC, whole seconds (X.509 has no fractions), ``not_after`` capped to 2262-04-11.
+
+    Raises InvalidInput when it would end before it begins.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, not_before: datetime, not_after: datetime) -> Validity:
+        begin, end = _whole("not_before", not_before), _whole("not_after", not_after)
+        if end <= begin:
+            raise InvalidInput(f"a validity ends ({iso(end)}) before it begins ({iso(begin)})")
+        return super().__new__(cls, begin, end)
 
     @classmethod
     def starting(
@@ -72,6 +72,12 @@ class Validity:
 
     def covers(self, now: datetime) -> bool:
         return self.not_before <= now <= self.not_after
+
+
+def _whole(name: str, moment: datetime) -> datetime:
+    if moment.tzinfo is None:
+        raise ValueError(f"{name} needs a time zone")
+    return min(moment.astimezone(timezone.utc).replace(microsecond=0), LATEST)
 
 
 def later(now: datetime, span: timedelta) -> datetime:

@@ -10,9 +10,9 @@ import os
 import shlex
 from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from keystore import layout, safe_files
-from keystore.authority import Authority, authority_of
 from keystore.certificate import CertificateFacts, read_certificates
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import (
@@ -24,8 +24,11 @@ from keystore.errors import (
     printable,
 )
 from keystore.role import Role
-from keystore.settings import Settings
-from keystore.signer import CaAccess, open_signer
+
+if TYPE_CHECKING:
+    from keystore.authority import Authority
+    from keystore.ca_access import CaAccess
+    from keystore.settings import Settings
 
 _OWN_ENTRIES = frozenset({
     layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS,
@@ -68,6 +71,8 @@ class KeystoreView:
 
     @cached_property
     def settings(self) -> Settings:
+        from keystore.settings import Settings
+
         text = safe_files.read_if_there(self.root, layout.SETTINGS)
         return Settings.from_json(text, str(self.root / layout.SETTINGS)) if text is not None else Settings()
 
@@ -99,6 +104,9 @@ class KeystoreView:
 
     def authority(self, role: Role, access: CaAccess) -> Authority:
         """The CA ready to sign; raises SigningUnavailable where its key is not, or does not open."""
+        from keystore.authority import authority_of
+        from keystore.signer import open_signer
+
         name = self.key_file(role)
         if name is None:
             raise SigningUnavailable(
@@ -110,7 +118,7 @@ class KeystoreView:
         cert = safe_files.read(self.root, layout.ca_cert(role))
         return authority_of(cert, signer, printable(self.root / layout.ca_cert(role)))
 
-    @property
+    @cached_property
     def has_crl(self) -> bool:
         return os.path.lexists(self.root / layout.CRL)
 

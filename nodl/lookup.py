@@ -16,9 +16,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import NamedTuple
 
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
 from nodl.document import RESOURCE_TYPE, V1_SUFFIX, ManifestNode, read_document, resource_key
@@ -26,8 +26,7 @@ from nodl.errors import ConflictingNoDLError
 from nodl.node_interface import NodeInterface
 
 
-@dataclass(frozen=True, slots=True)
-class Lookup:
+class Lookup(NamedTuple):
     """``found`` is empty when no document describes the executable; ``searched`` says where we looked."""
 
     found: tuple[NodeInterface, ...]
@@ -103,8 +102,7 @@ def find_node_interfaces(
     return ManifestLookup(prefixes, manifests).find(package, executable=executable, plugin=plugin)
 
 
-@dataclass(frozen=True, slots=True)
-class _Package:
+class _Package(NamedTuple):
     nodes: tuple[ManifestNode, ...]
     searched: tuple[str, ...]
 

@@ -61,7 +61,7 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
     options = _with_our_defaults(args)
     plan = resolve(path, arguments, options=resolve_options(options))
     launch = provision(plan, args.keystore, options=security_options(options))
-    _say(*plan.warnings, *launch.report.warnings, *expiry_notices(str(args.keystore), plan, args.warn_expiry))
+    _say(*plan.warnings, *launch.report.warnings, *expiry_notices(launch, args.warn_expiry))
     gate = PlannedGate(
         plan.evaluation.processes,
         plan.evaluation.components,

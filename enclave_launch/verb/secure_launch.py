@@ -200,7 +200,7 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int
     _warn(plan.warnings)
     _check_before_keys_are_made(plan)
     launch = provision(plan, keystore, options=security_options(options))
-    _warn((*launch.report.warnings, *expiry_notices(keystore, plan, options.warn_expiry)))
+    _warn((*launch.report.warnings, *expiry_notices(launch, options.warn_expiry)))
     return run(launch, options=_run_settings(options))
 
 

@@ -8,13 +8,13 @@ from collections.abc import Iterator
 
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.options import SecurityOptions
-from enclave_launch.plan import LaunchPlan
+from enclave_launch.secured import ProvisionedLaunch
 from enclave_launch.security_environment import environment_domains
+from keystore.ca_access import CaAccess, Secret
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError
 from keystore.expiry import expires_soon
 from keystore.provisioning import ProvisionOptions
-from keystore.signer import CaAccess, Secret
 from keystore.subject import SubjectScheme
 from keystore.validity import parse_duration, parse_end, utc_now
 
@@ -57,11 +57,12 @@ def _passphrase(options: argparse.Namespace) -> Secret | None:
     return None
 
 
-def expiry_notices(keystore: str, plan: LaunchPlan, margin: str) -> Iterator[str]:
-    """What of this launch ends within ``margin`` (a duration such as ``30d``), one line each."""
-    enclaves = [enclave.path for enclave in plan.derived.policy.enclaves]
+def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
+    """What of ``launch`` ends within ``margin`` (a duration such as ``30d``), one line each."""
+    keystore, known = launch.settings.keystore, launch.report.validities
+    enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]
     try:
-        due = expires_soon(keystore, parse_duration(margin), enclaves=enclaves)
+        due = expires_soon(keystore, parse_duration(margin), enclaves=enclaves, known=known)
     except InvalidInput as error:
         raise UsageError(str(error)) from error
     except KeystoreError as error:

@@ -17,8 +17,8 @@ from keystore.errors import InvalidInput
 from keystore.validity import parse_duration, parse_end, utc_now
 
 if TYPE_CHECKING:
+    from keystore.ca_access import CaAccess
     from keystore.provisioning import ProvisionOptions, ProvisionReport
-    from keystore.signer import CaAccess
 
 DEFAULT_LOCK_TIMEOUT = 30.0
 _BAR_WIDTH = 30
@@ -83,14 +83,14 @@ def add_subjects(parser: argparse.ArgumentParser) -> None:
 
 
 def access(arguments: argparse.Namespace) -> CaAccess:
-    from keystore.signer import CaAccess, Secret
+    from keystore.ca_access import CaAccess, Secret
 
     given = vars(arguments)
     passphrase = Secret(given["passphrase_file"], given["passphrase_fd"], given["passphrase_env"])
     pin = Secret(file=given["pin_file"], variable=given["pin_env"])
     return CaAccess(
-        passphrase=passphrase if passphrase != Secret() else None,
-        pin=pin if pin != Secret() else None,
+        passphrase=passphrase if passphrase.is_given else None,
+        pin=pin if pin.is_given else None,
     )
 
 

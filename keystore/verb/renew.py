@@ -9,7 +9,6 @@ first CA of a file, so its participants must take 'switch' together.
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from keystore.verb import common
@@ -83,4 +82,4 @@ def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> Prov
         Step.SWITCH: "deploy (Cyclone DDS: to all at once), then: --ca finish",
         Step.FINISH: "deploy; the old CA is trusted no more",
     }
-    return replace(report, created=(*report.created, following[step]))
+    return report._replace(created=(*report.created, following[step]))

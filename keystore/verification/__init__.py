@@ -11,8 +11,8 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore import layout
+from keystore.ca_access import CaAccess
 from keystore.errors import KeystoreError, StorageError
-from keystore.signer import CaAccess
 from keystore.validity import utc_now
 from keystore.verification import repair
 from keystore.verification.authorities import check_authorities

@@ -7,14 +7,14 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from keystore import der, layout, safe_files, smime
+from keystore.ca_access import CaAccess
 from keystore.certificate import CertificateFacts
 from keystore.creation import check_can_serve
+from keystore.crl_file import crl_validity
 from keystore.errors import KeystoreError, SigningUnavailable, UnsafeKeystore
-from keystore.expiry import crl_validity
 from keystore.governance import parse_governance
 from keystore.public_key import key_kind, signature_is_valid
 from keystore.role import Role
-from keystore.signer import CaAccess
 from keystore.validity import iso
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity

@@ -181,14 +181,9 @@ class _EnclaveCheck:
             yield self.error("wrong-subject", layout.CERT, "its subject is not that of this enclave")
 
     def _links(self) -> Iterator[Finding]:
-        wanted = list(layout.enclave_links(self._enclave))
-        if self._view.has_crl:
-            wanted.append(layout.ENCLAVE_CRL)
-            if self._read(layout.ENCLAVE_CRL) is None:
-                yield self.error(
-                    "no-crl", layout.ENCLAVE_CRL, "missing: this enclave would accept revoked peers"
-                )
-        for name in wanted:
+        if self._view.has_crl and self._read(layout.ENCLAVE_CRL) is None:
+            yield self.error("no-crl", layout.ENCLAVE_CRL, "missing: this enclave would accept revoked peers")
+        for name in layout.enclave_links(self._enclave, crl=self._view.has_crl):
             relative = f"{self._directory}/{name}"
             if safe_files.link_target(self._view.root, relative) is not None:
                 continue  # the target was checked with all files

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
 
 from nodl.node_interface import NodeInterface
 
 
-@dataclass(frozen=True, slots=True)
-class ManifestNode:
+class ManifestNode(NamedTuple):
     """``version`` of NoDL (1 or 2). ``parameter_types``: declared parameters with the type as written.
 
     ``explicit_executable``: the document itself says which executable or plugin runs the node (always in
@@ -19,6 +19,6 @@ class ManifestNode:
 
     interface: NodeInterface
     version: int
-    parameter_types: Mapping[str, str] = field(default_factory=dict)
+    parameter_types: Mapping[str, str] = MappingProxyType({})
     explicit_executable: bool = True
     included: tuple[str, ...] = ()

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 
 from keystore import lock
+from keystore.ca_access import Secret
 from keystore.creation import create_keystore
 from keystore.errors import DamagedKeystore, InvalidInput, UnsafeKeystore
 from keystore.governance_yaml import parse_governance_yaml
 from keystore.provisioning import provision
-from keystore.signer import Secret
 from keystore.store import opened
 from keystore.validity import parse_end
 from keystore.verb import main

@@ -11,13 +11,14 @@ import pytest
 
 from keystore import authority
 from keystore.authority import Authority, Curve
+from keystore.ca_access import CaAccess, Secret
 from keystore.creation import CreateOptions, ImportedCa, create_keystore
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, NotAKeystore, SigningUnavailable
 from keystore.governance import DomainRule, Governance, Protection
 from keystore.provisioning import provision
 from keystore.role import Role
-from keystore.signer import CaAccess, FileSigner, Secret
+from keystore.signer import FileSigner
 from keystore.validity import Validity
 from keystore.verification import verify
 from keystore.view import KeystoreView
@@ -170,13 +171,14 @@ def test_passphrases_from_descriptor_and_environment(monkeypatch: pytest.MonkeyP
         Secret(variable="NOT_SET").value()
 
 
-def test_no_key_material_in_representations() -> None:
+def test_no_key_material_in_representations(monkeypatch: pytest.MonkeyPatch) -> None:
     signer = authority.new_key(Curve.P256)
     secret = Secret(variable="X")
-    secret._read.append(SENTENCE)
+    monkeypatch.setenv("X", SENTENCE.decode())
+    assert secret.value() == SENTENCE
     made = authority.self_signed_ca(Role.IDENTITY, "x", signer, Validity.starting(NOW, DAY))
     shown = repr((signer, made, secret, CaAccess(passphrase=secret)))
-    assert SENTENCE.decode() not in shown and "PRIVATE" not in shown
+    assert SENTENCE.decode() not in shown and "PRIVATE" not in shown and "$X" in shown
     assert isinstance(made.signer, FileSigner)
 
 

@@ -10,6 +10,7 @@ from cryptography import x509
 
 from keystore import layout
 from keystore.bundle import export
+from keystore.ca_access import CaAccess
 from keystore.certificate import read_pem
 from keystore.enclaves import list_enclaves
 from keystore.errors import DamagedKeystore, InvalidInput
@@ -17,7 +18,6 @@ from keystore.expiry import status
 from keystore.provisioning import provision
 from keystore.renewal import RenewOptions, renew
 from keystore.revocation import RemoveOptions, remove, revoke_replaced
-from keystore.signer import CaAccess
 from keystore.store import opened
 from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot

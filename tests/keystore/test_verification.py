@@ -10,12 +10,12 @@ from pathlib import Path
 import pytest
 
 from keystore import smime
+from keystore.ca_access import CaAccess
 from keystore.domains import Domains
 from keystore.errors import NotAKeystore
 from keystore.permissions import permissions_document
 from keystore.provisioning import provision
 from keystore.role import Role
-from keystore.signer import CaAccess
 from keystore.validity import Validity
 from keystore.verification import Severity, verify
 from keystore.view import KeystoreView

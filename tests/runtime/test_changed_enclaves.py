@@ -28,8 +28,8 @@ from enclave_launch import (
 )
 from enclave_launch.process import RemapRule, ResolvedProcess
 from enclave_launch.secured import PlanProvider
+from keystore.ca_access import CaAccess, Secret
 from keystore.provisioning import ProvisionOptions, what_is_wrong
-from keystore.signer import CaAccess, Secret
 
 DEMO = Path(__file__).parents[2] / "fixtures/demo_ws"
 TALKER = '<node pkg="demo_nodes" exec="talker" name="talker"/>'
