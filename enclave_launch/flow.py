@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from enclave_launch.errors import ManifestError
@@ -45,7 +44,7 @@ def resolve(
     with ament_prefixes(evaluated.source.prefixes):
         finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
         plan = Planner(evaluated.source, finder, chosen.plan_options()).plan(evaluated.evaluation)
-    return replace(plan, warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)))
+    return plan._replace(warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)))
 
 
 def evaluate_launch(

@@ -9,7 +9,8 @@ What could not be found out is a value with a reason: a ``problem`` stops ``--se
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple
 
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope, assign_enclave
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
@@ -26,16 +27,14 @@ from enclave_launch.source_location import SourceLocation
 from nodl.node_interface import NodeInterface
 
 
-@dataclass(frozen=True, slots=True)
-class Found:
+class Found(NamedTuple):
     """The nodes of one executable or component. ``inferred``: from its source, for want of a manifest."""
 
     interfaces: tuple[NodeInterface, ...]
     inferred: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class Missing:
+class Missing(NamedTuple):
     """Nothing is known of an executable or component, and why: what was searched, what to do next."""
 
     subject: str
@@ -45,8 +44,7 @@ class Missing:
 InterfaceLookup = Callable[["ResolvedProcess | ResolvedComponent"], "Found | Missing"]
 
 
-@dataclass(frozen=True, slots=True)
-class PlannedProcess:
+class PlannedProcess(NamedTuple):
     """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes.
 
     ``inferred``: their interfaces come from the program's source, for want of a manifest.
@@ -73,8 +71,7 @@ class PlannedProcess:
         return self.process.fqn.replace(UNSPECIFIED_NODE_NAME, self.name)
 
 
-@dataclass(frozen=True, slots=True)
-class PlannedComponent:
+class PlannedComponent(NamedTuple):
     """One composable node; ``enclave`` is its container's, ``None`` when that is not part of this launch."""
 
     component: ResolvedComponent
@@ -93,8 +90,7 @@ class PlannedComponent:
         return self.component.fqn
 
 
-@dataclass(frozen=True, slots=True)
-class LaunchPlan:
+class LaunchPlan(NamedTuple):
     """What a launch file starts, in which enclaves, with which permissions.
 
     ``problems`` are what ``--secure`` refuses to start with; ``warnings`` are for the reader.
@@ -127,16 +123,14 @@ class LaunchPlan:
         return _nodes(self.processes, self.components, self.launcher)
 
 
-@dataclass(frozen=True, slots=True)
-class PlanOptions:
+class PlanOptions(NamedTuple):
     """``enclave_scope``: where processes without an ``enclave`` attribute go; ``policy``: how permissions derive."""
 
     enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
-    policy: PolicyOptions = field(default_factory=PolicyOptions)
+    policy: PolicyOptions = PolicyOptions()
 
 
-@dataclass(frozen=True, slots=True)
-class LaunchSource:
+class LaunchSource(NamedTuple):
     """What was asked for: enough to evaluate it once more, live, with the same results.
 
     ``launch_file`` and ``prefixes`` are absolute; ``launch_configurations`` are set before the file is included;
@@ -146,20 +140,18 @@ class LaunchSource:
     launch_file: str
     arguments: tuple[tuple[str, str], ...] = ()
     prefixes: tuple[str, ...] = ()
-    launch_configurations: Mapping[str, str] = field(default_factory=dict)
-    host_options: Mapping[str, object] = field(default_factory=dict)
+    launch_configurations: Mapping[str, str] = MappingProxyType({})
+    host_options: Mapping[str, object] = MappingProxyType({})
 
 
-@dataclass(frozen=True, slots=True)
-class EvaluatedLaunch:
+class EvaluatedLaunch(NamedTuple):
     """What a launch file would start, before anything is decided about enclaves."""
 
     source: LaunchSource
     evaluation: Evaluation
 
 
-@dataclass(frozen=True, slots=True)
-class Planner:
+class Planner(NamedTuple):
     """Makes the plan of one launch: assign enclaves, join interfaces with final names, derive the policy."""
 
     source: LaunchSource

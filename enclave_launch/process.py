@@ -7,8 +7,8 @@ Plain frozen values: nothing here touches the world.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from types import MappingProxyType
+from typing import Literal, NamedTuple
 
 from enclave_launch.source_location import SourceLocation
 
@@ -19,8 +19,7 @@ ParameterValue = bool | int | float | str | bytes | tuple[bool | int | float | s
 ProcessKind = Literal["node", "lifecycle_node", "container", "executable"]
 
 
-@dataclass(frozen=True, slots=True)
-class EnclaveRequest:
+class EnclaveRequest(NamedTuple):
     """What the launch file says about the enclave of one process.
 
     ``attribute``: the performed text of ``enclave=``; ``None`` when absent.
@@ -33,8 +32,7 @@ class EnclaveRequest:
     argument: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RemapRule:
+class RemapRule(NamedTuple):
     """``source:=target`` as passed to rcl, with the place it was written."""
 
     source: str
@@ -42,11 +40,10 @@ class RemapRule:
     location: SourceLocation | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class ResolvedProcess:
+class ResolvedProcess(NamedTuple):
     """One process. ``cmd`` is what would be executed, prefix included, without ``--enclave``."""
 
-    index: int  # N of the process name NAME-N
+    number: int  # N of the process name NAME-N
     kind: ProcessKind
     package: str | None
     executable: str
@@ -63,11 +60,10 @@ class ResolvedProcess:
     on_event: str | None = None
     cwd: str | None = None
     shell: bool = False
-    parameter_files: Mapping[str, str] = field(default_factory=dict)  # "<params:N>" -> YAML text
+    parameter_files: Mapping[str, str] = MappingProxyType({})  # "<params:N>" -> YAML text
 
 
-@dataclass(frozen=True, slots=True)
-class ResolvedComponent:
+class ResolvedComponent(NamedTuple):
     """One composable node, loaded into ``container`` (text as launch uses it)."""
 
     container: str
@@ -87,8 +83,7 @@ class ResolvedComponent:
         return f"{self.namespace.rstrip('/')}/{name}"
 
 
-@dataclass(frozen=True, slots=True)
-class LauncherCall:
+class LauncherCall(NamedTuple):
     """A ROS service that the launcher itself must call: loading a component, changing a state."""
 
     service: str  # final name as launch uses it
@@ -96,16 +91,14 @@ class LauncherCall:
     location: SourceLocation
 
 
-@dataclass(frozen=True, slots=True)
-class Unforeseeable:
+class Unforeseeable(NamedTuple):
     """An action that only exists once a callback has run; a dry run cannot know it."""
 
     what: str
     location: SourceLocation
 
 
-@dataclass(frozen=True, slots=True)
-class Evaluation:
+class Evaluation(NamedTuple):
     """Everything a launch file starts, in launch order: first what the visit starts, then what events start."""
 
     processes: tuple[ResolvedProcess, ...]

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import replace
 from typing import NamedTuple
 
 from enclave_launch.errors import ProvisionError
@@ -114,7 +113,7 @@ class PlanProvider:
         if (process.process_name, identity(process)) in self._by_name:
             return self.ensure(process)
         evaluation = self._plan.evaluation
-        extended = self._plan.planner.plan(replace(evaluation, processes=(*evaluation.processes, process)))
+        extended = self._plan.planner.plan(evaluation._replace(processes=(*evaluation.processes, process)))
         new = [problem for problem in extended.problems if problem not in self._plan.problems]
         if new:
             raise ProvisionError("\n".join(new))

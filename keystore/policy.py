@@ -7,8 +7,8 @@ sros2/policy/schemas/policy.xsd. Reading and writing the XML is ``keystore.polic
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from keystore.errors import InvalidInput
 
@@ -33,8 +33,7 @@ class Qualifier(str, Enum):
     DENY = "DENY"
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Rule:
+class Rule(NamedTuple):
     """``expression`` is absolute (``/a/b``), relative or private to the profile; it may hold wildcards
     only where a policy file had them."""
 
@@ -43,8 +42,7 @@ class Rule:
     expression: str
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class Profile:
+class Profile(NamedTuple):
     """The rules of one node: ``ns`` is an absolute namespace, ``node`` a node name."""
 
     ns: str
@@ -52,16 +50,14 @@ class Profile:
     rules: tuple[Rule, ...]
 
 
-@dataclass(frozen=True, slots=True, order=True)
-class EnclavePolicy:
+class EnclavePolicy(NamedTuple):
     """All that one enclave may do: the union of its profiles; DENY of any beats ALLOW of any."""
 
     path: str
     profiles: tuple[Profile, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Policy:
+class Policy(NamedTuple):
     """Enclaves sorted by path, each path once."""
 
     enclaves: tuple[EnclavePolicy, ...]

@@ -11,9 +11,9 @@ Pure; read by policy derivation and by the reports of inference.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
+from typing import NamedTuple
 
 from nodl.node_interface import ClientLibrary, EndpointKind
 
@@ -31,8 +31,7 @@ class Condition(Enum):
     TF_LISTENER = "subscribes to /tf, as a TransformListener does"
 
 
-@dataclass(frozen=True, slots=True)
-class BuiltIn:
+class BuiltIn(NamedTuple):
     """One interface under the name the client library uses; ``library`` ``None`` means all."""
 
     kind: EndpointKind

@@ -7,7 +7,7 @@ the name is then the parameter ``t``, to be filled in with what the launch file 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 Edit = tuple[str, tuple[str, ...]]
 """A method of ``str`` with its arguments: ``("strip", ("/",))``."""
@@ -17,8 +17,7 @@ EDITS = frozenset(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterPart:
+class ParameterPart(NamedTuple):
     """The value of the node's parameter ``name``; ``default`` is what the code declares, if known.
 
     ``item``: the parameter is a list and this is its element at an index, or ``"each"`` of them.
@@ -57,8 +56,7 @@ class ParameterPart:
         return text
 
 
-@dataclass(frozen=True, slots=True)
-class UnknownPart:
+class UnknownPart(NamedTuple):
     """Text that could not be determined; ``why`` is for the reader."""
 
     why: str = ""
@@ -67,8 +65,7 @@ class UnknownPart:
 Part = str | ParameterPart | UnknownPart
 
 
-@dataclass(frozen=True, slots=True)
-class NameTemplate:
+class NameTemplate(NamedTuple):
     """A name as a sequence of parts, normally a single literal."""
 
     parts: tuple[Part, ...]

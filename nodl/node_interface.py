@@ -7,8 +7,8 @@ whoever derives permissions from them no longer asks where they came from, but c
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from nodl.name_template import NameTemplate
 from nodl.source_ref import SourceRef
@@ -34,8 +34,7 @@ class Certainty(str, Enum):
     UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True, slots=True)
-class Endpoint:
+class Endpoint(NamedTuple):
     """One publisher, subscription, server or client, under the name the node's code uses.
 
     ``name`` is absolute (``/x``), relative (``x``) or private (``~/x``); nothing is expanded yet.
@@ -50,8 +49,7 @@ class Endpoint:
     written: str = ""  # the text in the source where a reader took it for another name, else empty
 
 
-@dataclass(frozen=True, slots=True)
-class Gap:
+class Gap(NamedTuple):
     """Something about the node that could not be found out, and why. Never silently dropped."""
 
     source: SourceRef
@@ -66,8 +64,7 @@ class ClientLibrary(str, Enum):
     UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True, slots=True)
-class NodeInterface:
+class NodeInterface(NamedTuple):
     """One node of an executable or component.
 
     ``name`` and ``namespace`` are the program's own defaults (what applies when launch gives none);

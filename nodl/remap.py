@@ -13,6 +13,7 @@ import re
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
 
@@ -48,8 +49,7 @@ class InvalidRemapRuleError(ValueError):
         super().__init__(f"{where}invalid remap rule {shown(rule)}: {reason}")
 
 
-@dataclass(frozen=True, slots=True)
-class ParsedRule:
+class ParsedRule(NamedTuple):
     """``node`` restricts the rule to nodes of that name; ``match`` is empty for ``__node`` and ``__ns``."""
 
     kind: RemapKind
@@ -63,8 +63,7 @@ class ParsedRule:
         return f"{self.text} ({self.origin})" if self.origin else self.text
 
 
-@dataclass(frozen=True, slots=True)
-class Resolved:
+class Resolved(NamedTuple):
     """A fully qualified name and the rules that led to it, in the order applied (mostly none or one)."""
 
     name: str
@@ -177,8 +176,7 @@ class NodeNames:
         return Resolved(self.expand(rule.replacement), (rule,))
 
 
-@dataclass(frozen=True, slots=True)
-class ActionParts:
+class ActionParts(NamedTuple):
     """Final names by part (``send_goal``, ``feedback`` ...)."""
 
     services: dict[str, Resolved]

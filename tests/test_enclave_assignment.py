@@ -14,7 +14,7 @@ def process(
     request: EnclaveRequest, fqn: str = "<node_namespace_unspecified>/talker", kind: ProcessKind = "node"
 ) -> ResolvedProcess:
     return ResolvedProcess(
-        index=1, kind=kind, package="p", executable="talker", process_name="talker-1",
+        number=1, kind=kind, package="p", executable="talker", process_name="talker-1",
         name=fqn.rpartition("/")[2], namespace=fqn.rpartition("/")[0], fqn=fqn, cmd=("talker",), remaps=(),
         parameters={}, environment={}, enclave=request, location=SourceLocation("/w/a.launch.xml", 3, "node"),
     )  # fmt: skip

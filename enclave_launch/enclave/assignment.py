@@ -16,8 +16,8 @@ Rules, from the design article "ROS 2 Security Enclaves" (section Runtime):
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import (
@@ -52,8 +52,7 @@ class Reason(str, Enum):
     LAUNCH = "one for the launch"
 
 
-@dataclass(frozen=True, slots=True)
-class EnclaveAssignment:
+class EnclaveAssignment(NamedTuple):
     """``path`` is absolute and valid for rcl; ``scope`` is what a relative attribute was resolved against."""
 
     path: str

@@ -8,7 +8,7 @@ outside of them a word with ``:=`` is still taken as a remap rule (deprecated th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 _REMAP = ("-r", "--remap")
 _PARAMETER = ("-p", "--param")
@@ -18,15 +18,13 @@ _OTHER_WITH_VALUE = ("--log-level", "--log-config-file", "--log-file-name")
 _WITH_VALUE = frozenset((*_REMAP, *_PARAMETER, *_PARAMETER_FILE, *_ENCLAVE, *_OTHER_WITH_VALUE))
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterFile:
+class ParameterFile(NamedTuple):
     """``--params-file PATH``."""
 
     path: str
 
 
-@dataclass(frozen=True, slots=True)
-class ParameterRule:
+class ParameterRule(NamedTuple):
     """``-p [NODE:]NAME:=VALUE``; ``value`` is YAML."""
 
     name: str
@@ -34,8 +32,7 @@ class ParameterRule:
     node: str | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RosArguments:
+class RosArguments(NamedTuple):
     """In command-line order. Of remap rules the first match wins, of parameters and enclaves the last."""
 
     remaps: tuple[str, ...] = ()

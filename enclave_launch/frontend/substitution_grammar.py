@@ -19,7 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 MAX_NESTING = 128  # where upstream ends in a RecursionError, too
 
@@ -113,8 +113,7 @@ def print_template(template: Template) -> str:
     return text
 
 
-@dataclass(frozen=True, slots=True)
-class _Context:
+class _Context(NamedTuple):
     """How text looks in one place of the grammar, and in the calls that stand there."""
 
     rule: str

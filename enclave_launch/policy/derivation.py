@@ -9,8 +9,8 @@ away takes exactly its permissions away. Time is linear in nodes and interfaces.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.policy.node_permissions import NodePermissions, Permission, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
@@ -39,8 +39,7 @@ Reasons = dict[Rule, list[Reason]]
 ProfileKey = tuple[str, str]  # namespace and node name
 
 
-@dataclass(frozen=True, slots=True)
-class PolicyOptions:
+class PolicyOptions(NamedTuple):
     """``accept_patterns``: partly known names become wildcards, each with a warning.
 
     ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: whether rcl remaps action
@@ -52,8 +51,7 @@ class PolicyOptions:
     actions_as_a_whole: bool | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class DerivedPolicy:
+class DerivedPolicy(NamedTuple):
     """``reasons``: enclave path -> rule (name absolute) -> why, sorted by node.
 
     ``problems`` are what ``--secure`` must refuse: a name that is not known or cannot exist.
@@ -102,15 +100,14 @@ def derive_policy(
     if chosen.policy_file is not None:
         derived = _merged(derived, chosen.policy_file)
     concerns = _size_warnings(derived.policy.enclaves)
-    return replace(derived, warnings=_unique((*derived.warnings, *concerns)))
+    return derived._replace(warnings=_unique((*derived.warnings, *concerns)))
 
 
 def _merged(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
     from enclave_launch.policy.policy_file import merge_policy_file
 
     merged = merge_policy_file(derived.policy, derived.reasons, document)
-    return replace(
-        derived,
+    return derived._replace(
         policy=merged.policy,
         reasons=merged.reasons,
         warnings=_unique((*derived.warnings, *merged.warnings)),

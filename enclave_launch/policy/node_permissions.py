@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
@@ -40,8 +40,7 @@ _PARTS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Reason:
+class Reason(NamedTuple):
     """Why a permission is there. ``place``: file:line of the manifest, source or policy, or a table row.
 
     ``written`` is the name as found there; ``rules`` the remap rules that changed it; ``note`` what else
@@ -56,15 +55,13 @@ class Reason:
     note: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Permission:
+class Permission(NamedTuple):
     operation: Operation
     name: str
     reason: Reason
 
 
-@dataclass(frozen=True, slots=True)
-class Unresolved:
+class Unresolved(NamedTuple):
     """An interface whose name is not (wholly) known: no permission follows from it. ``text`` for a person."""
 
     operation: Operation | None

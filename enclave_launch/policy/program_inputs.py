@@ -8,22 +8,22 @@ counts; where it cannot be told, the default in the source must not be believed.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import PurePath
+from types import MappingProxyType
+from typing import NamedTuple
 
 from enclave_launch.process import ResolvedProcess
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
 
 
-@dataclass(frozen=True, slots=True)
-class ProgramInputs:
+class ProgramInputs(NamedTuple):
     """``values`` by input name (``--topic``, ``-t``, ``$VARIABLE``).
 
     ``bare_words``: there are words that may be positional arguments; ``short_flags``: there are flags
     with one dash, which may be another spelling of any option.
     """
 
-    values: Mapping[str, str] = field(default_factory=dict)
+    values: Mapping[str, str] = MappingProxyType({})
     bare_words: bool = False
     short_flags: bool = False
 

@@ -11,8 +11,7 @@ the container's command line (rclcpp_components/component_manager.cpp), unless `
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
@@ -26,8 +25,7 @@ from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
 Role = Literal["node", "lifecycle_node", "container", "component", "launcher"]
 
 
-@dataclass(frozen=True, slots=True)
-class RunningNode:
+class RunningNode(NamedTuple):
     """``name`` and ``namespace`` are final; ``original_name`` is what the program calls itself."""
 
     interface: NodeInterface
@@ -39,7 +37,7 @@ class RunningNode:
     enclave: str
     location: SourceLocation
     role: Role = "node"
-    inputs: ProgramInputs = field(default_factory=ProgramInputs)
+    inputs: ProgramInputs = ProgramInputs()
 
     @property
     def fqn(self) -> str:
@@ -54,7 +52,7 @@ def node_of_process(
         process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location)
     )
     node = _named(interface, rules, process.parameters, enclave, process.location, role)
-    return replace(node, inputs=program_inputs(process))
+    return node._replace(inputs=program_inputs(process))
 
 
 def node_of_component(

@@ -38,7 +38,7 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
     namespace, _, name = fqn.rpartition("/")
     number, label = next_process_name(action, context, cmd)
     return ResolvedProcess(
-        index=number,
+        number=number,
         kind=_kind(action),
         package=_text(context, action.node_package),
         executable=_text(context, action.node_executable) or "",
@@ -62,7 +62,7 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
     description = action.process_description
     cmd = tuple(description.final_cmd)
     return ResolvedProcess(
-        index=int(description.final_name.rpartition("-")[2]),
+        number=int(description.final_name.rpartition("-")[2]),
         kind="executable",
         package=None,
         executable=first_word(cmd),

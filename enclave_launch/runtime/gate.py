@@ -8,22 +8,21 @@ process.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Protocol
+from types import MappingProxyType
+from typing import NamedTuple, Protocol
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 
 
-@dataclass(frozen=True, slots=True)
-class Grant:
+class Grant(NamedTuple):
     """What a process gets for its enclave: ``arguments`` end its command line, ``environment`` is laid
     over.
     """
 
     arguments: tuple[str, ...] = ()
-    environment: Mapping[str, str] = field(default_factory=dict)
+    environment: Mapping[str, str] = MappingProxyType({})
 
 
 class EnclaveGate(Protocol):

@@ -15,9 +15,8 @@ import socket
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.warden_channel import Message, WardenChannel
@@ -28,8 +27,7 @@ OnOutput = Callable[[Stream, bytes], None]
 CHUNK = 1 << 16  # bytes; what a Linux pipe holds by default
 
 
-@dataclass(frozen=True, slots=True)
-class ProcessSpec:
+class ProcessSpec(NamedTuple):
     """``environment`` is complete: nothing is inherited. ``shell``: the words, joined, are a shell's
     command line.
     """

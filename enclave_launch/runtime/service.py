@@ -18,10 +18,10 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AsyncExitStack, contextmanager
-from dataclasses import dataclass, field
 from datetime import datetime
 from signal import SIG_IGN, SIGHUP, SIGINT, SIGQUIT, SIGTERM, Signals, getsignal
-from typing import Any, TextIO
+from types import MappingProxyType
+from typing import Any, NamedTuple, TextIO
 
 from enclave_launch.description.launch.event_handlers import OnIncludeLaunchDescription, OnShutdown
 from enclave_launch.description.launch.events import IncludeLaunchDescription, Shutdown
@@ -39,8 +39,7 @@ from enclave_launch.runtime.ros_services import RosServices
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 
 
-@dataclass(frozen=True, slots=True)
-class RunOptions:
+class RunOptions(NamedTuple):
     """How to run; what to run is decided elsewhere.
 
     ``host_options`` go to the evaluation's host (distribution, seed of anonymous names, ...), the same as the
@@ -50,12 +49,12 @@ class RunOptions:
     noninteractive: bool = False
     debug: bool = False
     shutdown_when_idle: bool = True
-    launch_configurations: Mapping[str, str] = field(default_factory=dict)
+    launch_configurations: Mapping[str, str] = MappingProxyType({})
     screen: TextIO | None = None
     secrets: frozenset[str] = frozenset()
     notices: tuple[str, ...] = ()
     needs_ros_services: bool = False
-    host_options: Mapping[str, Any] = field(default_factory=dict)
+    host_options: Mapping[str, Any] = MappingProxyType({})
 
 
 def run_launch(

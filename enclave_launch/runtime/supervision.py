@@ -11,9 +11,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass
 from signal import SIGINT, SIGKILL, SIGTERM, Signals
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from enclave_launch.runtime.launch_log import Level
 from enclave_launch.runtime.process_tree import Child, ProcessSpec, ProcessTree, Stream
@@ -21,8 +20,7 @@ from enclave_launch.runtime.process_tree import Child, ProcessSpec, ProcessTree,
 Log = Callable[[Level, str], None]
 
 
-@dataclass(frozen=True, slots=True)
-class LifeRules:
+class LifeRules(NamedTuple):
     """Seconds throughout. ``max_retries`` below zero: no limit."""
 
     respawn: bool = False
@@ -30,8 +28,7 @@ class LifeRules:
     max_retries: int = -1
 
 
-@dataclass(frozen=True, slots=True)
-class Patience:
+class Patience(NamedTuple):
     """Seconds from SIGINT to SIGTERM, and from there to SIGKILL."""
 
     sigterm_timeout: float = 5.0
@@ -48,8 +45,7 @@ class Watcher(Protocol):
     def on_exited(self, pid: int, returncode: int) -> None: ...
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(NamedTuple):
     """How the last incarnation ended. ``returncode`` is None when none could be started."""
 
     returncode: int | None

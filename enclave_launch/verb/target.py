@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from enclave_launch.errors import UsageError
 from nodl import ament_index
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """``arguments``: name and value of each ``name:=value``, the last of a repeated name."""
 
     launch_file: str

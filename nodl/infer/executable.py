@@ -13,7 +13,7 @@ import glob
 import os
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executable_path
@@ -73,7 +73,7 @@ def _with_gaps(interfaces: list[NodeInterface], run: Run) -> tuple[NodeInterface
     """Gaps that belong to the whole program go to its first node, so that nobody overlooks them."""
     gaps = tuple(Gap(source, why) for source, why in run.findings.gaps)
     first = interfaces[0]
-    return (replace(first, gaps=(*first.gaps, *gaps)), *interfaces[1:])
+    return (first._replace(gaps=(*first.gaps, *gaps)), *interfaces[1:])
 
 
 def _is_python(path: str) -> bool:

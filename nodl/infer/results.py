@@ -6,7 +6,7 @@ Parameters stay symbolic, with what the code declares as their default; launch f
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
 from nodl.infer.text import Hole, Input, NodePart, Piece, Text
@@ -224,7 +224,7 @@ def remapped(interface: NodeInterface, rules: RemapRules) -> NodeInterface:
         if namespace is not None:
             namespace = rules.namespace(namespace, name).name
     endpoints = tuple(_remapped_endpoint(e, rules, name, namespace) for e in interface.endpoints)
-    return replace(interface, name=name, namespace=namespace, endpoints=endpoints)
+    return interface._replace(name=name, namespace=namespace, endpoints=endpoints)
 
 
 def _remapped_endpoint(
@@ -238,7 +238,7 @@ def _remapped_endpoint(
             if rule.kind in (RemapKind.NODE_NAME, RemapKind.NAMESPACE) or rule.node not in (None, name):
                 continue
             if expand_name(rule.match, namespace=namespace, node=name) == full:
-                return replace(endpoint, name=NameTemplate.literal(rule.replacement))
+                return endpoint._replace(name=NameTemplate.literal(rule.replacement))
     except InvalidNameError:
         return endpoint
     return endpoint

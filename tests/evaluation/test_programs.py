@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -33,4 +32,4 @@ def test_what_an_event_starts_may_come_later(launch_xml: Any) -> None:
     process = launch_xml('<executable cmd="no_such_program"/>').processes[0]
     with pytest.raises(LaunchFileError, match=r"main\.launch\.xml:\d+: <executable> program 'no_such_program'"):
         check_programs([process])
-    check_programs([replace(process, on_event="process exit")])
+    check_programs([process._replace(on_event="process exit")])

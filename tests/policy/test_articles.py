@@ -58,7 +58,7 @@ def process(
     cmd += ["-r", f"__ns:={namespace}"] if namespace else []
     cmd += ["-r", ":=".join(remap)] if remap else []
     return ResolvedProcess(
-        index=1,
+        number=1,
         kind="node",
         package="demo_nodes_cpp",
         executable=executable,

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import replace
 from datetime import datetime, timedelta, timezone
 from typing import Any
 
@@ -229,8 +228,8 @@ def test_names_from_parameters_follow_what_launch_sets(node: NodeMaker) -> None:
 def test_names_from_a_list_parameter_are_one_for_each_element(node: NodeMaker) -> None:
     each = node(endpoint("cam/", ParameterPart("cameras", item="each")), parameters={"cameras": ("l", "r")})
     assert declared(derive(each)) == {"publish /cam/l", "publish /cam/r"}
-    assert declared(derive(replace(each, parameters={"cameras": ()}))) == set()
-    assert len(derive(replace(each, parameters={})).problems) == 1
+    assert declared(derive(each._replace(parameters={"cameras": ()}))) == set()
+    assert len(derive(each._replace(parameters={})).problems) == 1
 
 
 def test_a_name_that_is_not_known_is_a_problem_with_its_place_and_remedy(node: NodeMaker) -> None:
@@ -395,6 +394,6 @@ def test_an_enclave_too_large_for_fast_dds_is_told_at_once(node: NodeMaker) -> N
 
 def test_renaming_a_node_renames_its_private_names_only(node: NodeMaker) -> None:
     one = node("pub ~/state", "pub state")
-    two = replace(one, name="other")
+    two = one._replace(name="other")
     assert declared(derive(one)) == {"publish /talker/state", "publish /state"}
     assert declared(derive(two)) == {"publish /other/state", "publish /state"}

@@ -20,7 +20,7 @@ HERE = SourceRef("talker.py", 9)
 
 def process(*arguments: str, environment: Mapping[str, str] | None = None) -> ResolvedProcess:
     return ResolvedProcess(
-        index=1,
+        number=1,
         kind="node",
         package="demo",
         executable="talker",

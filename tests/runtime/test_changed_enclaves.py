@@ -10,7 +10,6 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -143,8 +142,7 @@ class TestLate:
     @staticmethod
     def late(provider: PlanProvider) -> ResolvedProcess:
         first = process_of(provider)
-        return replace(
-            first,
+        return first._replace(
             process_name="talker-9",
             cmd=(*first.cmd, "-r", "chatter:=news"),
             remaps=(RemapRule("chatter", "news"),),

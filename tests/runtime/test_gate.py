@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,7 @@ from enclave_launch.source_location import SourceLocation
 PLACE = SourceLocation("demo.launch.py", 12, "node")
 
 TALKER = ResolvedProcess(
-    index=1,
+    number=1,
     kind="node",
     package="demo_nodes",
     executable="talker",
@@ -74,10 +73,10 @@ def gate(*, allow_late: bool = False) -> tuple[PlannedGate, Keystore, list[str]]
     "same",
     [
         TALKER,
-        replace(TALKER, index=7, process_name="talker-7"),
-        replace(TALKER, cmd=(*TALKER.cmd, "--params-file", "/tmp/launch_params_x")),
-        replace(TALKER, on_event="OnProcessExit a-1"),
-        replace(TALKER, remaps=(RemapRule("chatter", "news", PLACE),)),
+        TALKER._replace(number=7, process_name="talker-7"),
+        TALKER._replace(cmd=(*TALKER.cmd, "--params-file", "/tmp/launch_params_x")),
+        TALKER._replace(on_event="OnProcessExit a-1"),
+        TALKER._replace(remaps=(RemapRule("chatter", "news", PLACE),)),
     ],
     ids=["itself", "another number", "another parameter file", "another event", "rule with its place"],
 )
@@ -88,15 +87,15 @@ def test_what_the_plan_foresaw_is_provisioned(same: ResolvedProcess) -> None:
 
 
 BEYOND = {
-    "another name": replace(TALKER, fqn="/robot/talker2"),
-    "another program": replace(TALKER, executable="listener"),
-    "another package": replace(TALKER, package="evil"),
-    "another remap rule": replace(TALKER, cmd=("talker", "--ros-args", "-r", "chatter:=secret")),
-    "another enclave": replace(TALKER, enclave=EnclaveRequest(attribute="/root")),
-    "its own enclave argument": replace(TALKER, enclave=EnclaveRequest(scope="/robot", argument="/root")),
-    "simulated time": replace(TALKER, parameters={"use_sim_time": True}),
-    "an executable with an enclave": replace(
-        TALKER, kind="executable", package=None, fqn=None, enclave=EnclaveRequest(attribute="/root")
+    "another name": TALKER._replace(fqn="/robot/talker2"),
+    "another program": TALKER._replace(executable="listener"),
+    "another package": TALKER._replace(package="evil"),
+    "another remap rule": TALKER._replace(cmd=("talker", "--ros-args", "-r", "chatter:=secret")),
+    "another enclave": TALKER._replace(enclave=EnclaveRequest(attribute="/root")),
+    "its own enclave argument": TALKER._replace(enclave=EnclaveRequest(scope="/robot", argument="/root")),
+    "simulated time": TALKER._replace(parameters={"use_sim_time": True}),
+    "an executable with an enclave": TALKER._replace(
+        kind="executable", package=None, fqn=None, enclave=EnclaveRequest(attribute="/root")
     ),
 }
 
@@ -122,7 +121,7 @@ def test_allow_late_provisions_and_says_so_once() -> None:
 
 def test_an_executable_without_enclave_has_nothing_to_sign() -> None:
     guard, keystore, _ = gate()
-    guard.ensure(replace(TALKER, kind="executable", package=None, fqn=None, enclave=EnclaveRequest()))
+    guard.ensure(TALKER._replace(kind="executable", package=None, fqn=None, enclave=EnclaveRequest()))
     assert keystore.done == ["late None"]
 
 
@@ -130,10 +129,10 @@ def test_a_component_that_was_not_planned_cannot_be_granted_any_more() -> None:
     guard, _, _ = gate(allow_late=True)
     guard.ensure_components([CAMERA])
     with pytest.raises(LateProcess, match=r"camera/camera::Spy for /robot/box"):
-        guard.ensure_components([replace(CAMERA, plugin="camera::Spy")])
+        guard.ensure_components([CAMERA._replace(plugin="camera::Spy")])
 
 
 def test_the_place_is_told_as_written(tmp_path: Path) -> None:
     guard, _, _ = gate()
     with pytest.raises(LateProcess, match=str(tmp_path)):
-        guard.ensure(replace(TALKER, fqn="/x", location=SourceLocation(str(tmp_path / "a.launch.py"))))
+        guard.ensure(TALKER._replace(fqn="/x", location=SourceLocation(str(tmp_path / "a.launch.py"))))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.cmake import Build
@@ -353,7 +353,7 @@ def _interfaces(found: _Found, unit: CppUnit, build: Build, package: str | None)
         for namespace in dict.fromkeys(namespaces)
     ]
     keys = _keys(found, unit, build)
-    return [replace(node, executable=exe, plugin=plugin) for node in plain for exe, plugin in keys]
+    return [node._replace(executable=exe, plugin=plugin) for node in plain for exe, plugin in keys]
 
 
 def _plain(parts: Parts) -> str | None:

@@ -207,7 +207,7 @@ class ExecuteLocal(Action):
         description = self.__process_description
         name, cmd = description.final_name or "", tuple(description.final_cmd or ())
         return {
-            "index": int(name.rpartition("-")[2]),
+            "number": int(name.rpartition("-")[2]),
             "kind": "executable",
             "package": None,
             "executable": first_word(cmd),

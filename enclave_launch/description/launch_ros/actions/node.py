@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.launch.actions.execute_process import ExecuteProcess
@@ -228,7 +227,7 @@ class Node(ExecuteProcess):
             "remaps": tuple([placed(rule, place) for rule in self.__expanded_remappings or ()]),
             "parameters": self.__parameters.resolve(self.__name_tokens(), found.parameters),
             "parameter_files": self.__parameters.written_files(context),
-            "enclave": replace(enclave, argument=found.enclave) if found.enclave else enclave,
+            "enclave": enclave._replace(argument=found.enclave) if found.enclave else enclave,
         }
 
     def __words_after_program(self, cmd: tuple[str, ...]) -> tuple[str, ...]:
