@@ -8,30 +8,36 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from keystore.errors import InvalidInput, printable
 
 LOWEST_ID = 0
 HIGHEST_ID = 230
-_PART = re.compile(r"([0-9]{1,3})(?:-([0-9]{1,3}))?\Z")
 
 
-@dataclass(frozen=True, slots=True)
-class Domains:
-    """``ranges``: pairs (first, last), both included, sorted, neither touching nor overlapping."""
-
+class _Ranges(NamedTuple):
     ranges: tuple[tuple[int, int], ...]
 
-    def __post_init__(self) -> None:
-        if not self.ranges:
+
+class Domains(_Ranges):
+    """``ranges``: pairs (first, last), both included, sorted, neither touching nor overlapping.
+
+    Raises InvalidInput for what are no domain ids.
+    """
+
+    __slots__ = ()
+
+    def __new__(cls, ranges: Iterable[tuple[int, int]]) -> Domains:
+        given = tuple(ranges)
+        if not given:
             raise InvalidInput("at least one ROS domain id is needed")
-        for first, last in self.ranges:
+        for first, last in given:
             if not LOWEST_ID <= first <= last <= HIGHEST_ID:
                 raise InvalidInput(
                     f"domain ids {_text(first, last)} are no range within {LOWEST_ID}..{HIGHEST_ID}"
                 )
-        object.__setattr__(self, "ranges", tuple(_merged(self.ranges)))
+        return super().__new__(cls, tuple(_merged(given)))
 
     @classmethod
     def single(cls, domain_id: int) -> Domains:
@@ -48,14 +54,11 @@ class Domains:
             return cls.every()
         ranges = []
         for part in text.split(","):
-            match = _PART.match(part.strip())
+            match = re.fullmatch(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", part.strip())
             if match is None:
                 raise InvalidInput(f"{printable(text)} are no domain ids; write 0, 0-10 or 0,5,7-9")
             ranges.append((int(match[1]), int(match[2] or match[1])))
         return cls(tuple(ranges))
-
-    def __contains__(self, domain_id: int) -> bool:
-        return any(first <= domain_id <= last for first, last in self.ranges)
 
     def __str__(self) -> str:
         return ",".join(_text(first, last) for first, last in self.ranges)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from pathlib import Path
 
 from keystore.enclave_name import validate_enclave_name
@@ -33,7 +32,7 @@ def create_enclaves(
     ``allow_all`` asks for every topic, service and action. The keystore must exist.
     """
     root = resolve_root(keystore)
-    chosen = with_domains(root, replace(options or ProvisionOptions(), create=False))
+    chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
     ordered = sorted({validate_enclave_name(name) for name in names})
     wishes = {name: Wish(_allow_all(name, chosen) if allow_all else keep) for name in ordered}
     return bring_about(root, wishes, chosen)
@@ -61,7 +60,7 @@ def apply_policy(
 ) -> ProvisionReport:
     """Exactly the policy's permissions for the policy's enclaves, created where missing, in a keystore that
     exists."""
-    chosen = replace(options or ProvisionOptions(), create=False)
+    chosen = (options or ProvisionOptions())._replace(create=False)
     return provision(keystore, policy.enclaves, options=chosen)
 
 

@@ -16,7 +16,7 @@ from keystore.role import Role
 from keystore.validity import Validity, later, parse_moment, utc_now
 from keystore.view import KeystoreView, resolve_root
 
-_DATES = re.compile(rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_")
+_DATE = rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_"
 
 
 class Expiry(NamedTuple):
@@ -123,7 +123,7 @@ def _expiry(what: str, enclave: str | None, validity: Validity) -> Expiry:
 
 def _permissions_validity(signed: bytes, place: str) -> Validity:
     """Of the first grant, the only one that implementations use."""
-    found = dict(reversed(_DATES.findall(smime.read(signed, place).document)))
+    found = dict(reversed(re.findall(_DATE, smime.read(signed, place).document)))
     try:
         return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))
     except (KeyError, UnicodeDecodeError, InvalidInput):

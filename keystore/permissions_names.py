@@ -17,12 +17,12 @@ DISCOVERY_TOPIC = "ros_discovery_info"
 MAX_NAME_LENGTH = 247
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
-_NAMESPACE = re.compile(rf"/\Z|(?:/{_TOKEN})+\Z")
-_NODE = re.compile(rf"{_TOKEN}\Z")
+_NAMESPACE = rf"/\Z|(?:/{_TOKEN})+\Z"
+_NODE = rf"{_TOKEN}\Z"
 _FULL_NAME = re.compile(rf"(?:/{_TOKEN})+\Z")
 # What may stand in an expression with wildcards: names plus * ? [abc] [a-z] [!abc], the subset that
 # Cyclone DDS and Fast DDS read alike.
-_PATTERN = re.compile(r"(?:[A-Za-z0-9_/*?]|\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\])+\Z")
+_PATTERN = r"(?:[A-Za-z0-9_/*?]|\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\])+\Z"
 _WILDCARDS = frozenset("*?[]")
 
 # Suffixes of the DDS names of one action. Client and server see the same ones, the other way round.
@@ -110,11 +110,11 @@ def _candidates(operation: Operation, topics: tuple[set[str], set[str]]) -> set[
 
 
 def _check_profile(profile: Profile) -> None:
-    if not _NAMESPACE.match(profile.ns):
+    if not re.match(_NAMESPACE, profile.ns):
         raise PolicyError(
             f"ns={printable(profile.ns)} is not an absolute namespace; write for example '/' or '/robot'"
         )
-    if not _NODE.match(profile.node) or len(profile.node) > 255:
+    if not re.match(_NODE, profile.node) or len(profile.node) > 255:
         raise PolicyError(f"node={printable(profile.node)} is not a node name")
 
 
@@ -132,7 +132,7 @@ def _problem(expression: str) -> str | None:
     body = expression[1:] if expression[0] == "~" else expression
     if expression[0] == "~" and body[:1] not in ("", "/"):
         return "must have '/' after '~'"
-    if body and not _PATTERN.match(body):
+    if body and not re.match(_PATTERN, body):
         return "is not a valid name (letters, digits, '_', '/', and the wildcards * ? [abc] [a-z] [!abc])"
     if "//" in body or expression[-1] == "/":
         return "has an empty part"

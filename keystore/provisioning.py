@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
@@ -39,8 +38,7 @@ Progress = Callable[[int, int], None]
 DEFAULT_LOCK_TIMEOUT = 30.0
 
 
-@dataclass(frozen=True, slots=True)
-class ProvisionOptions:
+class ProvisionOptions(NamedTuple):
     """``domains`` None: those of the keystore's governance, 0 for a new one. ``lifetime``, ``subjects`` None:
     what the keystore was created with. ``renew_within``: certificates that end sooner are re-issued, by
     default only the expired. ``creation``: for a new keystore; its domains, access, clock and durability are
@@ -56,7 +54,7 @@ class ProvisionOptions:
     subjects: SubjectScheme | None = None
     rmw: str | None = None
     allow_subject_overlap: bool = False
-    access: CaAccess = field(default_factory=CaAccess)
+    access: CaAccess = CaAccess()
     lock_timeout: float = DEFAULT_LOCK_TIMEOUT
     durable: bool = True
     progress: Progress | None = None
@@ -135,7 +133,7 @@ def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
     if options.domains is not None:
         return options
     view = KeystoreView(root)
-    return replace(options, domains=governance_domains(view) if view.is_complete else Domains.single(0))
+    return options._replace(domains=governance_domains(view) if view.is_complete else Domains.single(0))
 
 
 def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:

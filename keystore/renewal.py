@@ -11,7 +11,7 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -57,7 +57,7 @@ def renew(
     chosen = options or RenewOptions()
     root = resolve_root(keystore)
     KeystoreView(root).require_complete()
-    provisioning = replace(chosen.provisioning, create=False)
+    provisioning = chosen.provisioning._replace(create=False)
     now = provisioning.now or utc_now()
     named = None if enclaves is None else sorted({validate_enclave_name(name) for name in enclaves})
     _refuse_unknown(root, named)
@@ -70,7 +70,7 @@ def renew(
             repaired.append("governance.xml made equal to the signed governance.p7s")
     view = KeystoreView(root)
     wishes = {name: _wish(view, name, named, chosen) for name in view.enclaves()}
-    due = provisioning if named is not None else replace(provisioning, renew_within=chosen.within)
+    due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
     report = bring_about(root, wishes, with_domains(root, due))
     if chosen.revoke_old:
         with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:

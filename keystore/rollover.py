@@ -17,7 +17,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection
-from dataclasses import replace
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
@@ -56,7 +55,7 @@ def roll_over(
     ``options.creation`` gives curve, lifetime and names of the new CAs. Raises InvalidInput for a step out of
     order.
     """
-    chosen = replace(options or ProvisionOptions(), create=False)
+    chosen = (options or ProvisionOptions())._replace(create=False)
     root = resolve_root(keystore)
     KeystoreView(root).require_complete()
     now = chosen.now or utc_now()

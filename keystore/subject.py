@@ -14,7 +14,7 @@ from enum import Enum
 
 # X.520 ub-common-name; cryptography >= 43 enforces it.
 MAX_COMMON_NAME = 64
-_SEPARATORS = re.compile(r"[,/|]")
+_SEPARATORS = "[,/|]"
 
 
 class SubjectScheme(str, Enum):
@@ -54,7 +54,7 @@ def scheme_of(cn: str) -> SubjectScheme:
 
 def pieces(cn: str) -> frozenset[tuple[str, str]]:
     """The bag Cyclone compares: non-empty pieces between separators, each cut at its first ``=``."""
-    cut = (piece.partition("=") for piece in _SEPARATORS.split(subject_name(cn)) if piece)
+    cut = (piece.partition("=") for piece in re.split(_SEPARATORS, subject_name(cn)) if piece)
     return frozenset((key, value) for key, _, value in cut)
 
 
@@ -64,7 +64,7 @@ def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
     ``names`` maps enclave to common name. Sorted; empty for any set of names of the exact scheme.
     """
     bags = {enclave: pieces(cn) for enclave, cn in names.items()}
-    open_ones = {enclave: bag for enclave, bag in bags.items() if _SEPARATORS.search(names[enclave])}
+    open_ones = {enclave: bag for enclave, bag in bags.items() if re.search(_SEPARATORS, names[enclave])}
     by_bag: dict[frozenset[tuple[str, str]], list[str]] = {}
     for enclave, bag in bags.items():
         by_bag.setdefault(bag, []).append(enclave)

@@ -8,6 +8,7 @@ import pytest
 
 from keystore.domains import Domains
 from keystore.errors import InvalidInput
+from keystore.governance_file import covers
 from keystore.permissions_names import ros_rules
 from keystore.permissions_read import parse_permissions
 from keystore.policy import Operation, Qualifier
@@ -104,7 +105,7 @@ def test_domain_lists_that_are_refused(text: str) -> None:
         Domains.parse(text)
 
 
-def test_domains_as_text_and_membership() -> None:
+def test_domains_as_text_and_what_they_cover() -> None:
     domains = Domains.parse("9,0-3")
     assert str(domains) == "0-3,9"
-    assert (2 in domains, 5 in domains) == (True, False)
+    assert covers(domains, Domains.parse("1-2,9")) and not covers(domains, Domains.single(5))

@@ -7,7 +7,6 @@ import shutil
 import stat
 import subprocess
 import sys
-from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -236,7 +235,7 @@ def test_what_ends_soon_is_renewed_only_when_asked(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a"], now=NOW, lifetime=90 * DAY)
     later = options(now=NOW + 80 * DAY, lifetime=90 * DAY)
     assert not provision(root, [policy("/a")], options=later).changed
-    asked = replace(later, renew_within=timedelta(days=30))
+    asked = later._replace(renew_within=timedelta(days=30))
     assert provision(root, [policy("/a")], options=asked).changed
 
 
@@ -318,7 +317,7 @@ def test_compatible_subjects_refuse_names_that_cyclone_confuses(tmp_path: Path) 
     with pytest.raises(InvalidInput, match="/talker could use the permissions of /robot/talker"):
         create_enclave(root, "/talker", options=wanted)
     assert list_enclaves(root) == ["/robot/talker"]
-    create_enclave(root, "/talker", options=replace(wanted, allow_subject_overlap=True))
+    create_enclave(root, "/talker", options=wanted._replace(allow_subject_overlap=True))
     assert "borrowed-permissions" in codes(root)
 
 
