@@ -27,8 +27,10 @@ from keystore.errors import KeystoreError
 from keystore.policy import EnclavePolicy
 from keystore.provisioning import ProvisionOptions, ProvisionReport, provision, what_is_wrong
 
-Stamp = tuple[tuple[str, int, int, int], ...]
-"""What any change to an enclave's files changes: name, inode, size and change time (which nobody can set back)."""
+Stamp = tuple[tuple[int, int, int] | None, ...]
+"""What any change to an enclave's files changes: inode, size and change time (which nobody can set back) of each."""
+
+_STAMPED = sorted(layout.ENCLAVE_FILES)
 
 
 class ProvisionedLaunch(NamedTuple):
@@ -59,15 +61,23 @@ def provision_policies(
 
 
 def file_stamp(keystore: str, enclave: str) -> Stamp:
-    """Empty for an enclave that is not there."""
+    """Of what provisioning looks at, links followed; empty for an enclave that is not there."""
     try:
-        with os.scandir(os.path.join(keystore, layout.enclave_directory(enclave))) as entries:
-            files = [
-                (entry.name, entry.stat()) for entry in entries if not entry.is_dir(follow_symlinks=False)
-            ]
+        directory = os.open(os.path.join(keystore, layout.enclave_directory(enclave)), os.O_RDONLY | os.O_DIRECTORY)
     except OSError:
         return ()
-    return tuple(sorted((name, status.st_ino, status.st_size, status.st_ctime_ns) for name, status in files))
+    try:
+        return tuple(_file_stamp(name, directory) for name in _STAMPED)
+    finally:
+        os.close(directory)
+
+
+def _file_stamp(name: str, directory: int) -> tuple[int, int, int] | None:
+    try:
+        status = os.stat(name, dir_fd=directory)
+    except OSError:
+        return None
+    return status.st_ino, status.st_size, status.st_ctime_ns
 
 
 class PlanProvider:
@@ -92,6 +102,14 @@ class PlanProvider:
         self._by_name = {(item.process.process_name, identity(item.process)): item for item in plan.processes}
         self._by_identity = {identity(item.process): item for item in plan.processes}
         self._policies = {enclave.path: enclave for enclave in plan.derived.policy.enclaves}
+
+    def granted(self, process: ResolvedProcess) -> Grant | None:
+        """The grant, if a look at the files' inodes and times is enough to know that the enclave is the one
+        provisioned."""
+        planned = self._planned(process)
+        if planned.enclave is not None and not self._is_untouched(self._policies[planned.enclave.path]):
+            return None
+        return self._grant(planned, process.environment)
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         """Raises ``ProvisionError`` when its enclave is no longer what was provisioned."""
@@ -139,9 +157,9 @@ class PlanProvider:
 
         Nodes that share an enclave, and restarts, pay for a look at its files only while nobody touches those.
         """
-        enclave, keystore = policy.path, self._launch.settings.keystore
-        if self._seen.get(enclave) == (policy, file_stamp(keystore, enclave)):
+        if self._is_untouched(policy):
             return
+        enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = what_is_wrong(keystore, policy, options=self._launch.options)
         except KeystoreError as error:
@@ -154,6 +172,10 @@ class PlanProvider:
                 f"{'; '.join(wrong)}. {_who_changed_it(wrong)}"
             )
         self._seen[enclave] = (policy, file_stamp(keystore, enclave))
+
+    def _is_untouched(self, policy: EnclavePolicy) -> bool:
+        stamp = file_stamp(self._launch.settings.keystore, policy.path)
+        return self._seen.get(policy.path) == (policy, stamp)
 
     def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
         variables = dict(secured_environment(planned, self._launch.settings))

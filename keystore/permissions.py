@@ -101,16 +101,15 @@ def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
     """All profiles of the enclave as one set of DDS rules; DENY of any beats ALLOW of any."""
     allowed: tuple[set[str], set[str]] = (set(), set())
     denied: tuple[set[str], set[str]] = (set(), set())
-    for profile in policy.profiles:
-        for rule in profile.rules:
-            try:
-                name = full_name(rule.expression, profile)
-            except PolicyError as error:
-                raise PolicyError(f"enclave {printable(policy.path)}: {error}") from None
-            target = allowed if rule.qualifier is Qualifier.ALLOW else denied
-            publish, subscribe = dds_topics(rule.operation, name)
-            target[0].update(publish)
-            target[1].update(subscribe)
+    try:
+        for profile in policy.profiles:
+            for operation, qualifier, expression in profile.rules:
+                publish, subscribe = dds_topics(operation, full_name(expression, profile))
+                target = allowed if qualifier is Qualifier.ALLOW else denied
+                target[0].update(publish)
+                target[1].update(subscribe)
+    except PolicyError as error:
+        raise PolicyError(f"enclave {printable(policy.path)}: {error}") from None
     if rmw not in RMW_WITHOUT_DISCOVERY_TOPIC:
         allowed[0].add(DISCOVERY_TOPIC)
         allowed[1].add(DISCOVERY_TOPIC)

@@ -8,7 +8,6 @@ counts; where it cannot be told, the default in the source must not be believed.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import PurePath
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -60,12 +59,14 @@ def _is_flag(word: str) -> bool:
     return word.startswith("-") and word not in ("-", "--")
 
 
+def _file_name(word: str) -> str:
+    return word.rstrip("/").rpartition("/")[2]
+
+
 def _own_words(process: ResolvedProcess) -> Sequence[str]:
     """The words after the executable that are no ROS arguments."""
-    start = next(
-        (i for i, word in enumerate(process.cmd) if PurePath(word).name == PurePath(process.executable).name),
-        0,
-    )
+    program = _file_name(process.executable)
+    start = next((i for i, word in enumerate(process.cmd) if _file_name(word) == program), 0)
     words: list[str] = []
     inside = False
     for word in process.cmd[start + 1 :]:

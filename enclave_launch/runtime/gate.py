@@ -26,7 +26,10 @@ class Grant(NamedTuple):
 
 
 class EnclaveGate(Protocol):
-    """Called before every start, in a worker thread, one call at a time."""
+    """Asked before every start, one call at a time: ``granted`` first, else ``ensure`` in a worker thread."""
+
+    def granted(self, process: ResolvedProcess) -> Grant | None:
+        """The answer of ``ensure`` where it takes no work: nobody touched the enclave since it was looked at."""
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         """Return once the enclave of ``process`` is complete on disk; idempotent.
@@ -43,6 +46,8 @@ class EnclaveGate(Protocol):
 
 class Provider(Protocol):
     """What makes enclaves complete: implemented over a plan and a keystore."""
+
+    def granted(self, process: ResolvedProcess) -> Grant | None: ...
 
     def ensure(self, process: ResolvedProcess) -> Grant: ...
 
@@ -98,6 +103,9 @@ class PlannedGate:
         self._provider = provider
         self._allow_late = allow_late
         self._say_late = say_late
+
+    def granted(self, process: ResolvedProcess) -> Grant | None:
+        return self._provider.granted(process) if identity(process) in self._processes else None
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         if identity(process) in self._processes:

@@ -49,6 +49,7 @@ class LiveHost(BaseHost):
         self._log = log
         self._gate = gate
         self._at_the_gate = ThreadPoolExecutor(1, "gate")  # one call at a time, in the order of the starts
+        self._waiting_at_the_gate = 0
         self._secrets = secrets
         self._fail = fail
         self._services = services
@@ -166,4 +167,10 @@ class LiveHost(BaseHost):
     async def _granted(self, process: ResolvedProcess) -> Grant:
         if self._gate is None:
             return Grant()
-        return await self._loop.run_in_executor(self._at_the_gate, self._gate.ensure, process)
+        if not self._waiting_at_the_gate and (grant := self._gate.granted(process)) is not None:
+            return grant
+        self._waiting_at_the_gate += 1
+        try:
+            return await self._loop.run_in_executor(self._at_the_gate, self._gate.ensure, process)
+        finally:
+            self._waiting_at_the_gate -= 1

@@ -124,8 +124,10 @@ def test_what_was_changed_is_refused_and_not_repaired(
     case: str, running: PlanProvider, keystore: Path
 ) -> None:
     change, reason = CHANGES[case]
+    assert running.granted(process_of(running)) is not None
     change(keystore)
     after = content(keystore)
+    assert running.granted(process_of(running)) is None
     with pytest.raises(ProvisionError, match=reason):
         respawn(running)
     assert content(keystore) == after

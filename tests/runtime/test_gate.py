@@ -48,6 +48,9 @@ class Keystore:
     def __init__(self) -> None:
         self.done: list[str] = []
 
+    def granted(self, process: ResolvedProcess) -> Grant | None:
+        return Grant(("--enclave", "/robot"))
+
     def ensure(self, process: ResolvedProcess) -> Grant:
         self.done.append(f"planned {process.fqn}")
         return Grant(("--enclave", "/robot"))
@@ -82,7 +85,7 @@ def gate(*, allow_late: bool = False) -> tuple[PlannedGate, Keystore, list[str]]
 )
 def test_what_the_plan_foresaw_is_provisioned(same: ResolvedProcess) -> None:
     guard, keystore, _ = gate()
-    assert guard.ensure(same) == Grant(("--enclave", "/robot"))
+    assert guard.granted(same) == guard.ensure(same) == Grant(("--enclave", "/robot"))
     assert keystore.done == ["planned /robot/talker"]
 
 
@@ -103,6 +106,7 @@ BEYOND = {
 @pytest.mark.parametrize("late", BEYOND.values(), ids=BEYOND)
 def test_what_goes_beyond_the_plan_is_refused_with_its_place(late: ResolvedProcess) -> None:
     guard, keystore, _ = gate()
+    assert guard.granted(late) is None
     with pytest.raises(LateProcess, match=r"refused: .* at demo\.launch\.py:12 .*--allow-late") as refusal:
         guard.ensure(late)
     assert keystore.done == []

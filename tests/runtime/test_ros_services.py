@@ -154,8 +154,11 @@ def launched(tmp_path: Path, actions: str, gate: Gate | None = None) -> int:
 class Gate:
     """Everything is permitted but components called ``late``."""
 
-    def ensure(self, process: ResolvedProcess) -> Grant:
+    def granted(self, process: ResolvedProcess) -> Grant | None:
         return Grant()
+
+    def ensure(self, process: ResolvedProcess) -> Grant:
+        raise AssertionError("granted at once")
 
     def ensure_components(self, components: object) -> None:
         if "late" in str(components):

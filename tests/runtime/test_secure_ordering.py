@@ -21,13 +21,23 @@ pytestmark = pytest.mark.usefixtures("ros_log_dir")
 
 
 class SlowKeystore:
-    """Completes an enclave by writing a file, after a while. ``broken``: names of processes it fails for."""
+    """Completes an enclave by writing a file, after a while. ``broken``: names of processes it fails for;
+    ``untouched``: of those that need no work."""
 
-    def __init__(self, directory: Path, broken: Sequence[str] = ()) -> None:
+    def __init__(self, directory: Path, broken: Sequence[str] = (), untouched: Sequence[str] = ()) -> None:
         self.directory = directory
         self.broken = broken
+        self.untouched = untouched
         self.order: list[str] = []
         self.inside = threading.Lock()
+
+    def granted(self, process: ResolvedProcess) -> Grant | None:
+        assert not self.inside.locked(), "one process at a time"
+        label = process.process_name.rpartition("-")[0]
+        if label not in self.untouched:
+            return None
+        self.order.append(label)
+        return Grant()
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         assert threading.current_thread() is not threading.main_thread(), (
@@ -77,6 +87,14 @@ def test_each_process_finds_its_enclave_complete_and_gets_what_the_gate_grants(
     shown = capfd.readouterr().out
     for number, name in enumerate("abc", start=1):
         assert f"[{name}-{number}] extra complete" in shown
+
+
+def test_what_needs_no_work_is_granted_at_once_but_overtakes_nobody(tmp_path: Path) -> None:
+    actions = [script(tmp_path, name, "true") for name in ("a", "b", "c", "d")]
+    keystore = SlowKeystore(tmp_path, untouched=("a", "d"))
+    assert run_launch(launch_file(tmp_path, *actions), gate=keystore) == 0
+    assert keystore.order == ["a", "b", "c", "d"]
+    assert (tmp_path / "d").exists(), "behind b and c it was looked at in its turn"
 
 
 def test_the_enclave_is_looked_at_again_before_each_respawn(tmp_path: Path) -> None:
