@@ -20,6 +20,8 @@ class PolicyError(InvalidInput):
 class Operation(str, Enum):
     """What a rule is about; the value is the attribute of the policy XML."""
 
+    __hash__ = str.__hash__  # rules are sought by the thousand; that of Enum is Python
+
     PUBLISH = "publish"
     SUBSCRIBE = "subscribe"
     REPLY = "reply"  # serve a service
@@ -29,6 +31,8 @@ class Operation(str, Enum):
 
 
 class Qualifier(str, Enum):
+    __hash__ = str.__hash__
+
     ALLOW = "ALLOW"
     DENY = "DENY"
 

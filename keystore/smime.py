@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from keystore.signer import Signer
 
 _TEXT_HEADER = b"Content-Type: text/plain\r\n\r\n"
+_LF_HEADER = b"Content-Type: text/plain\n\n"
 _SHA256 = der.encode(der.SEQUENCE, der.object_identifier("2.16.840.1.101.3.4.2.1"))
 _ECDSA_SHA256 = der.encode(der.SEQUENCE, der.object_identifier("1.2.840.10045.4.3.2"))
 _RSA = der.encode(der.SEQUENCE, der.object_identifier("1.2.840.113549.1.1.1"), der.encode(der.NULL))
@@ -117,14 +118,19 @@ def _multipart(content: bytes, pkcs7: bytes) -> bytes:
 class SignedDocument(NamedTuple):
     """A ``.p7s`` taken apart, nothing checked yet."""
 
-    content: bytes
-    """The signed bytes in canonical form: text/plain header and CRLF line ends."""
+    text: bytes
+    """The signed part with LF line ends: text/plain header and document."""
     pkcs7: bytes
 
     @property
     def document(self) -> bytes:
         """The XML with LF line ends."""
-        return self.content.removeprefix(_TEXT_HEADER).replace(b"\r\n", b"\n")
+        return self.text.removeprefix(_LF_HEADER)
+
+    @property
+    def content(self) -> bytes:
+        """The signed bytes: in canonical form, with CRLF line ends."""
+        return self.text.replace(b"\n", b"\r\n")
 
     def embeds(self, certificate: bytes) -> bool:
         """Whether this certificate (DER) is carried along: a cheap sign of who signed, no proof."""
@@ -149,7 +155,7 @@ def read(p7s: bytes, place: str) -> SignedDocument:
         pkcs7 = der.from_base64(encoded)
     except der.DerError:
         raise DamagedKeystore(f"{place}: its signature is not base64") from None
-    return SignedDocument(parts[1][1:].replace(b"\n", b"\r\n"), pkcs7)
+    return SignedDocument(parts[1][1:], pkcs7)
 
 
 def _boundary(header: bytes) -> bytes:
@@ -165,7 +171,7 @@ def check(signed: SignedDocument, authorities: list[CertificateFacts], place: st
     Strict as the fixed releases are (Cyclone DDS 11, Fast DDS 2.6.5): the signer must *be* one of
     ``authorities``. Certificates carried in the message are not trusted, and no chain is built.
     """
-    if not signed.content.startswith(_TEXT_HEADER):
+    if not signed.text.startswith(_LF_HEADER):
         raise DamagedKeystore(f"{place}: the signed part is not text/plain, DDS implementations refuse it")
     try:
         info = _signer_info(signed.pkcs7)

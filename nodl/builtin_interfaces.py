@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from enum import Enum
-from functools import lru_cache
 from typing import NamedTuple
 
 from nodl.node_interface import ClientLibrary, EndpointKind
@@ -113,7 +112,6 @@ TABLE: tuple[BuiltIn, ...] = (
 )
 
 
-@lru_cache(maxsize=256)
 def built_in_interfaces(
     distro: str, library: ClientLibrary, conditions: frozenset[Condition] = frozenset({Condition.ALWAYS})
 ) -> tuple[BuiltIn, ...]:

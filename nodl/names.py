@@ -19,7 +19,7 @@ MAX_NAME_LENGTH = 247
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
 _NODE_NAME = re.compile(rf"{_TOKEN}\Z")
 _ABSOLUTE = re.compile(rf"(?:/{_TOKEN})+\Z")
-_PLAIN = re.compile(rf"(~/)?{_TOKEN}(?:/{_TOKEN})*\Z")  # what nearly every name looks like
+_PLAIN = re.compile(rf"(~?/)?{_TOKEN}(?:/{_TOKEN})*\Z")  # what nearly every name looks like
 _SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
 _WILDCARDS = frozenset("*?[]")
 
@@ -114,11 +114,10 @@ def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> 
     ``x`` -> ``/ns/x``; ``/x`` -> ``/x``; ``~/x`` -> ``/ns/node/x``. Raises ``InvalidNameError`` for a name
     that is invalid before or after expansion.
     """
-    if is_full_name(name):
-        return name
     plain = _PLAIN.match(name)
     if plain:
-        quick = f"{join(namespace, node)}{name[1:]}" if plain[1] else join(namespace, name)
+        start = plain[1]
+        quick = name if start == "/" else join(namespace, f"{node}{name[1:]}" if start else name)
         if len(quick) <= MAX_NAME_LENGTH:
             return quick
     validate_name(name, what)

@@ -132,10 +132,12 @@ class NodeNames:
         return self._topics.get(full_name) or self._services.get(full_name)
 
     def topic(self, name: str) -> Resolved:
-        return self._resolve(self.expand(name, "topic name"), self._topics)
+        expanded = expand_name(name, namespace=self.namespace, node=self.node, what="topic name")
+        return self._resolve(expanded, self._topics) if self._topics else Resolved(expanded)
 
     def service(self, name: str) -> Resolved:
-        return self._resolve(self.expand(name, "service name"), self._services)
+        expanded = expand_name(name, namespace=self.namespace, node=self.node, what="service name")
+        return self._resolve(expanded, self._services) if self._services else Resolved(expanded)
 
     def action(self, name: str, *, as_a_whole: bool) -> Resolved:
         """The action name; ``as_a_whole`` is true for the distributions that remap it (kilted and later).

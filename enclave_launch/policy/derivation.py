@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.policy.node_permissions import NodePermissions, Permission, Reason, node_permissions
+from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
 from keystore.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 
@@ -118,8 +118,7 @@ def _merged(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
 class _Collection:
     """Permissions by enclave and profile while they come in."""
 
-    profiles: dict[str, dict[ProfileKey, set[Rule]]]
-    reasons: dict[str, Reasons] = field(default_factory=dict)
+    profiles: dict[str, dict[ProfileKey, Reasons]]
     nodes: dict[str, list[RunningNode]] = field(default_factory=dict)
     problems: list[str] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
@@ -127,11 +126,9 @@ class _Collection:
     def add(self, found: NodePermissions, policy_file: PolicyDocument | None) -> None:
         node = found.node
         self.nodes.setdefault(node.enclave, []).append(node)
-        profiles = self.profiles.setdefault(node.enclave, {})
-        rules = profiles.setdefault((node.namespace, node.name), set())
-        reasons = self.reasons.setdefault(node.enclave, {})
-        for permission in found.permissions:
-            _note(permission, rules, reasons)
+        reasons = self.profiles.setdefault(node.enclave, {}).setdefault((node.namespace, node.name), {})
+        for operation, name, reason in found.permissions:
+            reasons.setdefault(Rule(operation, Qualifier.ALLOW, name), []).append(reason)
         self.warnings.extend(found.warnings)
         for unresolved in found.unresolved:
             if unresolved.operation and _answered(policy_file, node, unresolved.operation):
@@ -143,17 +140,11 @@ class _Collection:
         enclaves = tuple(
             EnclavePolicy(
                 path,
-                tuple(
-                    Profile(ns, name, tuple(sorted(rules, key=_rule_order)))
-                    for (ns, name), rules in sorted(profiles.items())
-                ),
+                tuple(Profile(ns, name, tuple(sorted(profiles[ns, name]))) for ns, name in sorted(profiles)),
             )
             for path, profiles in sorted(self.profiles.items())
         )
-        reasons = {
-            path: {rule: _in_order(by_rule[rule]) for rule in sorted(by_rule, key=_rule_order)}
-            for path, by_rule in self.reasons.items()
-        }
+        reasons = {enclave.path: _merged_reasons(enclave, self.profiles[enclave.path]) for enclave in enclaves}
         nodes = {path: tuple(each) for path, each in self.nodes.items()}
         return DerivedPolicy(Policy(enclaves), reasons, nodes, _unique(self.problems), _unique(self.warnings))
 
@@ -172,10 +163,18 @@ def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[str]:
     return [concern.text for concern in concerns if concern]
 
 
-def _note(permission: Permission, rules: set[Rule], reasons: Reasons) -> None:
-    rule = Rule(permission.operation, Qualifier.ALLOW, permission.name)
-    rules.add(rule)
-    reasons.setdefault(rule, []).append(permission.reason)
+def _merged_reasons(
+    enclave: EnclavePolicy, profiles: Mapping[ProfileKey, Reasons]
+) -> dict[Rule, tuple[Reason, ...]]:
+    """Of all profiles, in the order of the rules."""
+    if len(enclave.profiles) == 1:
+        (by_rule,) = profiles.values()
+        return {rule: _in_order(by_rule[rule]) for rule in enclave.profiles[0].rules}
+    merged: Reasons = {}
+    for by_rule in profiles.values():
+        for rule, reasons in by_rule.items():
+            merged.setdefault(rule, []).extend(reasons)
+    return {rule: _in_order(merged[rule]) for rule in sorted(merged)}
 
 
 def _in_order(reasons: list[Reason]) -> tuple[Reason, ...]:
@@ -183,11 +182,6 @@ def _in_order(reasons: list[Reason]) -> tuple[Reason, ...]:
         return (reasons[0],)
     by_place = sorted(reasons, key=lambda reason: (reason.node, reason.origin, reason.place, reason.written))
     return tuple(dict.fromkeys(by_place))
-
-
-def _rule_order(rule: Rule) -> tuple[str, str, str]:
-    """The order of ``Rule`` itself, several times faster."""
-    return rule.operation, rule.qualifier, rule.expression
 
 
 def _answered(document: PolicyDocument | None, node: RunningNode, operation: Operation) -> bool:

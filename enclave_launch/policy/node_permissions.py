@@ -7,18 +7,18 @@ and namespace, then the first matching remap rule replaces it (``nodl.remap``).
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
-from functools import cache
+from functools import lru_cache
 from typing import Literal, NamedTuple
 
 from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
 from keystore.policy import Operation
-from nodl.builtin_interfaces import BuiltIn, built_in_interfaces
+from nodl.builtin_interfaces import Condition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import InvalidNameError, validate_namespace, validate_node_name
-from nodl.node_interface import Certainty, Endpoint, EndpointKind
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind
 from nodl.remap import NodeNames, ParsedRule, Resolved
 
 Origin = Literal["declared", "built-in", "policy file"]
@@ -104,8 +104,7 @@ class _Collector:
             return self._result
         for endpoint in self._node.interface.endpoints:
             self._endpoint(endpoint)
-        for row in built_in_interfaces(self._distro, self._node.interface.library, conditions_of(self._node)):
-            self._built_in(row)
+        self._built_in(_built_in_rows(self._distro, self._node.interface.library, conditions_of(self._node)))
         for gap in self._node.interface.gaps:
             self._unresolved(None, str(gap.source), gap.why)
         return self._result
@@ -140,11 +139,15 @@ class _Collector:
         except InvalidNameError as error:
             self._unresolved(operation, place, str(error))
 
-    def _built_in(self, row: BuiltIn) -> None:
-        operation = _OPERATIONS[row.kind]
-        resolved = self._plain(operation, row.name)
-        reason = Reason(self._fqn, "built-in", _shown(row), row.name, resolved.rules)
-        self._result.permissions.append(Permission(operation, resolved.name, reason))
+    def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
+        """Every node has them, by the dozen: whatever is the same for many nodes is known already."""
+        node, permissions = self._fqn, self._result.permissions
+        try:
+            for operation, name, place in rows:
+                final, rules = self._plain(operation, name)
+                permissions.append(Permission(operation, final, Reason(node, "built-in", place, name, rules)))
+        except InvalidNameError as error:
+            self._unresolved(None, str(self._node.location), f"{error}; it could not start under this name")
 
     def _resolve(self, operation: Operation, name: str, place: str) -> Iterator[tuple[Operation, Resolved]]:
         """The final names: one, or five where the parts of an action were remapped one by one."""
@@ -209,9 +212,13 @@ class _Collector:
         self._result.unresolved.append(Unresolved(operation, text))
 
 
-@cache
-def _shown(row: BuiltIn) -> str:
-    return str(row)
+@lru_cache(maxsize=256)
+def _built_in_rows(
+    distro: str, library: ClientLibrary, conditions: frozenset[Condition]
+) -> tuple[tuple[Operation, str, str], ...]:
+    """Operation, name as the client library writes it, and the row for a reader."""
+    rows = built_in_interfaces(distro, library, conditions)
+    return tuple((_OPERATIONS[row.kind], row.name, str(row)) for row in rows)
 
 
 def _parameter_note(template: NameTemplate, node: RunningNode) -> str:

@@ -107,7 +107,7 @@ def test_changed_content_is_refused() -> None:
 
 def test_a_changed_signature_is_refused() -> None:
     signed = smime.read(sign(DOCUMENT), "x")
-    broken = smime.SignedDocument(signed.content, signed.pkcs7[:-1] + bytes([signed.pkcs7[-1] ^ 1]))
+    broken = signed._replace(pkcs7=signed.pkcs7[:-1] + bytes([signed.pkcs7[-1] ^ 1]))
     with pytest.raises(DamagedKeystore):
         smime.check(broken, [CA.facts], "x")
 
