@@ -105,8 +105,10 @@ def provision(
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
     wanted = chosen.keystore or ProvisionOptions(domains=environment_domains(os.environ))
     enclaves = plan.derived.policy.enclaves
-    stamps = {enclave.path: file_stamp(settings.keystore, enclave.path) for enclave in enclaves}
+    before = [(enclave.path, file_stamp(settings.keystore, enclave.path)) for enclave in enclaves]
     report = provision_policies(settings, enclaves, wanted)
+    standing = report.validities
+    stamps = {path: stamp for path, stamp in before if path in standing}
     return ProvisionedLaunch(plan, settings, report, wanted, stamps)
 
 

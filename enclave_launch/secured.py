@@ -34,8 +34,8 @@ _STAMPED = sorted(layout.ENCLAVE_FILES)
 
 
 class ProvisionedLaunch(NamedTuple):
-    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it. ``stamps``: the
-    files of each enclave as they were just before provisioning looked at them."""
+    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it. ``stamps``: of
+    each enclave that provisioning found standing, its files as they were just before it looked."""
 
     plan: LaunchPlan
     settings: SecuritySettings
@@ -61,20 +61,14 @@ def provision_policies(
 
 
 def file_stamp(keystore: str, enclave: str) -> Stamp:
-    """Of what provisioning looks at, links followed; empty for an enclave that is not there."""
-    try:
-        directory = os.open(os.path.join(keystore, layout.enclave_directory(enclave)), os.O_RDONLY | os.O_DIRECTORY)
-    except OSError:
-        return ()
-    try:
-        return tuple(_file_stamp(name, directory) for name in _STAMPED)
-    finally:
-        os.close(directory)
+    """Of what provisioning looks at, links followed; None for what is not there."""
+    directory = f"{keystore}/{layout.enclave_directory(enclave)}"
+    return tuple(_file_stamp(f"{directory}/{name}") for name in _STAMPED)
 
 
-def _file_stamp(name: str, directory: int) -> tuple[int, int, int] | None:
+def _file_stamp(path: str) -> tuple[int, int, int] | None:
     try:
-        status = os.stat(name, dir_fd=directory)
+        status = os.stat(path)
     except OSError:
         return None
     return status.st_ino, status.st_size, status.st_ctime_ns
@@ -89,7 +83,7 @@ class PlanProvider:
         self._seen = {
             path: (policy, launch.stamps[path])
             for path, policy in self._policies.items()
-            if launch.stamps.get(path)
+            if path in launch.stamps
         }
 
     @property

@@ -61,18 +61,18 @@ def _elements(data: bytes, at: int, limit: int) -> list[Element]:
     while at < limit:
         if at + 2 > limit:
             raise DerError("cut short")
-        start, length = at, data[at + 1]
-        at += 2
+        length, body = data[at + 1], at + 2
         if length >= 0x80:
             width = length & 0x7F
-            if not 1 <= width <= 4 or at + width > limit:
+            body += width
+            if not 1 <= width <= 4 or body > limit:
                 raise DerError("unsupported length")
-            length = int.from_bytes(data[at : at + width], "big")
-            at += width
-        if at + length > limit:
+            length = int.from_bytes(data[at + 2 : body], "big")
+        end = body + length
+        if end > limit:
             raise DerError("cut short")
-        found.append(Element(data, data[start], start, at, at + length))
-        at += length
+        found.append(Element(data, data[at], at, body, end))
+        at = end
     return found
 
 

@@ -21,7 +21,11 @@ def signed_governance(view: KeystoreView) -> smime.SignedDocument:
 
 def governance_domains(view: KeystoreView) -> Domains:
     """The domains the governance in force lists, read cheaply; raises DamagedKeystore when there are none."""
-    found = _IDS.findall(signed_governance(view).document)
+    return _listed_domains(signed_governance(view), view)
+
+
+def _listed_domains(signed: smime.SignedDocument, view: KeystoreView) -> Domains:
+    found = _IDS.findall(signed.document)
     if not found:
         raise DamagedKeystore(f"{printable(view.root / layout.GOVERNANCE)} lists no domain")
     return Domains(tuple((int(one or low), int(one or high)) for one, low, high in found))
@@ -29,9 +33,10 @@ def governance_domains(view: KeystoreView) -> Domains:
 
 def governance_stands(view: KeystoreView, domains: Domains | None) -> bool:
     """Cheaply: signed by the present permissions CA, and each of ``domains`` is listed in it."""
-    if not signed_governance(view).embeds(view.ca(Role.PERMISSIONS).der):
+    signed = signed_governance(view)
+    if not signed.embeds(view.ca(Role.PERMISSIONS).der):
         return False
-    return domains is None or covers(governance_domains(view), domains)
+    return domains is None or covers(_listed_domains(signed, view), domains)
 
 
 def covers(outer: Domains, inner: Domains) -> bool:

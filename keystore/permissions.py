@@ -24,7 +24,7 @@ from keystore.errors import printable
 from keystore.permissions_names import (
     DISCOVERY_TOPIC,
     Topics,
-    dds_topics,
+    add_dds_topics,
     full_name,
     has_wildcard,
 )
@@ -104,10 +104,8 @@ def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
     try:
         for profile in policy.profiles:
             for operation, qualifier, expression in profile.rules:
-                publish, subscribe = dds_topics(operation, full_name(expression, profile))
                 target = allowed if qualifier is Qualifier.ALLOW else denied
-                target[0].update(publish)
-                target[1].update(subscribe)
+                add_dds_topics(operation, full_name(expression, profile), *target)
     except PolicyError as error:
         raise PolicyError(f"enclave {printable(policy.path)}: {error}") from None
     if rmw not in RMW_WITHOUT_DISCOVERY_TOPIC:

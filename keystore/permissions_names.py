@@ -58,22 +58,31 @@ def full_name(expression: str, profile: Profile) -> str:
     return name
 
 
-def dds_topics(operation: Operation, name: str) -> tuple[Topics, Topics]:
+def dds_topics(operation: Operation, name: str) -> tuple[set[str], set[str]]:
     """The DDS topics that a participant publishes and subscribes for ``operation`` on ``name``."""
+    publish: set[str] = set()
+    subscribe: set[str] = set()
+    add_dds_topics(operation, name, publish, subscribe)
+    return publish, subscribe
+
+
+def add_dds_topics(operation: Operation, name: str, publish: set[str], subscribe: set[str]) -> None:
+    """As ``dds_topics``, into sets that the caller fills for many names: this runs before every start."""
     if operation is Operation.PUBLISH:
-        return (f"rt{name}",), ()
-    if operation is Operation.SUBSCRIBE:
-        return (), (f"rt{name}",)
-    if operation is Operation.REQUEST:
-        return (f"rq{name}Request",), (f"rr{name}Reply",)
-    if operation is Operation.REPLY:
-        return (f"rr{name}Reply",), (f"rq{name}Request",)
-    requests = tuple(f"rq{name}{suffix}" for suffix in _ACTION_REQUESTS)
-    answers = (
-        *(f"rr{name}{suffix}" for suffix in _ACTION_REPLIES),
-        *(f"rt{name}{suffix}" for suffix in _ACTION_TOPICS),
-    )
-    return (requests, answers) if operation is Operation.CALL else (answers, requests)
+        publish.add(f"rt{name}")
+    elif operation is Operation.SUBSCRIBE:
+        subscribe.add(f"rt{name}")
+    elif operation is Operation.REQUEST:
+        publish.add(f"rq{name}Request")
+        subscribe.add(f"rr{name}Reply")
+    elif operation is Operation.REPLY:
+        publish.add(f"rr{name}Reply")
+        subscribe.add(f"rq{name}Request")
+    else:
+        asked, answered = (publish, subscribe) if operation is Operation.CALL else (subscribe, publish)
+        asked.update(f"rq{name}{suffix}" for suffix in _ACTION_REQUESTS)
+        answered.update(f"rr{name}{suffix}" for suffix in _ACTION_REPLIES)
+        answered.update(f"rt{name}{suffix}" for suffix in _ACTION_TOPICS)
 
 
 def ros_rules(
@@ -89,7 +98,7 @@ def ros_rules(
     for operation in (Operation.EXECUTE, Operation.CALL, Operation.REPLY, Operation.REQUEST):
         for name in sorted(_candidates(operation, remaining)):
             wanted = dds_topics(operation, name)
-            if remaining[0].issuperset(wanted[0]) and remaining[1].issuperset(wanted[1]):
+            if remaining[0] >= wanted[0] and remaining[1] >= wanted[1]:
                 rules.append(Rule(operation, qualifier, name))
                 remaining[0].difference_update(wanted[0])
                 remaining[1].difference_update(wanted[1])
