@@ -120,9 +120,12 @@ def run(
     Before anything is started raises ``RuntimeFailure`` when something it needs is not there, and ``LaunchFileError``
     for a program that cannot be executed.
     """
-    from enclave_launch.running import run_launched
+    from enclave_launch.runtime.warden_process import WardenProcess
 
-    return run_launched(launch, options or RunSettings())
+    with WardenProcess() as warden:  # starts up while we import what drives it
+        from enclave_launch.running import run_launched
+
+        return run_launched(launch, options or RunSettings(), warden)
 
 
 async def run_async(

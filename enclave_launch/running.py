@@ -17,20 +17,21 @@ from enclave_launch.runtime.service import RunOptions, run_launch, run_launch_as
 
 if TYPE_CHECKING:
     from enclave_launch.options import RunSettings
+    from enclave_launch.runtime.warden_process import WardenProcess
     from enclave_launch.secured import ProvisionedLaunch
 
 
 Launch = Union[EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
 
 
-def run_launched(launch: Launch, settings: RunSettings) -> int:
+def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -> int:
     """Block until all is over. Before anything was started raises ``RuntimeFailure``, and ``LaunchFileError``
     for a program that is not there."""
     source = _evaluated(launch).source
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
         check_programs(_evaluated(launch).evaluation.processes)
-        return run_launch(source.launch_file, source.arguments, gate=gate, options=options)
+        return run_launch(source.launch_file, source.arguments, gate=gate, options=options, warden=warden)
 
 
 async def run_launched_async(launch: Launch, settings: RunSettings) -> int:

@@ -11,15 +11,12 @@ import contextlib
 import errno
 import os
 import signal
-import socket
-import subprocess
-import sys
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Literal, NamedTuple
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.warden_channel import Message, WardenChannel
+from enclave_launch.runtime.warden_process import WardenProcess
 
 Stream = Literal["stdout", "stderr"]
 OnOutput = Callable[[Stream, bytes], None]
@@ -159,26 +156,10 @@ class Child:
 class ProcessTree:
     """Use as an async context manager: leaving it ends everything that is still running."""
 
-    def __init__(self) -> None:
-        _occupy_standard_descriptors()
-        ours, theirs = socket.socketpair()
-        with theirs:
-            os.set_inheritable(theirs.fileno(), True)
-            try:
-                self._process = subprocess.Popen(
-                    [sys.executable, "-I", "-S", _warden_script(), str(theirs.fileno())],
-                    pass_fds=[theirs.fileno()],
-                    stdin=subprocess.DEVNULL,
-                    stdout=subprocess.DEVNULL,
-                    start_new_session=True,
-                    env={},
-                )
-            except OSError as error:
-                ours.close()
-                raise RuntimeFailure(
-                    f"cannot start the warden with {sys.executable!r}: {error.strerror}"
-                ) from error
-        self._channel = WardenChannel(ours, self._on_message, self._on_lost)
+    def __init__(self, warden: WardenProcess | None = None) -> None:
+        started = warden or WardenProcess()
+        self._process = started.process
+        self._channel = WardenChannel(started.connection, self._on_message, self._on_lost)
         self._children: dict[int, Child] = {}
         self._count = 0
         self._paused = False
@@ -284,17 +265,6 @@ class ProcessTree:
                 child.started.set_exception(RuntimeFailure("the warden process was killed"))
         if self.lost is not None and not self.lost.done():
             self.lost.set_result(None)
-
-
-def _occupy_standard_descriptors() -> None:
-    """Where we were started with one of 0, 1, 2 closed: what we open must not end up there, and be printed into."""
-    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
-        pass
-    os.close(descriptor)
-
-
-def _warden_script() -> str:
-    return str(Path(__file__).with_name("warden.py"))
 
 
 def _open_output(emulate_tty: bool) -> tuple[int, int]:

@@ -37,6 +37,7 @@ from enclave_launch.runtime.log_directory import log_base_directory, make_log_di
 from enclave_launch.runtime.process_tree import ProcessTree
 from enclave_launch.runtime.ros_services import RosServices
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
+from enclave_launch.runtime.warden_process import WardenProcess
 
 
 class RunOptions(NamedTuple):
@@ -63,8 +64,11 @@ def run_launch(
     *,
     gate: EnclaveGate | None = None,
     options: RunOptions | None = None,
+    warden: WardenProcess | None = None,
 ) -> int:
     """Run a launch file to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
+
+    ``warden``: one that is starting up already; it ends with the launch.
 
     :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed, not the
         main thread.
@@ -72,7 +76,9 @@ def run_launch(
     _require_signals()
 
     async def main() -> int:
-        service = LaunchService(launch_file, arguments, gate=gate, options=options or RunOptions())
+        service = LaunchService(
+            launch_file, arguments, gate=gate, options=options or RunOptions(), warden=warden
+        )
         with _signals_to(service):
             return await service.run()
 
@@ -105,11 +111,13 @@ class LaunchService:
         *,
         gate: EnclaveGate | None,
         options: RunOptions,
+        warden: WardenProcess | None = None,
     ) -> None:
         self._launch_file = os.path.abspath(launch_file)
         self._arguments = arguments
         self._gate = gate
         self._options = options
+        self._warden = warden
         self._wake = asyncio.Event()
         self._futures: list[asyncio.Future[Any]] = []
         self._shutting_down = False
@@ -128,7 +136,7 @@ class LaunchService:
             )
         async with AsyncExitStack() as stack:
             stack.callback(_running.release)
-            tree = ProcessTree()  # first: the warden starts up while we go on
+            tree = ProcessTree(self._warden)  # first: the warden starts up while we go on
             await stack.enter_async_context(tree)
             stack.enter_context(_many_descriptors())
             self._services = self._ros_services()
