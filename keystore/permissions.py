@@ -101,11 +101,12 @@ def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
     """All profiles of the enclave as one set of DDS rules; DENY of any beats ALLOW of any."""
     allowed: tuple[set[str], set[str]] = (set(), set())
     denied: tuple[set[str], set[str]] = (set(), set())
+    allow = Qualifier.ALLOW
     try:
         for profile in policy.profiles:
             for operation, qualifier, expression in profile.rules:
-                target = allowed if qualifier is Qualifier.ALLOW else denied
-                add_dds_topics(operation, full_name(expression, profile), *target)
+                publish, subscribe = allowed if qualifier is allow else denied
+                add_dds_topics(operation, full_name(expression, profile), publish, subscribe)
     except PolicyError as error:
         raise PolicyError(f"enclave {printable(policy.path)}: {error}") from None
     if rmw not in RMW_WITHOUT_DISCOVERY_TOPIC:

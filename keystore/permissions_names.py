@@ -25,12 +25,29 @@ _FULL_NAME = re.compile(rf"(?:/{_TOKEN})+\Z")
 _PATTERN = r"(?:[A-Za-z0-9_/*?]|\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\])+\Z"
 _WILDCARDS = frozenset("*?[]")
 
-# Suffixes of the DDS names of one action. Client and server see the same ones, the other way round.
-_ACTION_REQUESTS = tuple(f"/_action/{part}Request" for part in ("cancel_goal", "get_result", "send_goal"))
-_ACTION_REPLIES = tuple(f"/_action/{part}Reply" for part in ("cancel_goal", "get_result", "send_goal"))
-_ACTION_TOPICS = ("/_action/feedback", "/_action/status")
-
 Topics = tuple[str, ...]
+Forms = tuple[tuple[str, str], ...]
+"""What stands before and after a name."""
+
+_TOPIC: Forms = (("rt", ""),)
+_REQUEST: Forms = (("rq", "Request"),)
+_REPLY: Forms = (("rr", "Reply"),)
+_ACTION_REQUESTS: Forms = tuple(
+    ("rq", f"/_action/{part}Request") for part in ("cancel_goal", "get_result", "send_goal")
+)
+_ACTION_ANSWERS: Forms = (
+    *(("rr", f"/_action/{part}Reply") for part in ("cancel_goal", "get_result", "send_goal")),
+    *(("rt", f"/_action/{part}") for part in ("feedback", "status")),
+)
+# What a participant publishes and what it subscribes for an operation.
+_FORMS: dict[Operation, tuple[Forms, Forms]] = {
+    Operation.PUBLISH: (_TOPIC, ()),
+    Operation.SUBSCRIBE: ((), _TOPIC),
+    Operation.REQUEST: (_REQUEST, _REPLY),
+    Operation.REPLY: (_REPLY, _REQUEST),
+    Operation.CALL: (_ACTION_REQUESTS, _ACTION_ANSWERS),
+    Operation.EXECUTE: (_ACTION_ANSWERS, _ACTION_REQUESTS),
+}
 
 
 def has_wildcard(name: str) -> bool:
@@ -68,21 +85,11 @@ def dds_topics(operation: Operation, name: str) -> tuple[set[str], set[str]]:
 
 def add_dds_topics(operation: Operation, name: str, publish: set[str], subscribe: set[str]) -> None:
     """As ``dds_topics``, into sets that the caller fills for many names: this runs before every start."""
-    if operation is Operation.PUBLISH:
-        publish.add(f"rt{name}")
-    elif operation is Operation.SUBSCRIBE:
-        subscribe.add(f"rt{name}")
-    elif operation is Operation.REQUEST:
-        publish.add(f"rq{name}Request")
-        subscribe.add(f"rr{name}Reply")
-    elif operation is Operation.REPLY:
-        publish.add(f"rr{name}Reply")
-        subscribe.add(f"rq{name}Request")
-    else:
-        asked, answered = (publish, subscribe) if operation is Operation.CALL else (subscribe, publish)
-        asked.update(f"rq{name}{suffix}" for suffix in _ACTION_REQUESTS)
-        answered.update(f"rr{name}{suffix}" for suffix in _ACTION_REPLIES)
-        answered.update(f"rt{name}{suffix}" for suffix in _ACTION_TOPICS)
+    published, subscribed = _FORMS[operation]
+    for before, after in published:
+        publish.add(before + name + after)
+    for before, after in subscribed:
+        subscribe.add(before + name + after)
 
 
 def ros_rules(
@@ -114,7 +121,7 @@ def ros_rules(
 
 def _candidates(operation: Operation, topics: tuple[set[str], set[str]]) -> set[str]:
     side = 0 if operation in (Operation.CALL, Operation.REQUEST) else 1
-    suffix = _ACTION_REQUESTS[2] if operation in (Operation.EXECUTE, Operation.CALL) else "Request"
+    suffix = _ACTION_REQUESTS[2][1] if operation in (Operation.EXECUTE, Operation.CALL) else "Request"
     return {t[2 : -len(suffix)] for t in topics[side] if t.startswith("rq/") and t.endswith(suffix)}
 
 

@@ -17,7 +17,7 @@ from enclave_launch.policy.running_node import RunningNode
 from keystore.policy import Operation
 from nodl.builtin_interfaces import Condition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
-from nodl.names import InvalidNameError, validate_namespace, validate_node_name
+from nodl.names import MAX_NAME_LENGTH, InvalidNameError, validate_namespace, validate_node_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind
 from nodl.remap import NodeNames, ParsedRule, Resolved
 
@@ -140,11 +140,15 @@ class _Collector:
             self._unresolved(operation, place, str(error))
 
     def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
-        """Every node has them, by the dozen: whatever is the same for many nodes is known already."""
+        """Every node has them, by the dozen, and their names need no check but of the length."""
         node, permissions = self._fqn, self._result.permissions
+        remapped = bool(self._node.rules.names)
         try:
             for operation, name, place in rows:
-                final, rules = self._plain(operation, name)
+                rules: tuple[ParsedRule, ...] = ()
+                final = node + name[1:] if name[0] == "~" else name
+                if remapped or len(final) > MAX_NAME_LENGTH:
+                    final, rules = self._plain(operation, name)
                 permissions.append(Permission(operation, final, Reason(node, "built-in", place, name, rules)))
         except InvalidNameError as error:
             self._unresolved(None, str(self._node.location), f"{error}; it could not start under this name")

@@ -51,8 +51,8 @@ def node_of_process(
     rules = RemapRules(
         process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location)
     )
-    node = _named(interface, rules, process.parameters, enclave, process.location, role)
-    return node._replace(inputs=program_inputs(process))
+    inputs = program_inputs(process)
+    return _named(interface, rules, process.parameters, enclave, process.location, role, inputs)
 
 
 def node_of_component(
@@ -68,7 +68,8 @@ def node_of_component(
     if container is not None and component.extra_arguments.get("forward_global_arguments") is True:
         forwarded = _parse(parse_ros_arguments(container.cmd).remaps, container.remaps, container.location)
     rules = RemapRules(local=_parse(texts, component.remaps, component.location), process=forwarded)
-    return _named(interface, rules, component.parameters, enclave, component.location, "component")
+    inputs = ProgramInputs()
+    return _named(interface, rules, component.parameters, enclave, component.location, "component", inputs)
 
 
 def _named(
@@ -78,6 +79,7 @@ def _named(
     enclave: str,
     location: SourceLocation,
     role: Role,
+    inputs: ProgramInputs,
 ) -> RunningNode:
     original = interface.name or ""
     name = rules.node_name(original).name
@@ -89,7 +91,7 @@ def _named(
         )
     namespace = rules.namespace(interface.namespace or "/", name).name
     return RunningNode(
-        interface, original or name, name, namespace, rules, parameters, enclave, location, role
+        interface, original or name, name, namespace, rules, parameters, enclave, location, role, inputs
     )
 
 
