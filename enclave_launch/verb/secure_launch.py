@@ -20,10 +20,16 @@ if TYPE_CHECKING:
     from enclave_launch.verb.target import Target
 
 
+_ALLOCATIONS = 100_000
+"""Between two searches for garbage. Python's 700 search all that a start-up builds, and nearly all of it stays."""
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv`` (default: the program's own). Gives the exit status, never a traceback
     for what a user can cause."""
     options = build_parser().parse_intermixed_args(argv)
+    before = gc.get_threshold()
+    gc.set_threshold(_ALLOCATIONS)
     try:
         return _main(options)
     except EnclaveLaunchError as error:
@@ -34,6 +40,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    finally:
+        gc.set_threshold(*before)
 
 
 def _main(options: argparse.Namespace) -> int:
@@ -207,12 +215,14 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int
 def _check_before_keys_are_made(plan: LaunchPlan) -> None:
     """What ``run`` would refuse in any case, asked before the keystore is touched. Raises as ``run`` does."""
     from enclave_launch.evaluation.programs import check_programs
-    from enclave_launch.runtime.ros_services import require_rclpy
 
     if plan.problems:
         return  # told first, by ``provision``
     check_programs(plan.evaluation.processes)
     if plan.launcher is not None:
+        # It brings asyncio, which otherwise is imported while the warden starts up.
+        from enclave_launch.runtime.ros_services import require_rclpy
+
         require_rclpy()
 
 
