@@ -93,29 +93,33 @@ class PlanProvider:
 
     def _follow(self, plan: LaunchPlan) -> None:
         self._plan = plan
-        self._by_name = {(item.process.process_name, identity(item.process)): item for item in plan.processes}
-        self._by_identity = {identity(item.process): item for item in plan.processes}
+        identified = [(identity(item.process), item) for item in plan.processes]
+        self._by_name = {(item.process.process_name, key): item for key, item in identified}
+        self._by_identity = dict(identified)
         self._policies = {enclave.path: enclave for enclave in plan.derived.policy.enclaves}
 
     def granted(self, process: ResolvedProcess) -> Grant | None:
         """The grant, if a look at the files' inodes and times is enough to know that the enclave is the one
         provisioned."""
-        planned = self._planned(process)
+        planned = self._find(process)
+        if planned is None:
+            return None
         if planned.enclave is not None and not self._is_untouched(self._policies[planned.enclave.path]):
             return None
         return self._grant(planned, process.environment)
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         """Raises ``ProvisionError`` when its enclave is no longer what was provisioned."""
-        planned = self._planned(process)
+        planned = self._find(process)
+        assert planned is not None, "the gate lets only planned processes come here"
         if planned.enclave is not None:
             self._check(self._policies[planned.enclave.path])
         return self._grant(planned, process.environment)
 
-    def _planned(self, process: ResolvedProcess) -> PlannedProcess:
+    def _find(self, process: ResolvedProcess) -> PlannedProcess | None:
         """Equal processes may have enclaves of their own; their names tell them apart unless events reordered them."""
         key = identity(process)
-        return self._by_name.get((process.process_name, key)) or self._by_identity[key]
+        return self._by_name.get((process.process_name, key)) or self._by_identity.get(key)
 
     def ensure_late(self, process: ResolvedProcess) -> Grant:
         """Extend the plan by ``process`` and provision that; what the plan has already is only held against it.
@@ -131,8 +135,8 @@ class PlanProvider:
             raise ProvisionError("\n".join(new))
         before = self._policies
         self._follow(extended)
-        planned = self._planned(process)
-        if planned.enclave is not None:
+        planned = self._find(process)
+        if planned is not None and planned.enclave is not None:
             policy = self._policies[planned.enclave.path]
             if policy.path in before:  # to extend is not to repair
                 self._check(before[policy.path])

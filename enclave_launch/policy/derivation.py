@@ -36,6 +36,8 @@ LIST_NAMES: dict[Operation, str] = {
 _MANY_RULES = 20
 
 Reasons = dict[Rule, list[Reason]]
+_OTHER_NAME = "it could not start: give it another name or namespace"
+
 ProfileKey = tuple[str, str]  # namespace and node name
 
 
@@ -134,7 +136,8 @@ class _Collection:
             if unresolved.operation and _answered(policy_file, node, unresolved.operation):
                 self.warnings.append(f"{unresolved.text}; the policy file says what it may do")
             else:
-                self.problems.append(f"{unresolved.text}; {_remedy(node)}")
+                remedy = _OTHER_NAME if unresolved.impossible_name else _remedy(node)
+                self.problems.append(f"{unresolved.text}; {remedy}")
 
     def result(self) -> DerivedPolicy:
         enclaves = tuple(

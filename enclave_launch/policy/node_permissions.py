@@ -62,10 +62,14 @@ class Permission(NamedTuple):
 
 
 class Unresolved(NamedTuple):
-    """An interface whose name is not (wholly) known: no permission follows from it. ``text`` for a person."""
+    """An interface whose name is not (wholly) known: no permission follows from it. ``text`` for a person.
+
+    ``impossible_name``: nothing is unknown, but no node can run under the name it is given.
+    """
 
     operation: Operation | None
     text: str
+    impossible_name: bool = False
 
 
 @dataclass(slots=True)
@@ -100,7 +104,7 @@ class _Collector:
             validate_node_name(self._node.name)
             validate_namespace(self._node.namespace)
         except InvalidNameError as error:
-            self._unresolved(None, str(self._node.location), str(error))
+            self._impossible(error)
             return self._result
         for endpoint in self._node.interface.endpoints:
             self._endpoint(endpoint)
@@ -151,7 +155,7 @@ class _Collector:
                     final, rules = self._plain(operation, name)
                 permissions.append(Permission(operation, final, Reason(node, "built-in", place, name, rules)))
         except InvalidNameError as error:
-            self._unresolved(None, str(self._node.location), f"{error}; it could not start under this name")
+            self._impossible(error)
 
     def _resolve(self, operation: Operation, name: str, place: str) -> Iterator[tuple[Operation, Resolved]]:
         """The final names: one, or five where the parts of an action were remapped one by one."""
@@ -210,6 +214,10 @@ class _Collector:
         reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note)
         self._result.permissions.append(Permission(operation, name, reason))
         self._result.warnings.append(f"{place}: node {self._fqn} may {operation.value} {name}: {note}")
+
+    def _impossible(self, error: InvalidNameError) -> None:
+        text = f"{self._node.location}: node {self._fqn}: {error}"
+        self._result.unresolved.append(Unresolved(None, text, impossible_name=True))
 
     def _unresolved(self, operation: Operation | None, place: str, why: str) -> None:
         text = f"{place}: node {self._fqn}: {why}"

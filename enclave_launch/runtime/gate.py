@@ -47,7 +47,8 @@ class EnclaveGate(Protocol):
 class Provider(Protocol):
     """What makes enclaves complete: implemented over a plan and a keystore."""
 
-    def granted(self, process: ResolvedProcess) -> Grant | None: ...
+    def granted(self, process: ResolvedProcess) -> Grant | None:
+        """What takes no work; None for every process that the plan does not have."""
 
     def ensure(self, process: ResolvedProcess) -> Grant: ...
 
@@ -105,7 +106,7 @@ class PlannedGate:
         self._say_late = say_late
 
     def granted(self, process: ResolvedProcess) -> Grant | None:
-        return self._provider.granted(process) if identity(process) in self._processes else None
+        return self._provider.granted(process)
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         if identity(process) in self._processes:

@@ -118,6 +118,21 @@ def test_only_what_is_due_is_renewed(tmp_path: Path) -> None:
     assert not expires_soon(root, 30 * DAY, now=NOW)
 
 
+def test_what_provisioning_saw_need_not_be_read_again(tmp_path: Path) -> None:
+    """The validities of a report stand for files: the same answer, without a look at them."""
+    root = filled(tmp_path / "ks", ["/a", "/b"], now=NOW, lifetime=20 * DAY)
+    known = provision(root, [policy("/a"), policy("/b")], options=options(now=NOW)).validities
+    assert known.keys() == {"/a", "/b"}
+    soon = expires_soon(root, 30 * DAY, enclaves=known, now=NOW)
+    assert [one.subject for one in soon] == [
+        f"{what} of {name}" for what in ("certificate", "permissions") for name in known
+    ]
+    (root / "enclaves/a/cert.pem").unlink()
+    assert expires_soon(root, 30 * DAY, enclaves=known, known=known, now=NOW) == soon
+    assert not expires_soon(root, 10 * DAY, enclaves=known, known=known, now=NOW)
+    assert provision(root, [policy("/a")], options=options(now=NOW)).validities == {}, "just made, not found"
+
+
 def test_named_enclaves_are_renewed_in_any_case(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a", "/b"])
     key = (root / "enclaves/a/key.pem").read_bytes()

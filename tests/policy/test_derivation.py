@@ -283,6 +283,15 @@ def test_gaps_of_inference_are_problems(node: NodeMaker) -> None:
     assert problem.startswith("talker.py:30: node /talker: eval() cannot be followed; describe demo/talker")
 
 
+def test_a_name_that_leaves_no_room_for_its_services_is_a_problem(node: NodeMaker) -> None:
+    """rcl creates ``~/set_parameters_atomically`` for every node, and refuses names over 247 characters."""
+    derived = derive(node(name="n" * 60, namespace="/" + "a" * 170))
+    (problem,) = derived.problems
+    assert problem.startswith("demo.launch.xml:5: node /aaa")
+    assert problem.endswith("is longer than 247 characters; it could not start: give it another name or namespace")
+    assert not derive(node(name="n" * 40, namespace="/" + "a" * 170)).problems
+
+
 @pytest.mark.parametrize(
     ("name", "namespace"), [("a b", "/"), ("n", "/a/"), ("<node_name_unspecified>", "/")]
 )

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.process import EnclaveRequest, RemapRule, ResolvedComponent, ResolvedProcess
-from enclave_launch.runtime.gate import Grant, LateProcess, PlannedGate
+from enclave_launch.runtime.gate import Grant, LateProcess, PlannedGate, identity
 from enclave_launch.source_location import SourceLocation
 
 PLACE = SourceLocation("demo.launch.py", 12, "node")
@@ -49,7 +49,7 @@ class Keystore:
         self.done: list[str] = []
 
     def granted(self, process: ResolvedProcess) -> Grant | None:
-        return Grant(("--enclave", "/robot"))
+        return Grant(("--enclave", "/robot")) if identity(process) == identity(TALKER) else None
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         self.done.append(f"planned {process.fqn}")

@@ -406,11 +406,13 @@ def test_two_hundred_processes_in_one_launch(tmp_path: Path) -> None:
 
 def test_two_hundred_respawns_leak_neither_descriptors_nor_memory_nor_handlers(tmp_path: Path) -> None:
     prelude = """
-        import os
+        import os, sys
         def measure(context):
             pages = int(open("/proc/self/statm").read().split()[1])
             handlers = len(context._event_handlers.all())
-            print("MEASURED", len(os.listdir("/proc/self/fd")), handlers, pages * 4, flush=True)
+            line = f"MEASURED {len(os.listdir('/proc/self/fd'))} {handlers} {pages * 4}"
+            sys.stdout.write(line + chr(10))  # in one piece: launch's own lines come from another thread
+            sys.stdout.flush()
     """
     action = 'sh("true", respawn=True, respawn_max_retries=200, on_exit=[OpaqueFunction(function=measure)])'
     status, lines = finished(tmp_path, action, prelude=prelude)
