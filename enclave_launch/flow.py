@@ -95,7 +95,7 @@ def provision(
 
     Raises ``ManifestError`` for a plan with problems (nothing is written then) and ``ProvisionError``.
     """
-    from enclave_launch.secured import ProvisionedLaunch, file_stamp, provision_policies
+    from enclave_launch.secured import ProvisionedLaunch, provision_policies
     from enclave_launch.security_environment import SecuritySettings, environment_domains
     from keystore.provisioning import ProvisionOptions
 
@@ -104,12 +104,8 @@ def provision(
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
     wanted = chosen.keystore or ProvisionOptions(domains=environment_domains(os.environ))
-    enclaves = plan.derived.policy.enclaves
-    before = [(enclave.path, file_stamp(settings.keystore, enclave.path)) for enclave in enclaves]
-    report = provision_policies(settings, enclaves, wanted)
-    standing = report.validities
-    stamps = {path: stamp for path, stamp in before if path in standing}
-    return ProvisionedLaunch(plan, settings, report, wanted, stamps)
+    report = provision_policies(settings, plan.derived.policy.enclaves, wanted)
+    return ProvisionedLaunch(plan, settings, report, wanted)
 
 
 def run(

@@ -21,27 +21,19 @@ from enclave_launch.security_environment import (
     launcher_environment,
     secured_environment,
 )
-from keystore import layout
-from keystore.enclave_state import OTHER_PERMISSIONS
 from keystore.errors import KeystoreError
 from keystore.policy import EnclavePolicy
-from keystore.provisioning import ProvisionOptions, ProvisionReport, provision, what_is_wrong
-
-Stamp = tuple[tuple[int, int, int] | None, ...]
-"""What any change to an enclave's files changes: inode, size and change time (which nobody can set back) of each."""
-
-_STAMPED = sorted(layout.ENCLAVE_FILES)
+from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
+from keystore.stamps import enclave_stamp
 
 
 class ProvisionedLaunch(NamedTuple):
-    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it. ``stamps``: of
-    each enclave that provisioning found standing, its files as they were just before it looked."""
+    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it."""
 
     plan: LaunchPlan
     settings: SecuritySettings
     report: ProvisionReport
     options: ProvisionOptions
-    stamps: Mapping[str, Stamp]
 
     @property
     def secret_variables(self) -> frozenset[str]:
@@ -60,20 +52,6 @@ def provision_policies(
         raise ProvisionError(str(error)) from error
 
 
-def file_stamp(keystore: str, enclave: str) -> Stamp:
-    """Of what provisioning looks at, links followed; None for what is not there."""
-    directory = f"{keystore}/{layout.enclave_directory(enclave)}"
-    return tuple(_file_stamp(f"{directory}/{name}") for name in _STAMPED)
-
-
-def _file_stamp(path: str) -> tuple[int, int, int] | None:
-    try:
-        status = os.stat(path)
-    except OSError:
-        return None
-    return status.st_ino, status.st_size, status.st_ctime_ns
-
-
 class PlanProvider:
     """Lets processes start whose enclave is what was provisioned, and hands out what rcl reads."""
 
@@ -81,9 +59,9 @@ class PlanProvider:
         self._launch = launch
         self._follow(launch.plan)
         self._seen = {
-            path: (policy, launch.stamps[path])
+            path: (policy, launch.report.stamps[path])
             for path, policy in self._policies.items()
-            if path in launch.stamps
+            if path in launch.report.stamps
         }
 
     @property
@@ -157,6 +135,8 @@ class PlanProvider:
         """
         if self._is_untouched(policy):
             return
+        from keystore.provisioning_check import what_is_wrong
+
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = what_is_wrong(keystore, policy, options=self._launch.options)
@@ -169,10 +149,10 @@ class PlanProvider:
                 f"enclave {enclave} in {keystore} is no longer what was provisioned for this launch: "
                 f"{'; '.join(wrong)}. {_who_changed_it(wrong)}"
             )
-        self._seen[enclave] = (policy, file_stamp(keystore, enclave))
+        self._seen[enclave] = (policy, enclave_stamp(keystore, enclave))
 
     def _is_untouched(self, policy: EnclavePolicy) -> bool:
-        stamp = file_stamp(self._launch.settings.keystore, policy.path)
+        stamp = enclave_stamp(self._launch.settings.keystore, policy.path)
         return self._seen.get(policy.path) == (policy, stamp)
 
     def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
@@ -183,6 +163,8 @@ class PlanProvider:
 
 
 def _who_changed_it(wrong: tuple[str, ...]) -> str:
+    from keystore.enclave_state import OTHER_PERMISSIONS
+
     if OTHER_PERMISSIONS in wrong:
         return (
             "Another launch on this keystore that has an enclave of this name provisions its own permissions: give "

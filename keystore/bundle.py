@@ -20,9 +20,10 @@ from pathlib import Path
 
 from keystore import layout, safe_files, store
 from keystore.errors import DamagedKeystore, InvalidInput, StorageError, printable
+from keystore.safe_files import resolve_root
 from keystore.validity import utc_now
 from keystore.verification.finding import Finding, Severity
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 _LINKED = ("identity_ca.cert.pem", "permissions_ca.cert.pem", layout.ENCLAVE_GOVERNANCE, layout.ENCLAVE_CRL)
 

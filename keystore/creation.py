@@ -23,13 +23,14 @@ from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printab
 from keystore.governance import Governance, governance_document, parse_governance
 from keystore.governance_file import covers, governance_stands
 from keystore.role import Role
+from keystore.safe_files import resolve_root
 from keystore.settings import Settings
 from keystore.signer import FileSigner, open_signer
 from keystore.store import Content, Store
 from keystore.subject import SubjectScheme
 from keystore.trusted_documents import trusted_document
 from keystore.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,17 +8,11 @@ from pathlib import Path
 from keystore.enclave_name import validate_enclave_name
 from keystore.enclave_state import PermissionsSource
 from keystore.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
-from keystore.provisioning import (
-    ProvisionOptions,
-    ProvisionReport,
-    Wish,
-    bring_about,
-    policy_source,
-    provision,
-    with_domains,
-)
+from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
+from keystore.provisioning_check import Wish, bring_about, policy_source, with_domains
+from keystore.safe_files import resolve_root
 from keystore.validity import Validity
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 
 def create_enclaves(

@@ -13,8 +13,9 @@ from keystore.crl_file import crl_validity
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import DamagedKeystore, InvalidInput
 from keystore.role import Role
+from keystore.safe_files import resolve_root
 from keystore.validity import Validity, later, parse_moment, utc_now
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 _DATE = rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_"
 

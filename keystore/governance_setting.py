@@ -13,8 +13,9 @@ from keystore.errors import DamagedKeystore
 from keystore.governance import Governance, governance_document
 from keystore.governance_file import governance_stands, signed_governance
 from keystore.role import Role
+from keystore.safe_files import resolve_root
 from keystore.validity import utc_now
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,15 +15,8 @@ from keystore.enclave_name import check_distinct
 from keystore.enclave_state import EnclaveState
 from keystore.enclave_writing import EnclaveWriter
 from keystore.governance_file import governance_domains
-from keystore.provisioning import (
-    EnclaveReport,
-    Progress,
-    ProvisionOptions,
-    ProvisionReport,
-    Wish,
-    as_found,
-    inspect_wish,
-)
+from keystore.provisioning import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
+from keystore.provisioning_check import Wish, as_found, inspect_wish
 from keystore.revocation import renew_crl
 from keystore.role import Role
 from keystore.store import Store

@@ -23,13 +23,15 @@ from keystore.enclave_name import validate_enclave_name
 from keystore.enclave_state import Identity
 from keystore.enclaves import keep
 from keystore.errors import InvalidInput, printable
-from keystore.provisioning import ProvisionOptions, ProvisionReport, Wish, bring_about, with_domains
+from keystore.provisioning import ProvisionOptions, ProvisionReport
+from keystore.provisioning_check import Wish, bring_about, with_domains
 from keystore.revocation import renew_crl, revoke_replaced
 from keystore.role import Role
+from keystore.safe_files import resolve_root
 from keystore.store import Store
 from keystore.subject import SubjectScheme, scheme_of
 from keystore.validity import utc_now
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 DEFAULT_WITHIN = timedelta(days=30)
 

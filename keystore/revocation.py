@@ -26,10 +26,11 @@ from keystore.der import DerError
 from keystore.enclave_name import validate_enclave_name
 from keystore.errors import DamagedKeystore, InvalidInput, printable
 from keystore.role import Role
+from keystore.safe_files import resolve_root
 from keystore.store import Link, Store
 from keystore.superseded import serials_of
 from keystore.validity import later, utc_now
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 if TYPE_CHECKING:
     from cryptography import x509

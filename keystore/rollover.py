@@ -28,12 +28,14 @@ from keystore.copies import refresh_copies
 from keystore.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
 from keystore.enclaves import keep
 from keystore.errors import InvalidInput
-from keystore.provisioning import ProvisionOptions, ProvisionReport, Wish, bring_about, with_domains
+from keystore.provisioning import ProvisionOptions, ProvisionReport
+from keystore.provisioning_check import Wish, bring_about, with_domains
 from keystore.revocation import drop_crl
 from keystore.role import Role
+from keystore.safe_files import resolve_root
 from keystore.store import Content, Store
 from keystore.validity import Validity, utc_now
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 
 class Step(str, Enum):

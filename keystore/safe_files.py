@@ -13,10 +13,18 @@ import stat
 from pathlib import Path
 
 from keystore import layout
-from keystore.errors import DamagedKeystore, StorageError, UnsafeKeystore, printable
+from keystore.errors import DamagedKeystore, NotAKeystore, StorageError, UnsafeKeystore, printable
 
 _MAX_FILE = 8_000_000
 _WRITABLE_BY_OTHERS = 0o022
+
+
+def resolve_root(keystore: Path | str) -> Path:
+    """Raises NotAKeystore for what can be no path."""
+    try:
+        return Path(os.path.realpath(keystore))
+    except ValueError:
+        raise NotAKeystore(f"{printable(keystore)} is no path") from None
 
 
 def read(root: Path, relative: str) -> bytes:

@@ -146,11 +146,3 @@ def _collect(directory: Path | str, prefix: str, found: list[str]) -> None:
         except InvalidEnclaveName:
             continue  # a stray, which verify reports
         _collect(entry.path, f"{prefix}/{entry.name}", found)
-
-
-def resolve_root(keystore: Path | str) -> Path:
-    """Raises NotAKeystore for what can be no path."""
-    try:
-        return Path(os.path.realpath(keystore))
-    except ValueError:
-        raise NotAKeystore(f"{printable(keystore)} is no path") from None

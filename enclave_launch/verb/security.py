@@ -13,10 +13,8 @@ from enclave_launch.security_environment import environment_domains
 from keystore.ca_access import CaAccess, Secret
 from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError
-from keystore.expiry import expires_soon
 from keystore.provisioning import ProvisionOptions
-from keystore.subject import SubjectScheme
-from keystore.validity import parse_duration, parse_end, utc_now
+from keystore.validity import later, parse_duration, parse_end, utc_now
 
 
 def security_options(options: argparse.Namespace) -> SecurityOptions:
@@ -32,6 +30,7 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
     subjects, creation = None, None
     if options.compatible_subjects:
         from keystore.creation import CreateOptions  # much to import, and rarely needed
+        from keystore.subject import SubjectScheme
 
         subjects, creation = SubjectScheme.COMPATIBLE, CreateOptions(subjects=SubjectScheme.COMPATIBLE)
     return ProvisionOptions(
@@ -59,10 +58,15 @@ def _passphrase(options: argparse.Namespace) -> Secret | None:
 
 def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
     """What of ``launch`` ends within ``margin`` (a duration such as ``30d``), one line each."""
+    within, ends = parse_duration(margin), launch.report.ends
+    if ends is not None and later(utc_now(), within) < ends:
+        return
+    from keystore.expiry import expires_soon
+
     keystore, known = launch.settings.keystore, launch.report.validities
     enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]
     try:
-        due = expires_soon(keystore, parse_duration(margin), enclaves=enclaves, known=known)
+        due = expires_soon(keystore, within, enclaves=enclaves, known=known)
     except InvalidInput as error:
         raise UsageError(str(error)) from error
     except KeystoreError as error:

@@ -13,6 +13,7 @@ from pathlib import Path
 from keystore import layout
 from keystore.ca_access import CaAccess
 from keystore.errors import KeystoreError, StorageError
+from keystore.safe_files import resolve_root
 from keystore.validity import utc_now
 from keystore.verification import repair
 from keystore.verification.authorities import check_authorities
@@ -20,7 +21,7 @@ from keystore.verification.enclaves import check_enclaves
 from keystore.verification.files import check_files
 from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
-from keystore.view import KeystoreView, resolve_root
+from keystore.view import KeystoreView
 
 
 @dataclass(frozen=True, slots=True)

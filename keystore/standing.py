@@ -1,0 +1,150 @@
+"""What was seen to stand, remembered between launches: then a look at the files' inodes and times is enough.
+
+    recall    before a provisioning: None, or that everything is as when it was last compared in full
+    remember  after a full comparison that found nothing to do
+
+The note is a cache of the user's, outside the keystore: ``$XDG_CACHE_HOME/enclave-launch``. It decides nothing but
+whether a comparison is repeated: DDS checks every signature when a process starts, and nothing is ever signed
+because of it. It holds for one policy text, one set of options, this code and these files; with any other, when
+it is not the user's alone, or when it is gone, everything is compared. Touches the cache directory only.
+"""
+
+from __future__ import annotations
+
+import binascii
+import os
+import stat
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import NamedTuple
+
+from keystore import layout
+from keystore.domains import Domains
+from keystore.policy import EnclavePolicy
+from keystore.role import Role
+from keystore.stamps import Stamp, enclave_stamp, file_stamp
+from keystore.validity import Validity
+
+_SHARED = (*(layout.ca_cert(role) for role in Role), layout.GOVERNANCE, layout.CRL)
+# What decides how an enclave should look: a newer version compares everything once more.
+_CODE = ("permissions.py", "permissions_names.py", "permissions_patterns.py", "enclave_state.py")
+
+
+class Question(NamedTuple):
+    """What is asked of a keystore, apart from the policies."""
+
+    root: Path
+    domains: Domains
+    rmw: str | None
+
+    def head(self) -> str:
+        """The note's first line: all that holds for every enclave."""
+        shared = [file_stamp(f"{self.root}/{name}") for name in _SHARED]
+        code = [file_stamp(os.path.join(os.path.dirname(__file__), name)) for name in _CODE]
+        return f"{self.root}\t{self.domains}\t{self.rmw}\t{shared}\t{code}"
+
+
+class Standing(NamedTuple):
+    """``stamps`` of the enclaves asked for, as they are; ``ends``: when the first certificate, CA or CRL ends."""
+
+    stamps: Mapping[str, Stamp]
+    ends: datetime
+
+
+def recall(
+    question: Question, policies: Iterable[EnclavePolicy], now: datetime, due: datetime
+) -> Standing | None:
+    """Whether all was seen to stand with these policies and nothing was touched since. ``due``: certificates that
+    end before it do not stand."""
+    head, span, lines = _read(question.root)
+    if not lines or head != question.head():
+        return None
+    begin, end = map(int, span.split("\t"))
+    last = end
+    stamps = {}
+    for policy in policies:
+        stamp = stamps[policy.path] = enclave_stamp(str(question.root), policy.path)
+        own_begin, own_end, seen = lines.get(policy.path, "0\t0\t").split("\t", 2)
+        if seen != _seen(stamp, policy):
+            return None
+        begin, last = max(begin, int(own_begin)), min(last, int(own_end))
+    if not begin <= now.timestamp() <= end or last < due.timestamp():
+        return None
+    return Standing(stamps, datetime.fromtimestamp(last, timezone.utc))
+
+
+def remember(
+    question: Question,
+    shared: Validity,
+    found: Iterable[tuple[EnclavePolicy, Stamp, Validity]],
+) -> None:
+    """``found``: what a full comparison saw to stand, with stamps from before it. ``shared``: of CAs and CRL.
+
+    Best effort: without a cache directory of the user's own nothing is remembered.
+    """
+    head = question.head()
+    known, _, lines = _read(question.root)
+    kept = lines if known == head else {}
+    new = {policy.path: f"{_span(validity)}\t{_seen(stamp, policy)}" for policy, stamp, validity in found}
+    text = "\n".join([head, _span(shared), *(f"{path}\t{line}" for path, line in {**kept, **new}.items())])
+    with suppress(OSError, ValueError):  # no such directory, no room, a name that is no text
+        _write(_note(question.root), text)
+
+
+def _seen(stamp: Stamp, policy: EnclavePolicy) -> str:
+    return f"{stamp}\t{list(_words(policy))}"
+
+
+def _words(policy: EnclavePolicy) -> Iterator[str]:
+    for ns, node, rules in policy.profiles:
+        yield f"{ns!r} {node!r}"
+        yield from map(" ".join, rules)  # of a rule only the last word is free text
+
+
+def _span(validity: Validity) -> str:
+    return f"{int(validity.not_before.timestamp())}\t{int(validity.not_after.timestamp())}"
+
+
+def _read(root: Path) -> tuple[str, str, dict[str, str]]:
+    """Head, span of what is shared, and the line of each enclave; empty unless the note is ours alone."""
+    note = _note(root)
+    try:
+        if not _is_ours(os.lstat(note.parent)):
+            return "", "", {}
+        descriptor = os.open(note, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+        with open(descriptor, encoding="utf-8", newline="\n") as file:
+            if not _is_ours(os.fstat(descriptor)):
+                return "", "", {}
+            head, span, *lines = file.read().split("\n")
+    except (OSError, ValueError):
+        return "", "", {}
+    parts = (line.partition("\t") for line in lines)
+    return head, span, {path: line for path, _, line in parts}
+
+
+def _is_ours(status: os.stat_result) -> bool:
+    return status.st_uid == os.geteuid() and not status.st_mode & 0o022 and not stat.S_ISLNK(status.st_mode)
+
+
+def _note(root: Path) -> Path:
+    """One file for each keystore; two that share a name only make each other forget."""
+    base = os.environ.get("XDG_CACHE_HOME", "")
+    if not os.path.isabs(base):  # the XDG base directory specification: anything else is to be ignored
+        base = os.path.join(os.path.expanduser("~"), ".cache")
+    return Path(base, "enclave-launch", f"standing-{binascii.crc32(os.fsencode(root)):08x}")
+
+
+def _write(note: Path, text: str) -> None:
+    import tempfile  # much to import, and only when there is something new to remember
+
+    note.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    descriptor, name = tempfile.mkstemp(dir=note.parent)
+    try:
+        with open(descriptor, "w", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+        os.replace(name, note)
+    except BaseException:
+        os.unlink(name)
+        raise
