@@ -15,8 +15,9 @@ The last two where launch, launch_ros and ros2launch are importable, from a sour
 
 What makes the figures hold on a machine that does other things, too: every round runs each variant once, in random
 order, so that a disturbance meets all alike; a figure is the median over rounds (``BENCH_RUNS``,
-by default 15) after one that only warms caches; what ``--secure`` adds is the median of the differences *within*
-rounds, shown with its quartiles. CPU time counts launcher and nodes together.
+by default 15) after two that only warm caches; what ``--secure`` adds is the median of the differences *within*
+rounds, shown with its quartiles and with the difference of the least disturbed runs. CPU time counts launcher and
+nodes together.
 
 Also: output through our pumps to a file, against ``cat``.
 """
@@ -49,6 +50,7 @@ REAL_LAUNCH = [path for path in os.environ.get("REAL_LAUNCH_PYTHONPATH", "").spl
 sys.path.extend(REAL_LAUNCH)
 ROUNDS = int(os.environ.get("BENCH_RUNS", "15"))
 NODES = 50
+_WARMING = 2
 PACKAGE = "bench_nodes"
 
 SCRIPT = """#!/bin/bash
@@ -112,6 +114,7 @@ class Workspace:
             **inherited,
             "PYTHONPYCACHEPREFIX": str(self.directory / "bytecode"),
             "BENCH_STAMPS": str(self.stamps),
+            "XDG_CACHE_HOME": str(self.directory / "cache"),
             "AMENT_PREFIX_PATH": os.pathsep.join(filter(None, prefixes)),
             "PYTHONPATH": os.pathsep.join(filter(None, [*path, os.environ.get("PYTHONPATH", "")])),
             "ROS_LOG_DIR": str(self.directory / "log"),
@@ -188,13 +191,13 @@ def variants(workspace: Workspace, count: int) -> Mapping[str, Variant]:
 
 
 def measured(workspace: Workspace, count: int) -> Mapping[str, list[Times]]:
-    """All rounds of all variants but the first, which warms caches: bytecode, files, keystores."""
+    """All rounds of all variants but those that warm caches: bytecode, files, keystores and what is known of them."""
     chosen = variants(workspace, count)
     results: dict[str, list[Times]] = {name: [] for name in chosen}
-    for _ in range(ROUNDS + 1):
+    for _ in range(_WARMING + ROUNDS):
         for name in random.sample(list(chosen), len(chosen)):
             results[name].append(workspace.time(chosen[name], count))
-    return {name: times[1:] for name, times in results.items()}
+    return {name: times[_WARMING:] for name, times in results.items()}
 
 
 def median(times: Sequence[Times]) -> Times:
@@ -227,9 +230,10 @@ def differences(before: Sequence[Times], after: Sequence[Times]) -> Iterator[str
     """Of runs in the same round."""
     labels = ("until the first process", "until the last process", "CPU")
     for column, label in zip(COLUMNS, labels, strict=True):
-        added = [getattr(b, column) - getattr(a, column) for a, b in zip(before, after, strict=True)]
-        low, middle, high = statistics.quantiles(added, n=4)
-        yield f"{label:24} {middle:+6.1f} ms  (half of the rounds between {low:+.1f} and {high:+.1f})"
+        less, more = ([getattr(one, column) for one in times] for times in (before, after))
+        low, middle, high = statistics.quantiles([b - a for a, b in zip(less, more, strict=True)], n=4)
+        spread = f"half of the rounds between {low:+.1f} and {high:+.1f}"
+        yield f"{label:24} {middle:+6.1f} ms  ({spread}; fastest against fastest {min(more) - min(less):+.1f})"
 
 
 def report_output(workspace: Workspace, title: str, command: str) -> None:

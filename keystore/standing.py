@@ -14,6 +14,7 @@ from __future__ import annotations
 import binascii
 import os
 import stat
+import time
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from datetime import datetime, timezone
@@ -30,6 +31,10 @@ from keystore.validity import Validity
 _SHARED = (*(layout.ca_cert(role) for role in Role), layout.GOVERNANCE, layout.CRL)
 # What decides how an enclave should look: a newer version compares everything once more.
 _CODE = ("permissions.py", "permissions_names.py", "permissions_patterns.py", "enclave_state.py")
+
+
+_KEPT = 90 * 24 * 3600.0
+"""Seconds."""
 
 
 class Question(NamedTuple):
@@ -136,6 +141,14 @@ def _note(root: Path) -> Path:
     return Path(base, "enclave-launch", f"standing-{binascii.crc32(os.fsencode(root)):08x}")
 
 
+def _forget_old(directory: Path) -> None:
+    """Notes of keystores that are gone; one that is still asked for is simply written again."""
+    limit = time.time() - _KEPT
+    for entry in os.scandir(directory):
+        if entry.stat(follow_symlinks=False).st_mtime < limit:
+            os.unlink(entry.path)
+
+
 def _write(note: Path, text: str) -> None:
     import tempfile  # much to import, and only when there is something new to remember
 
@@ -145,6 +158,8 @@ def _write(note: Path, text: str) -> None:
         with open(descriptor, "w", encoding="utf-8", newline="\n") as file:
             file.write(text)
         os.replace(name, note)
+        _forget_old(note.parent)
     except BaseException:
-        os.unlink(name)
+        with suppress(FileNotFoundError):
+            os.unlink(name)
         raise

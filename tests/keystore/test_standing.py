@@ -234,6 +234,17 @@ def test_the_note_is_for_the_user_alone_and_holds_no_secret(root: Path, cache: P
     assert "PRIVATE" not in note.read_text() and "/chatter" in note.read_text()
 
 
+def test_notes_of_keystores_that_are_gone_do_not_pile_up(root: Path, cache: Path) -> None:
+    (note,) = cache.iterdir()
+    old, young = cache / "standing-00000000", cache / "standing-00000001"
+    for one, days in ((old, 91), (young, 89)):
+        one.touch()
+        os.utime(one, (time.time() - days * 86400,) * 2)
+    note.unlink()
+    provision(root, [A], options=WANTED)
+    assert set(cache.iterdir()) == {note, young}
+
+
 def test_two_launches_on_one_keystore_remember_both(tmp_path: Path, cache: Path, compared: list[str]) -> None:
     root = tmp_path / "ks"
     provision(root, [A, B], options=WANTED)
