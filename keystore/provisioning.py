@@ -8,8 +8,6 @@ Idempotent: what stands is not touched, keys are never replaced unless asked. An
 by the next one, because ``enclave_state`` finds every missing step again.
 """
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from datetime import datetime, timedelta
@@ -46,12 +44,12 @@ class ProvisionOptions(NamedTuple):
 
     domains: Domains | None = None
     create: bool = True
-    creation: CreateOptions | None = None
+    creation: "CreateOptions | None" = None
     lifetime: timedelta | None = None
     valid_until: datetime | None = None
     backdate: timedelta = DEFAULT_BACKDATE
     renew_within: timedelta = timedelta(0)
-    subjects: SubjectScheme | None = None
+    subjects: "SubjectScheme | None" = None
     rmw: str | None = None
     allow_subject_overlap: bool = False
     access: CaAccess = CaAccess()

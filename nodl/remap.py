@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from enum import Enum
 from typing import NamedTuple
 
@@ -36,6 +35,9 @@ class RemapKind(str, Enum):
     SERVICE = "rosservice://"
     NODE_NAME = "__node"
     NAMESPACE = "__ns"
+
+
+_OF_THE_NODE = (RemapKind.NODE_NAME, RemapKind.NAMESPACE)
 
 
 class InvalidRemapRuleError(ValueError):
@@ -70,8 +72,7 @@ class Resolved(NamedTuple):
     rules: tuple[ParsedRule, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class RemapRules:
+class RemapRules(NamedTuple):
     """The rules one node obeys: its own (``local``, of a component's load request) before the process's.
 
     Within each list the first match wins and nothing is applied to the result.
@@ -79,14 +80,11 @@ class RemapRules:
 
     local: tuple[ParsedRule, ...] = ()
     process: tuple[ParsedRule, ...] = ()
-    ordered: tuple[ParsedRule, ...] = field(init=False, repr=False, compare=False)
-    names: tuple[ParsedRule, ...] = field(init=False, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
-        ordered = (*self.local, *self.process)
-        object.__setattr__(self, "ordered", ordered)
-        names = tuple(r for r in ordered if r.kind not in (RemapKind.NODE_NAME, RemapKind.NAMESPACE))
-        object.__setattr__(self, "names", names)
+    @property
+    def names(self) -> tuple[ParsedRule, ...]:
+        """The rules for names of topics and services, in their order."""
+        return tuple([rule for rule in (*self.local, *self.process) if rule.kind not in _OF_THE_NODE])
 
     def node_name(self, original: str) -> Resolved:
         """The name the node gets; ``NODE:`` compares with the original name."""
@@ -97,7 +95,7 @@ class RemapRules:
         return self._first(RemapKind.NAMESPACE, node, original)
 
     def _first(self, kind: RemapKind, node: str, original: str) -> Resolved:
-        for rule in self.ordered:
+        for rule in (*self.local, *self.process):
             if rule.kind is kind and rule.node in (None, node):
                 return Resolved(rule.replacement, (rule,))
         return Resolved(original)
@@ -118,6 +116,10 @@ class NodeNames:
         self._parts_are_named = False
         for rule in rules.names if rules else ():
             self._add(rule)
+
+    @property
+    def has_rules(self) -> bool:
+        return bool(self._topics or self._services)
 
     @property
     def fqn(self) -> str:

@@ -146,7 +146,7 @@ class _Collector:
     def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
         """Every node has them, by the dozen, and their names need no check but of the length."""
         node, permissions = self._fqn, self._result.permissions
-        remapped = bool(self._node.rules.names)
+        remapped = self._names.has_rules
         try:
             for operation, name, place in rows:
                 rules: tuple[ParsedRule, ...] = ()

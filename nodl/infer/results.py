@@ -62,7 +62,7 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) 
                 parameters=tuple(sorted({*record.parameters, *record.assigned})),
                 gaps=tuple(dict.fromkeys(gaps)),
             )
-            interfaces.append(remapped(interface, rules) if rules.ordered else interface)
+            interfaces.append(remapped(interface, rules) if rules.local or rules.process else interface)
     return interfaces
 
 
