@@ -1,7 +1,7 @@
 """How long from the command to the first and the last process, and what ``--secure`` adds to that.
 
 Times whole commands as a person starts them: interpreter, imports, evaluation, keystore, process. The nodes are small
-shell scripts that write down when they were started.
+shell scripts that write down when they were started; each has an enclave of its own.
 
     floor                the interpreter starting the same programs with nothing decided
     plain                secure-launch
@@ -99,7 +99,7 @@ class Workspace:
             upstream.install(self.site, self.prefix)
         for count in (1, NODES):
             lines = "".join(
-                f'<node pkg="{PACKAGE}" exec="node" name="n{number}" namespace="/r{number % 10}"/>'
+                f'<node pkg="{PACKAGE}" exec="node" name="n{number}" namespace="/r{number % 10}" enclave="e{number}"/>'
                 for number in range(count)
             )
             self.launch_file(count).write_text(f"<launch>{lines}</launch>")
