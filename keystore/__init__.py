@@ -5,7 +5,8 @@
     authority.py ── identity.py ─┘            ^ creation, renewal, rollover, revocation
 
 The public functions below are loaded when first used, so that a launch imports only what its path needs:
-``provision`` of a keystore in which nothing changed imports neither ``cryptography`` nor lxml. The verbs of
+``provision`` of a keystore in which nothing changed imports neither ``cryptography`` nor lxml, and where nothing was
+touched since it last looked (``standing``) it opens none of the keystore's files. The verbs of
 ``secure-keystore`` call the same functions.
 """
 

@@ -1,7 +1,7 @@
 """What the keystore wants to know about a certificate, read without ``cryptography``. Pure.
 
 Nothing here proves anything: signatures are checked by ``keystore.verify``. These facts serve status, the
-warm path of a launch, and finding out which subject an enclave already has.
+comparison before a launch, and finding out which subject an enclave already has.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The CRL in force: from when until when. Cheap: asked before every launch."""
+"""The CRL in force: from when until when. Cheap: asked before a launch."""
 
 from __future__ import annotations
 

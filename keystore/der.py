@@ -1,6 +1,6 @@
 """The little DER that certificates and S/MIME need, read and written in plain Python. Pure.
 
-Why not a library: the warm path of a launch must look into certificates without importing ``cryptography``,
+Why not a library: comparing a keystore before a launch must look into certificates without importing ``cryptography``,
 and its PKCS#7 writer cannot sign with a key that lives in a token. Only definite lengths and single-byte tags
 are accepted, which is all X.509 and CMS use (ITU-T X.690 section 10).
 """
@@ -56,7 +56,7 @@ def parse(data: bytes) -> Element:
 
 
 def _elements(data: bytes, at: int, limit: int) -> list[Element]:
-    """One flat loop: certificates are read by the hundred before every launch."""
+    """One flat loop: certificates are read by the hundred before a launch."""
     found = []
     while at < limit:
         if at + 2 > limit:

@@ -1,6 +1,6 @@
 """One enclave on disk against what it should be: what is missing, stale or wrong, by cheap means. Reads only.
 
-This is the warm path of every launch: no ``cryptography``, no XML parser, about ten system calls an
+A launch asks this unless ``standing`` knows the answer: no ``cryptography``, no XML parser, some twenty system calls an
 enclave. It compares bytes, dates, modes and links; it does not check signatures, which DDS does at start
 and ``keystore.verify`` on request.
 """

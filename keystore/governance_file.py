@@ -1,4 +1,4 @@
-"""The governance in force: which domains it covers, whether it stands. Cheap: asked before every launch."""
+"""The governance in force: which domains it covers, whether it stands. Cheap: asked before a launch."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ that Cyclone DDS and Fast DDS both read, and without what breaks either of them:
 - no blanks in values, no comments, ids and full ranges of domains, no empty topic;
 - one line per element and no indentation: the whole document travels in each handshake.
 
-This is on the way to every start: text is put together directly, lxml is not needed.
+This is on the way to a start: text is put together directly, lxml is not needed.
 Sources: DDS-Security 1.1 section 9.4.1.3, and measurements on Cyclone DDS 0.10.2 and Fast DDS 2.9.1.
 """
 
@@ -203,7 +203,7 @@ _ENTITIES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;"
 
 
 def escape(text: str) -> str:
-    """As ``html.escape``, whose module costs every launch two milliseconds."""
+    """As ``html.escape``, whose module takes two milliseconds to import."""
     return text.translate(_ENTITIES)
 
 

@@ -84,7 +84,7 @@ def dds_topics(operation: Operation, name: str) -> tuple[set[str], set[str]]:
 
 
 def add_dds_topics(operation: Operation, name: str, publish: set[str], subscribe: set[str]) -> None:
-    """As ``dds_topics``, into sets that the caller fills for many names: this runs before every start."""
+    """As ``dds_topics``, into sets that the caller fills for many names: this runs before a start."""
     published, subscribed = _FORMS[operation]
     for before, after in published:
         publish.add(before + name + after)

@@ -55,7 +55,7 @@ def read_private(root: Path, relative: str) -> bytes:
 
 
 def _read(root: Path, relative: str) -> bytes:
-    """Text paths, not ``Path``: this runs a few hundred times before every launch."""
+    """Text paths, not ``Path``: this runs a few hundred times before a launch."""
     descriptor = _open(root, relative)
     try:
         info = os.fstat(descriptor)

@@ -81,21 +81,19 @@ def recall(
 
 
 def remember(
-    question: Question,
-    shared: Validity,
-    found: Iterable[tuple[EnclavePolicy, Stamp, Validity]],
+    root: Path, head: str, shared: Validity, found: Iterable[tuple[EnclavePolicy, Stamp, Validity]]
 ) -> None:
-    """``found``: what a full comparison saw to stand, with stamps from before it. ``shared``: of CAs and CRL.
+    """``found``: what a full comparison saw to stand. ``head`` (of the question) and the stamps are from before it,
+    so that what changed meanwhile is not taken for seen. ``shared``: of CAs and CRL.
 
     Best effort: without a cache directory of the user's own nothing is remembered.
     """
-    head = question.head()
-    known, _, lines = _read(question.root)
+    known, _, lines = _read(root)
     kept = lines if known == head else {}
     new = {policy.path: f"{_span(validity)}\t{_seen(stamp, policy)}" for policy, stamp, validity in found}
     text = "\n".join([head, _span(shared), *(f"{path}\t{line}" for path, line in {**kept, **new}.items())])
     with suppress(OSError, ValueError):  # no such directory, no room, a name that is no text
-        _write(_note(question.root), text)
+        _write(_note(root), text)
 
 
 def _seen(stamp: Stamp, policy: EnclavePolicy) -> str:

@@ -18,6 +18,8 @@ from keystore.errors import InvalidInput, KeystoreError, UnsafeKeystore
 from keystore.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
 from keystore.revocation import RemoveOptions, remove
+from keystore.standing import Question, recall
+from keystore.validity import utc_now
 from tests.keystore.kit import DAY, NOW, options, policy, snapshot
 
 A, B = policy("/robot/a", "/chatter", "/orders"), policy("/b")
@@ -164,6 +166,34 @@ def test_another_question_is_compared_in_full(
     with suppress(KeystoreError):  # what comes of it is told elsewhere
         provision(root, policies, options=chosen)
     assert compared == ["compared"]
+
+
+@pytest.mark.parametrize("name", ["public/permissions_ca.cert.pem", "enclaves/b/cert.pem"])
+def test_what_changes_while_it_is_compared_is_not_taken_for_seen(
+    name: str, tmp_path: Path, cache: Path, compared: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = tmp_path / "ks"
+    provision(root, [B], options=WANTED)
+    real = provisioning_check.bring_about
+
+    def meanwhile(*words: object) -> ProvisionReport:
+        report = real(*words)  # type: ignore[arg-type]
+        (root / name).write_bytes((root / name).read_bytes())
+        return report
+
+    monkeypatch.setattr(provisioning_check, "bring_about", meanwhile)
+    time.sleep(0.02)
+    provision(root, [B], options=WANTED)
+    monkeypatch.undo()
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert recalled(root) is None
+    provision(root, [B], options=WANTED)
+    assert recalled(root) is not None
+
+
+def recalled(root: Path) -> object:
+    question = Question(root, Domains.single(0), None)
+    return recall(question, [B], utc_now(), utc_now())
 
 
 def test_rules_that_read_alike_are_told_apart(root: Path, compared: list[str]) -> None:
