@@ -92,8 +92,10 @@ def remember(
     kept = lines if known == head else {}
     new = {policy.path: f"{_span(validity)}\t{_seen(stamp, policy)}" for policy, stamp, validity in found}
     text = "\n".join([head, _span(shared), *(f"{path}\t{line}" for path, line in {**kept, **new}.items())])
-    with suppress(OSError, ValueError):  # no such directory, no room, a name that is no text
-        _write(_note(root), text)
+    note = _note(root)
+    if note is not None:
+        with suppress(OSError, ValueError):  # no such directory, no room, a name that is no text
+            _write(note, text)
 
 
 def _seen(stamp: Stamp, policy: EnclavePolicy) -> str:
@@ -113,6 +115,8 @@ def _span(validity: Validity) -> str:
 def _read(root: Path) -> tuple[str, str, dict[str, str]]:
     """Head, span of what is shared, and the line of each enclave; empty unless the note is ours alone."""
     note = _note(root)
+    if note is None:
+        return "", "", {}
     try:
         if not _is_ours(os.lstat(note.parent)):
             return "", "", {}
@@ -131,11 +135,13 @@ def _is_ours(status: os.stat_result) -> bool:
     return status.st_uid == os.geteuid() and not status.st_mode & 0o022 and not stat.S_ISLNK(status.st_mode)
 
 
-def _note(root: Path) -> Path:
-    """One file for each keystore; two that share a name only make each other forget."""
+def _note(root: Path) -> Path | None:
+    """One file for each keystore; two that share a name only make each other forget. None for a user without home."""
     base = os.environ.get("XDG_CACHE_HOME", "")
     if not os.path.isabs(base):  # the XDG base directory specification: anything else is to be ignored
         base = os.path.join(os.path.expanduser("~"), ".cache")
+    if not os.path.isabs(base):
+        return None
     return Path(base, "enclave-launch", f"standing-{binascii.crc32(os.fsencode(root)):08x}")
 
 

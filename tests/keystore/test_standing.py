@@ -258,6 +258,18 @@ def test_without_a_cache_directory_nothing_is_remembered_and_nothing_fails(
     assert len(compared) == 3
 
 
+def test_a_user_without_home_leaves_nothing_in_the_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, compared: list[str]
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", "relative")
+    monkeypatch.setattr("os.path.expanduser", lambda path: path)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    for _ in range(3):
+        provision(tmp_path / "ks", [A], options=WANTED)
+    assert len(compared) == 3 and not list((tmp_path / "here").iterdir())
+
+
 def test_the_note_is_for_the_user_alone_and_holds_no_secret(root: Path, cache: Path) -> None:
     (note,) = cache.iterdir()
     assert (cache.stat().st_mode & 0o777, note.stat().st_mode & 0o777) == (0o700, 0o600)
