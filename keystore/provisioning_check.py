@@ -52,12 +52,12 @@ def provision_policies(
     return report._replace(stamps={path: stamps[path] for path in standing})
 
 
-def _shared_validity(view: KeystoreView) -> Validity:
-    """While all of these hold: the CAs and the CRL."""
+def _shared_validity(view: KeystoreView) -> tuple[datetime, datetime]:
+    """From when until when the CAs and the CRL all hold. With an old CA in a bundle the end may come first."""
     held = [ca.validity for role in Role for ca in view.ca_bundle(role)]
     if view.has_crl:
         held.append(crl_validity(view))
-    return Validity(max(one.not_before for one in held), min(one.not_after for one in held))
+    return max(one.not_before for one in held), min(one.not_after for one in held)
 
 
 def what_is_wrong(

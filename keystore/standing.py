@@ -32,7 +32,6 @@ _SHARED = (*(layout.ca_cert(role) for role in Role), layout.GOVERNANCE, layout.C
 # What decides how an enclave should look: a newer version compares everything once more.
 _CODE = ("permissions.py", "permissions_names.py", "permissions_patterns.py", "enclave_state.py")
 
-
 _KEPT = 90 * 24 * 3600.0
 """Seconds."""
 
@@ -63,6 +62,15 @@ def recall(
 ) -> Standing | None:
     """Whether all was seen to stand with these policies and nothing was touched since. ``due``: certificates that
     end before it do not stand."""
+    try:
+        return _recall(question, policies, now, due)
+    except ValueError:  # somebody wrote in the note
+        return None
+
+
+def _recall(
+    question: Question, policies: Iterable[EnclavePolicy], now: datetime, due: datetime
+) -> Standing | None:
     head, span, lines = _read(question.root)
     if not lines or head != question.head():
         return None
@@ -81,17 +89,20 @@ def recall(
 
 
 def remember(
-    root: Path, head: str, shared: Validity, found: Iterable[tuple[EnclavePolicy, Stamp, Validity]]
+    root: Path,
+    head: str,
+    shared: tuple[datetime, datetime],
+    found: Iterable[tuple[EnclavePolicy, Stamp, Validity]],
 ) -> None:
     """``found``: what a full comparison saw to stand. ``head`` (of the question) and the stamps are from before it,
-    so that what changed meanwhile is not taken for seen. ``shared``: of CAs and CRL.
+    so that what changed meanwhile is not taken for seen. ``shared``: begin and end of what CAs and CRL have in common.
 
     Best effort: without a cache directory of the user's own nothing is remembered.
     """
     known, _, lines = _read(root)
     kept = lines if known == head else {}
-    new = {policy.path: f"{_span(validity)}\t{_seen(stamp, policy)}" for policy, stamp, validity in found}
-    text = "\n".join([head, _span(shared), *(f"{path}\t{line}" for path, line in {**kept, **new}.items())])
+    new = {policy.path: f"{_span(*validity)}\t{_seen(stamp, policy)}" for policy, stamp, validity in found}
+    text = "\n".join([head, _span(*shared), *(f"{path}\t{line}" for path, line in {**kept, **new}.items())])
     note = _note(root)
     if note is not None:
         with suppress(OSError, ValueError):  # no such directory, no room, a name that is no text
@@ -108,8 +119,8 @@ def _words(policy: EnclavePolicy) -> Iterator[str]:
         yield from map(" ".join, rules)  # of a rule only the last word is free text
 
 
-def _span(validity: Validity) -> str:
-    return f"{int(validity.not_before.timestamp())}\t{int(validity.not_after.timestamp())}"
+def _span(begin: datetime, end: datetime) -> str:
+    return f"{int(begin.timestamp())}\t{int(end.timestamp())}"
 
 
 def _read(root: Path) -> tuple[str, str, dict[str, str]]:

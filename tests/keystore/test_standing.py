@@ -224,6 +224,10 @@ def pipe_for_it(note: Path) -> None:
     os.mkfifo(note)
 
 
+def rewrite(note: Path, change: Callable[[int, str], str]) -> None:
+    note.write_text("\n".join(change(*numbered) for numbered in enumerate(note.read_text().split("\n"))))
+
+
 NOTES: dict[str, Callable[[Path], object]] = {
     "gone": Path.unlink,
     "not text": broken_note,
@@ -234,6 +238,8 @@ NOTES: dict[str, Callable[[Path], object]] = {
     "a pipe": pipe_for_it,
     "writable by others": lambda note: note.chmod(0o666),
     "in a directory that others can write": lambda note: note.parent.chmod(0o777),
+    "no dates": lambda note: rewrite(note, lambda number, line: "x" if number == 1 else line),
+    "fields missing": lambda note: rewrite(note, lambda number, line: line[:30] if number > 1 else line),
     "of another version": lambda note: note.write_text(note.read_text().replace("\t", "\t0", 1)),
 }
 
@@ -268,6 +274,21 @@ def test_a_user_without_home_leaves_nothing_in_the_working_directory(
     for _ in range(3):
         provision(tmp_path / "ks", [A], options=WANTED)
     assert len(compared) == 3 and not list((tmp_path / "here").iterdir())
+
+
+def test_a_bundle_with_a_ca_that_has_ended_is_no_obstacle(
+    tmp_path: Path, cache: Path, compared: list[str]
+) -> None:
+    """After a roll-over the old CA stays in the bundle until it is finished; the two need not overlap."""
+    old, new = tmp_path / "old", tmp_path / "new"
+    provision(old, [B], options=options(domains=Domains.single(0), now=NOW - 4000 * DAY))
+    later_on = options(domains=Domains.single(0), now=NOW + 4000 * DAY)
+    provision(new, [B], options=later_on)
+    bundle = new / "public/identity_ca.cert.pem"
+    bundle.write_bytes(bundle.read_bytes() + (old / "public/identity_ca.cert.pem").read_bytes())
+    for _ in range(2):
+        assert not provision(new, [B], options=later_on).changed
+    assert len(compared) == 4, "never taken for known"
 
 
 def test_the_note_is_for_the_user_alone_and_holds_no_secret(root: Path, cache: Path) -> None:
