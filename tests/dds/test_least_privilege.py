@@ -105,7 +105,7 @@ def check(dds: Probe, domain: int, root: Path, expected: Mapping[str, Endpoints]
     ]
     assert all(answers.participants.get(enclave) for enclave in expected), answers.log
     assert len(answers.endpoints) == len(expected) * len(universe)
-    assert wrong == []
+    assert wrong == [], answers.log
 
 
 def _maybe_built_in() -> Endpoints:
