@@ -33,10 +33,19 @@ struct Job {
   std::vector<Words> attempts;
 };
 
+// Fast DDS logs to the standard output, from threads of its own and in pieces: answers need an output for themselves.
+int answers = STDOUT_FILENO;
+
+void leave_standard_output_to_the_log() {
+  answers = dup(STDOUT_FILENO);
+  dup2(STDERR_FILENO, STDOUT_FILENO);
+}
+
 // One write per line: the processes of a probe share their output.
 void answer(const std::string& label, const std::string& what, const std::string& detail,
             const std::string& result) {
-  std::cout << label + '\t' + what + '\t' + detail + '\t' + result + '\n' << std::flush;
+  const std::string line = label + '\t' + what + '\t' + detail + '\t' + result + '\n';
+  if (write(answers, line.data(), line.size()) != static_cast<ssize_t>(line.size())) std::abort();
 }
 
 std::string verdict(bool allowed) { return allowed ? "allowed" : "refused"; }
@@ -65,25 +74,13 @@ void carry_out(const Job& job, uint32_t domain) {
   const auto tell = [&](const Words& words, bool allowed) {
     answer(job.label, words.at(0), words.at(1), verdict(allowed));
   };
-  // Permissions refuse every time. Once in some ten thousand endpoints Fast DDS 2.9.1 on a busy machine failed for
-  // another reason, even twice in a row: only a refusal that is repeated a while later counts.
-  std::vector<Words> refused;
-  const auto try_again = [&] {
-    if (!refused.empty()) std::this_thread::sleep_for(std::chrono::milliseconds(500));
-    for (auto& words : refused) tell(words, attempt(words));
-    refused.clear();
-  };
   for (auto& words : job.attempts) {
     if (words.at(0) == "run") {
-      try_again();
       run(participant, std::stod(words.at(1)));
-    } else if (attempt(words)) {
-      tell(words, true);
     } else {
-      refused.push_back(words);
+      tell(words, attempt(words));
     }
   }
-  try_again();
 }
 
 Words split(const std::string& line) {
@@ -119,6 +116,7 @@ std::vector<Job> read_jobs(std::istream& lines, uint32_t& domain) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  leave_standard_output_to_the_log();
   if (argc != 2) {
     std::cerr << "usage: fastdds_probe JOBFILE" << std::endl;
     return 2;
