@@ -28,7 +28,9 @@ ENTRY_POINTS = {
         "secure-nodl = nodl.verb:main",
     ],
     "launch.frontend.launch_extension": ["enclave_launch = enclave_launch.ros2.attributes"],
-    "launch_ros.node_action": ["security_enclaves = enclave_launch.ros2.node_action:EnclaveNodeActionExtension"],
+    "launch_ros.node_action": [
+        "security_enclaves = enclave_launch.ros2.node_action:EnclaveNodeActionExtension"
+    ],
     "ros2launch.option": ["security_enclaves = enclave_launch.ros2.option:EnclaveOption"],
 }
 

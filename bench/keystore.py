@@ -121,7 +121,9 @@ class Floor:
         certificate = self._certificate(subject, key.public_key())
         options = [pkcs7.PKCS7Options.Binary, pkcs7.PKCS7Options.DetachedSignature]
         builder = pkcs7.PKCS7SignatureBuilder().set_data(self._document)
-        signed = builder.add_signer(self._ca, self._ca_key, hashes.SHA256()).sign(serialization.Encoding.DER, options)
+        signed = builder.add_signer(self._ca, self._ca_key, hashes.SHA256()).sign(
+            serialization.Encoding.DER, options
+        )
         pem, pkcs8 = serialization.Encoding.PEM, serialization.PrivateFormat.PKCS8
         os.mkdir(directory)
         self._write(f"{directory}/key.pem", key.private_bytes(pem, pkcs8, serialization.NoEncryption()))
@@ -185,7 +187,9 @@ def main() -> None:
     else:
         row("SROS2's own code", theirs, floor, theirs)
     print()
-    print(f"{'provision, nothing changed':28} {best(lambda root: unchanged(root, 50)) * 1000:8.2f} ms for 50 enclaves")
+    print(
+        f"{'provision, nothing changed':28} {best(lambda root: unchanged(root, 50)) * 1000:8.2f} ms for 50 enclaves"
+    )
     print(f"{'verify':28} {best(lambda root: verified(root, count)):8.2f} s for {count} enclaves")
 
 

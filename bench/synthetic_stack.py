@@ -8,12 +8,31 @@ from __future__ import annotations
 
 from pathlib import Path
 
-AREAS = ("sensing", "localization", "perception", "planning", "control", "system", "map", "vehicle", "api", "rviz")
+AREAS = (
+    "sensing",
+    "localization",
+    "perception",
+    "planning",
+    "control",
+    "system",
+    "map",
+    "vehicle",
+    "api",
+    "rviz",
+)
 SUBSYSTEMS = 6
 LEAVES = 5
 PROCESSES = 55
 COMPONENTS = 53
-FORWARDED = ("use_sim_time", "vehicle_model", "sensor_model", "map_path", "data_path", "launch_mode", "log_level")
+FORWARDED = (
+    "use_sim_time",
+    "vehicle_model",
+    "sensor_model",
+    "map_path",
+    "data_path",
+    "launch_mode",
+    "log_level",
+)
 
 
 def write_stack(prefix: Path) -> Path:
@@ -95,7 +114,9 @@ def _write_leaf(share: Path, area: str, name: str, nodes: int, components: int) 
 
 
 def _write_parameters(path: Path) -> None:
-    values = "".join(f"    value_{number}: {number}.5\n    name_{number}: text {number}\n" for number in range(25))
+    values = "".join(
+        f"    value_{number}: {number}.5\n    name_{number}: text {number}\n" for number in range(25)
+    )
     path.write_text(f"/**:\n  ros__parameters:\n{values}", encoding="utf-8")
 
 
@@ -106,7 +127,7 @@ def _node(area: str, name: str) -> str:
         f'    <param from="$(var param_path)"/>\n'
         f'    <param name="use_sim_time" value="$(var use_sim_time)"/>\n'
         f'    <param name="model"\n'
-        f'      value="$(eval &quot;\'$(var vehicle_model)\' + \'_$(var sensor_model)\'&quot;)"/>\n'
+        f"      value=\"$(eval &quot;'$(var vehicle_model)' + '_$(var sensor_model)'&quot;)\"/>\n"
         f'    <remap from="~/input/state" to="/{area}/state"/>\n'
         f'    <remap from="~/output" to="$(var launch_mode)/out"/>\n'
         f"  </node>\n"
@@ -125,12 +146,16 @@ def _container(area: str, name: str, components: int) -> str:
 
 
 def _arguments() -> str:
-    lines = [f'  <arg name="{name}" default="{_default(name)}" description="{name}"/>\n' for name in FORWARDED]
+    lines = [
+        f'  <arg name="{name}" default="{_default(name)}" description="{name}"/>\n' for name in FORWARDED
+    ]
     return "".join(lines)
 
 
 def _default(name: str) -> str:
-    return {"use_sim_time": "true", "map_path": "$(env HOME)/map", "log_level": "info"}.get(name, f"the_{name}")
+    return {"use_sim_time": "true", "map_path": "$(env HOME)/map", "log_level": "info"}.get(
+        name, f"the_{name}"
+    )
 
 
 def _include(package: str, file: str) -> str:

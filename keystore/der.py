@@ -113,7 +113,9 @@ def time_value(element: Element) -> datetime:
         raise DerError("a time that is not in UTC")
     year, month, day = int(text[:4]), int(text[4:6]), int(text[6:8])
     try:
-        return datetime(year, month, day, int(text[8:10]), int(text[10:12]), int(text[12:14]), tzinfo=timezone.utc)
+        return datetime(
+            year, month, day, int(text[8:10]), int(text[10:12]), int(text[12:14]), tzinfo=timezone.utc
+        )
     except ValueError as error:
         raise DerError("an impossible time") from error
 

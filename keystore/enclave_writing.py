@@ -98,7 +98,9 @@ class EnclaveWriter:
         return [
             Superseded(state.enclave, state.facts.serial, state.facts.validity.not_after)
             for state in states
-            if state.identity is not Identity.GOOD and state.facts is not None and state.facts.names_issuer(ca)
+            if state.identity is not Identity.GOOD
+            and state.facts is not None
+            and state.facts.names_issuer(ca)
         ]
 
     def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> tuple[str, ...]:

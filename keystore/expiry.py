@@ -90,9 +90,7 @@ def _order(one: Expiry) -> tuple[datetime, str, str]:
     return one.not_after, one.what, one.enclave or ""
 
 
-def _expiries(
-    view: KeystoreView, names: Iterable[str], known: Mapping[str, Validity]
-) -> Iterator[Expiry]:
+def _expiries(view: KeystoreView, names: Iterable[str], known: Mapping[str, Validity]) -> Iterator[Expiry]:
     for role in Role:
         for ca in view.ca_bundle(role):
             yield _expiry(role.value.replace("_ca", " CA"), None, ca.validity)

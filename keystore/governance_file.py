@@ -41,4 +41,6 @@ def governance_stands(view: KeystoreView, domains: Domains | None) -> bool:
 
 def covers(outer: Domains, inner: Domains) -> bool:
     """Whether ``outer`` has every domain of ``inner``."""
-    return all(any(low <= first and last <= high for low, high in outer.ranges) for first, last in inner.ranges)
+    return all(
+        any(low <= first and last <= high for low, high in outer.ranges) for first, last in inner.ranges
+    )

@@ -44,10 +44,16 @@ def provision_policies(
     # Before the comparison: what changes meanwhile counts as touched.
     head = Question(root, chosen.domains or Domains.single(0), chosen.rmw).head()
     stamps = {policy.path: enclave_stamp(str(root), policy.path) for policy in policies}
-    report = bring_about(root, {policy.path: Wish(policy_source(policy, chosen)) for policy in policies}, chosen)
+    report = bring_about(
+        root, {policy.path: Wish(policy_source(policy, chosen)) for policy in policies}, chosen
+    )
     standing = report.validities
     if not report.changed:
-        found = [(policy, stamps[policy.path], standing[policy.path]) for policy in policies if policy.path in standing]
+        found = [
+            (policy, stamps[policy.path], standing[policy.path])
+            for policy in policies
+            if policy.path in standing
+        ]
         remember(root, head, _shared_validity(KeystoreView(root)), found)
     return report._replace(stamps={path: stamps[path] for path in standing})
 

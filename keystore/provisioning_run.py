@@ -61,7 +61,11 @@ def _complete_keystore(
     """Missing parts of the keystore itself, and a governance that covers the domains."""
     domains = options.domains or governance_domains(KeystoreView(opened.root))
     creation = replace(
-        options.creation or CreateOptions(), domains=domains, access=options.access, durable=options.durable, now=now
+        options.creation or CreateOptions(),
+        domains=domains,
+        access=options.access,
+        durable=options.durable,
+        now=now,
     )
     report = complete(opened, creation)
     done = list(report.actions)

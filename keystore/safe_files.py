@@ -149,7 +149,9 @@ def private_problem(path: Path | str, info: os.stat_result) -> str | None:
             f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that "
             f"user, or take it over: {private_repair(path, info)}"
         )
-    return f"{printable(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
+    return (
+        f"{printable(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
+    )
 
 
 def close_to_others(root: Path) -> str:

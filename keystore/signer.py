@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     PublicKey = ec.EllipticCurvePublicKey | rsa.RSAPublicKey
     PrivateKey = ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey
 
+
 class Signer(Protocol):
     """Signs with SHA-256: ECDSA in DER form, or RSA PKCS#1 v1.5, after the kind of ``public_key()``."""
 

@@ -60,7 +60,8 @@ def remember(batch: Batch, view: KeystoreView, replaced: Iterable[Superseded], n
     kept = {one for one in (*superseded(view), *fresh) if one.not_after > now}
     ordered = sorted(kept, key=lambda one: (one.enclave, one.serial))
     entries = [
-        {"enclave": one.enclave, "serial": f"{one.serial:040x}", "not_after": iso(one.not_after)} for one in ordered
+        {"enclave": one.enclave, "serial": f"{one.serial:040x}", "not_after": iso(one.not_after)}
+        for one in ordered
     ]
     text = json.dumps({"version": _VERSION, "certificates": entries}, indent=1) + "\n"
     batch.file(layout.SUPERSEDED, text.encode(), PRIVATE_MODE)

@@ -21,7 +21,9 @@ CONSOLE = re.findall(r"^```console\n\$ (.*?)\n(.*?)\n```$", README, re.S | re.M)
 @pytest.mark.parametrize(("command", "shown"), CONSOLE, ids=[command for command, _ in CONSOLE])
 def test_a_command_prints_what_the_readme_shows(command: str, shown: str) -> None:
     program, *words = shlex.split(command)
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "AMENT_"))}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "AMENT_"))
+    }
     run = subprocess.run(
         [sys.executable, "-m", MODULES[program], *words],
         capture_output=True, text=True, cwd=ROOT, env=environment, check=True, timeout=60,

@@ -122,7 +122,9 @@ def _is_ours(module: ModuleType) -> bool:
 
 def _dependents(names: set[str], belongs: Callable[[str], bool]) -> set[str]:
     """Of ``names``, the modules of each top-level package in which some module holds such an object."""
-    tops = {name.partition(".")[0] for name in names if _holds(sys.modules[name], belongs)} - {"enclave_launch"}
+    tops = {name.partition(".")[0] for name in names if _holds(sys.modules[name], belongs)} - {
+        "enclave_launch"
+    }
     return {name for name in names if name.partition(".")[0] in tops}
 
 

@@ -85,9 +85,7 @@ class Feature(Enum):
         "timers keep the launch configurations of their position",
         jazzy=(3, 4, 5), kilted=(3, 8, 1), rolling=(3, 9), source=_LAUNCH_LOG,
     )  # fmt: skip
-    LET_IN_INCLUDE = Since(
-        "let inside include", jazzy=(3, 4, 6), kilted=(3, 8, 1), source=_LAUNCH_LOG
-    )
+    LET_IN_INCLUDE = Since("let inside include", jazzy=(3, 4, 6), kilted=(3, 8, 1), source=_LAUNCH_LOG)
     NESTED_PATH_JOIN = Since(
         "nested lists in PathJoinSubstitution", jazzy=None, kilted=(3, 8, 1), source=_LAUNCH_LOG
     )
@@ -111,9 +109,7 @@ class Feature(Enum):
         "timers keep the environment of their position",
         jazzy=None, kilted=None, rolling=(3, 9), source=_LAUNCH_LOG,
     )  # fmt: skip
-    DECLARE_BOOLEAN = Since(
-        "class DeclareBooleanLaunchArgument", jazzy=None, kilted=None, source=_LAUNCH_LOG
-    )
+    DECLARE_BOOLEAN = Since("class DeclareBooleanLaunchArgument", jazzy=None, kilted=None, source=_LAUNCH_LOG)
     WILDCARD_SECTIONS = Since(
         "wildcard sections in parameter files of components", "launch_ros",
         humble=(0, 19, 10), jazzy=(0, 26, 7), kilted=(0, 28, 1), rolling=(0, 29), source=_LAUNCH_ROS_LOG,

@@ -84,7 +84,9 @@ def _next_step(error: BaseException, text: str) -> str:
     if isinstance(error, OSError) and f"'{MISSING_PREFIX}/" in text:
         return "\nthat file is part of a package that is not installed here; this launch file reads it itself"
     if isinstance(error, ModuleNotFoundError):
-        folders = f"Python {sys.version_info.major}.{sys.version_info.minor}, PYTHONPATH and the install prefixes"
+        folders = (
+            f"Python {sys.version_info.major}.{sys.version_info.minor}, PYTHONPATH and the install prefixes"
+        )
         return f" (searched: {folders})"
     if isinstance(error, AttributeError) and "get_launch_arguments_with_include" in text:
         return "\ngenerate_launch_description() must return a LaunchDescription"

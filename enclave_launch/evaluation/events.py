@@ -123,7 +123,9 @@ def _key(handler: BaseEventHandler) -> tuple[type[Event] | None, int]:
     return event_class, 0 if target is None or event_class is None else id(target)
 
 
-def handle_next(context: LaunchContext, describe: Callable[[BaseEventHandler, Event], str | None]) -> list[Any]:
+def handle_next(
+    context: LaunchContext, describe: Callable[[BaseEventHandler, Event], str | None]
+) -> list[Any]:
     """Take one event from the queue through all its handlers; give the futures of what was begun.
 
     ``describe`` names a handler's turn for ``context.on_event`` (``None``: as the event's own mark).
@@ -135,7 +137,9 @@ def handle_next(context: LaunchContext, describe: Callable[[BaseEventHandler, Ev
     return futures
 
 
-def run_handler(context: LaunchContext, handler: BaseEventHandler, event: Event, mark: str | None) -> list[Any]:
+def run_handler(
+    context: LaunchContext, handler: BaseEventHandler, event: Event, mark: str | None
+) -> list[Any]:
     """Let one handler answer ``event``: its entities are visited with the event's own locals."""
     from enclave_launch.evaluation.visit import visit_all
 

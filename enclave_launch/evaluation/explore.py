@@ -93,7 +93,9 @@ class Explorer:
         self._remember(handler)
         mark = chain(mark, _label(handler, event))
         if id(event) in self._made_up and handler.computes() and not _is_ours(handler):
-            self._host.unforeseeable(Unforeseeable(f"what a callback returns for {mark}", self._place(handler)))
+            self._host.unforeseeable(
+                Unforeseeable(f"what a callback returns for {mark}", self._place(handler))
+            )
             return
         run_handler(self._context, handler, event, mark)
 

@@ -198,7 +198,9 @@ class BaseHost:
 
             if shutil.which(command[0]) is None:
                 program = os.path.basename(command[0])
-                self.warn(f"program '{program}' is not installed; a placeholder stands for what it would write")
+                self.warn(
+                    f"program '{program}' is not installed; a placeholder stands for what it would write"
+                )
                 return CommandResult(0, f"<output of {program}, which is not installed>", "")
         return self._run_command(command, merge_stderr)
 

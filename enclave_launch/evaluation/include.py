@@ -49,7 +49,9 @@ def _check_cycle(location: str, context: LaunchContext) -> None:
         cycle = [known for known, _ in context.open_files]
         if path in cycle:
             cycle = cycle[len(cycle) - 1 - cycle[::-1].index(path) :]
-        raise CyclicIncludeError("launch files include each other without end: " + " -> ".join([*cycle, path]))
+        raise CyclicIncludeError(
+            "launch files include each other without end: " + " -> ".join([*cycle, path])
+        )
 
 
 def opened(include: IncludeLaunchDescription, context: LaunchContext) -> tuple[OpenFile, ...]:

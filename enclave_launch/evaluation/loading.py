@@ -84,5 +84,3 @@ class LoadCache:
 
 def _runs_python(location: str) -> bool:
     return os.path.splitext(location)[1] == ".py"
-
-

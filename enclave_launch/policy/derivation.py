@@ -147,7 +147,9 @@ class _Collection:
             )
             for path, profiles in sorted(self.profiles.items())
         )
-        reasons = {enclave.path: _merged_reasons(enclave, self.profiles[enclave.path]) for enclave in enclaves}
+        reasons = {
+            enclave.path: _merged_reasons(enclave, self.profiles[enclave.path]) for enclave in enclaves
+        }
         nodes = {path: tuple(each) for path, each in self.nodes.items()}
         return DerivedPolicy(Policy(enclaves), reasons, nodes, _unique(self.problems), _unique(self.warnings))
 

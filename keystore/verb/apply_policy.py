@@ -11,7 +11,9 @@ from keystore.verb import common
 def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     parser.add_argument("policy", metavar="POLICY.xml", type=Path, help="SROS2 policy, version 0.2.0")
-    parser.add_argument("--domain-id", metavar="IDS", help="domains of the permissions (default: the governance's)")
+    parser.add_argument(
+        "--domain-id", metavar="IDS", help="domains of the permissions (default: the governance's)"
+    )
     common.add_validity(parser)
     common.add_subjects(parser)
     common.add_signing(parser)

@@ -56,7 +56,9 @@ def _next_step(view: KeystoreView, role: Role) -> str:
     return "switch" if os.path.isdir(view.root / layout.NEXT / role.value) else "finish"
 
 
-def _check_certificate(view: KeystoreView, role: Role, facts: CertificateFacts, now: datetime) -> Iterator[Finding]:
+def _check_certificate(
+    view: KeystoreView, role: Role, facts: CertificateFacts, now: datetime
+) -> Iterator[Finding]:
     place = layout.ca_cert(role)
     try:
         check_can_serve(facts.der, role, now, place)

@@ -134,7 +134,9 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
 def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bool) -> Iterator[Finding]:
     path = root / relative
     if private and (problem := safe_files.private_problem(path, info)):
-        yield Finding(Severity.ERROR, "unsafe-owner", relative, problem, safe_files.private_repair(path, info))
+        yield Finding(
+            Severity.ERROR, "unsafe-owner", relative, problem, safe_files.private_repair(path, info)
+        )
     elif info.st_mode & 0o022:
         yield Finding(
             Severity.ERROR, "writable-by-others", relative,

@@ -26,7 +26,9 @@ def run_on(root: Path, command: str, relative: str, note: str = "") -> str:
 def grant_again(root: Path, enclave: str) -> str:
     """What an enclave may do is unknown once its signed permissions are not to be trusted: start from nothing."""
     document = f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"
-    renew = run(root, "renew", enclave, note="grants nothing until secure-keystore apply-policy, or the next launch")
+    renew = run(
+        root, "renew", enclave, note="grants nothing until secure-keystore apply-policy, or the next launch"
+    )
     return f"{run_on(root, 'rm -f', document)} && {renew}"
 
 

@@ -132,7 +132,9 @@ def _creating_lines(module: SourceModule) -> list[int]:
 def settle(run: Run) -> None:
     """Call all callbacks until neither state nor findings change."""
     run.repeated += 1
-    in_vain: dict[tuple[object, int | None], tuple[int, int]] = {}  # the version that a callback left as it was
+    in_vain: dict[
+        tuple[object, int | None], tuple[int, int]
+    ] = {}  # the version that a callback left as it was
     for turn in range(MAX_ROUNDS):
         before = run.state.version(), dict(run.callbacks)
         for callback, arity in before[1].items():
@@ -180,5 +182,3 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
         run.findings.gap(SourceRef(run.main.path), f"the analysis was given up: {error}")
     except RecursionError:
         run.findings.gap(SourceRef(run.main.path), "the analysis was given up: nested too deep")
-
-

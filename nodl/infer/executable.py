@@ -25,7 +25,11 @@ from nodl.infer.system import without_collector
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
-_SITE_PATTERNS = ("lib/python3*/site-packages", "local/lib/python3*/dist-packages", "lib/python3/dist-packages")
+_SITE_PATTERNS = (
+    "lib/python3*/site-packages",
+    "local/lib/python3*/dist-packages",
+    "lib/python3/dist-packages",
+)
 _LOADS_ENTRY_POINT = re.compile(
     r"load_entry_point\(\s*['\"]([^'\"]+)['\"]\s*,\s*['\"]console_scripts['\"]\s*,\s*['\"]([^'\"]+)['\"]"
 )

@@ -184,7 +184,9 @@ def _default_items(atom: object, item: int | str) -> list[str | None]:
     exact = atom.items.exact if isinstance(atom, Sequence) else None
     if exact is None:
         return [None]
-    chosen = exact if item == "each" else exact[item : item + 1] if isinstance(item, int) and item >= 0 else ()
+    chosen = (
+        exact if item == "each" else exact[item : item + 1] if isinstance(item, int) and item >= 0 else ()
+    )
     return [text for element in chosen for text in _default_texts(element, None)]
 
 

@@ -19,7 +19,9 @@ from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
 CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".hpp", ".hh", ".hxx", ".h")
-_SKIPPED_FOLDERS = frozenset({"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"})
+_SKIPPED_FOLDERS = frozenset(
+    {"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"}
+)
 _NOT_PROGRAMS = re.compile(r"(?:setup|conf|conftest)\.py\Z|.*launch\.py\Z")
 
 
@@ -72,7 +74,9 @@ def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
         except CppSupportMissing as error:
             gaps.append(Gap(SourceRef(sources[0]), str(error)))
             continue
-        found, open_questions = nodes_of_unit(unit, read_build(folder), read_package(folder).name if folder else None)
+        found, open_questions = nodes_of_unit(
+            unit, read_build(folder), read_package(folder).name if folder else None
+        )
         nodes.extend(found)
         gaps.extend(open_questions)
     return nodes, gaps
@@ -122,5 +126,3 @@ def without_collector() -> Iterator[None]:
     finally:
         if enabled:
             gc.enable()
-
-

@@ -55,7 +55,10 @@ def run(args: argparse.Namespace) -> int:
         sys.stdout.write(_encodable("".join(documents.values())))
     if not system.nodes:
         count = len(system.files)
-        print(f"secure-nodl infer: no node was found in {count} source file{'s' * (count != 1)}", file=sys.stderr)
+        print(
+            f"secure-nodl infer: no node was found in {count} source file{'s' * (count != 1)}",
+            file=sys.stderr,
+        )
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):
         print(f"{len(expanded.unresolved)} unresolved:", file=sys.stderr)
         for question in expanded.unresolved:
@@ -78,7 +81,9 @@ def _documents(
         from nodl.infer.report.text_report import to_text
 
         text = to_text(expanded, built_in=args.builtin)
-        return {"inferred.txt": text.replace(os.path.join(os.getcwd(), ""), "")}  # as a person would name the files
+        return {
+            "inferred.txt": text.replace(os.path.join(os.getcwd(), ""), "")
+        }  # as a person would name the files
     from nodl.infer.report.nodl_report import to_v1, to_v2
 
     return to_v1(system) if chosen == "v1" else to_v2(system)
@@ -122,7 +127,9 @@ def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
     except ValueError:
         raise LookupError(f"no such file or folder: {package}") from None
     except PackageNotFoundError as error:
-        raise LookupError(f"'{package}' is neither a file or folder nor an installed package: {error}") from None
+        raise LookupError(
+            f"'{package}' is neither a file or folder nor an installed package: {error}"
+        ) from None
     files = sorted(p for p in folder.glob("*") if p.is_file() and os.access(p, os.X_OK))
     nodes: list[NodeInterface] = []
     gaps: list[Gap] = []

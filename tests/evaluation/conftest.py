@@ -64,7 +64,6 @@ def launch_py(files: Callable[..., Path]) -> Launch:
     return run
 
 
-
 @pytest.fixture
 def started() -> Callable[[Evaluation], list[tuple[str, str | None]]]:
     """Command line and mark of each process."""

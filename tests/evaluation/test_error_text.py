@@ -29,7 +29,10 @@ def message(tmp_path: Path, name: str, text: str | bytes, **options: object) -> 
         ('<let name="x"/>', "2: <let> Attribute 'value' of type str not found in Entity 'let'"),
         ('<let name="x" value="$(nosub a)"/>', "2: <let> Unknown substitution: nosub"),
         ('<log message="a" if="maybe"/>', "but got 'maybe'"),
-        ('<include file="$(dirname)/none.launch.xml"/>', "2: <include> No such file or directory: 'none.launch.xml'"),
+        (
+            '<include file="$(dirname)/none.launch.xml"/>',
+            "2: <include> No such file or directory: 'none.launch.xml'",
+        ),
         ("&nothing;", "a.launch.xml:2: malformed XML: undefined entity"),
         ("<node", "malformed XML: not well-formed (invalid token)"),
     ],
@@ -44,7 +47,10 @@ def test_a_mistake_in_xml(tmp_path: Path, content: str, told: str) -> None:
 @pytest.mark.parametrize(
     ("content", "told"),
     [
-        ("launch: [\n", "a.launch.yaml:2: malformed YAML: while parsing a flow node, expected the node content"),
+        (
+            "launch: [\n",
+            "a.launch.yaml:2: malformed YAML: while parsing a flow node, expected the node content",
+        ),
         ("", "a.launch.yaml: the file is empty, expected the key 'launch'"),
         (b"launch:\n- arg: {name: \xff}\n", "a.launch.yaml: not UTF-8 text: byte 0xff at offset 22"),
     ],
@@ -109,11 +115,15 @@ def test_an_error_inside_a_helper_stands_at_the_element_and_names_the_helper(
     assert text == "a.launch.py:7: <LogInfo> KeyError: unset (in r3_helper.py:5)"
 
 
-def test_a_program_that_is_not_installed_is_a_placeholder_when_packages_may_be_missing(tmp_path: Path) -> None:
+def test_a_program_that_is_not_installed_is_a_placeholder_when_packages_may_be_missing(
+    tmp_path: Path,
+) -> None:
     text = XML.format(
         '<executable cmd="$(find-exec no-such-xacro) $(command \'no-such-xacro a.urdf\')" shell="true"/>'
     )
     assert "executable 'no-such-xacro' not found on the PATH" in message(tmp_path, "a.launch.xml", text)
     found = evaluate(tmp_path / "a.launch.xml", host=PlanHost(allow_missing_packages=True))
     assert " ".join(found.processes[0].cmd).startswith("/missing/bin/no-such-xacro <output of no-such-xacro")
-    assert found.warnings == ("program 'no-such-xacro' is not installed; a placeholder stands for what it would write",)
+    assert found.warnings == (
+        "program 'no-such-xacro' is not installed; a placeholder stands for what it would write",
+    )

@@ -24,7 +24,11 @@ def test_an_error_tells_file_line_element_and_the_include_chain(files: Callable[
         evaluate(folder / "main.launch.xml")
     location = caught.value.location
     assert location is not None
-    assert (Path(location.file).name, location.line, location.element) == ("inner.launch.xml", 3, "executable")
+    assert (Path(location.file).name, location.line, location.element) == (
+        "inner.launch.xml",
+        3,
+        "executable",
+    )
     assert [Path(step).name for step in location.includes] == ["main.launch.xml:2", "middle.launch.xml:2"]
     assert type(caught.value.cause).__name__ == "SubstitutionFailure"
 
@@ -57,7 +61,9 @@ def test_what_was_started_before_the_error_is_kept(launch_xml: Any) -> None:
 
 
 @pytest.mark.parametrize("path", ["$(dirname)", "$(env D)"])
-def test_cyclic_includes_are_an_error(files: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, path: str) -> None:
+def test_cyclic_includes_are_an_error(
+    files: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
     folder = files(
         a__launch__xml=f'<include file="{path}/b.launch.xml"/>',
         b__launch__xml=f'<include file="{path}/a.launch.xml"/>',
@@ -86,7 +92,9 @@ def test_our_own_process_is_left_as_it_was(launch_py: Any) -> None:
         entities = [SetEnvironmentVariable("FROM_LAUNCH", "1"), UnsetEnvironmentVariable("PATH")]
     """)
     assert (dict(os.environ), sys.path) == (environment, path)
-    assert not {name for name in set(sys.modules) - modules if name.partition(".")[0] in ("launch", "launch_ros")}
+    assert not {
+        name for name in set(sys.modules) - modules if name.partition(".")[0] in ("launch", "launch_ros")
+    }
 
 
 def test_it_is_restored_after_an_error_too(launch_xml: Any) -> None:

@@ -194,4 +194,6 @@ def test_a_handler_that_nothing_reaches_is_reported(launch_py: Any) -> None:
         from launch.event_handlers import event_named
         entities = [RegisterEventHandler(EventHandler(matcher=event_named("from.outside"), entities=[EP(cmd=["x"])]))]
     """)
-    assert [item.what for item in found.unforeseeable] == ["entities of EventHandler, whose event cannot be told"]
+    assert [item.what for item in found.unforeseeable] == [
+        "entities of EventHandler, whose event cannot be told"
+    ]

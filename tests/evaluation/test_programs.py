@@ -24,12 +24,18 @@ def test_missing_programs_are_named_with_their_place(launch_xml: Any, tmp_path: 
         <executable cmd="true" launch-prefix="no_such_prefix"/>
     """)
     messages = [str(error) for error in missing_programs(found.processes)]
-    assert [message.split("'")[1] for message in messages] == ["no_such_program", "/nowhere/tool", "no_such_prefix"]
+    assert [message.split("'")[1] for message in messages] == [
+        "no_such_program",
+        "/nowhere/tool",
+        "no_such_prefix",
+    ]
     assert "main.launch.xml:3: <executable>" in messages[0]
 
 
 def test_what_an_event_starts_may_come_later(launch_xml: Any) -> None:
     process = launch_xml('<executable cmd="no_such_program"/>').processes[0]
-    with pytest.raises(LaunchFileError, match=r"main\.launch\.xml:\d+: <executable> program 'no_such_program'"):
+    with pytest.raises(
+        LaunchFileError, match=r"main\.launch\.xml:\d+: <executable> program 'no_such_program'"
+    ):
         check_programs([process])
     check_programs([process._replace(on_event="process exit")])

@@ -152,7 +152,10 @@ def test_an_executable_without_enclave_is_still_told_that_security_is_on(
 
 TAMPERINGS = {
     "another signature": ("permissions.p7s", lambda data: data.replace(b"MII", b"MIJ", 1)),
-    "other permissions, unsigned": ("permissions.p7s", lambda data: data.replace(b"rt/chatter", b"rt/chatteR")),
+    "other permissions, unsigned": (
+        "permissions.p7s",
+        lambda data: data.replace(b"rt/chatter", b"rt/chatteR"),
+    ),
     "the reviewed copy": ("permissions.xml", lambda data: data.replace(b"rt/chatter", b"rt/chatteR")),
     "no permissions at all": ("permissions.p7s", None),
     "another key": ("key.pem", lambda data: b""),

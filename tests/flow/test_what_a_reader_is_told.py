@@ -34,7 +34,9 @@ def workspace(tmp_path: Path) -> Path:
 def test_the_tree_tells_what_was_inferred(secure_launch: SecureLaunch, write: Write, workspace: Path) -> None:
     file = write('<node pkg="robot" exec="hello"/><node pkg="demo_nodes" exec="talker"/>')
     tree = secure_launch("--dry-run", "--prefix", workspace, file).stdout
-    hello, talker = (line for line in tree.splitlines() if "robot/hello" in line or "demo_nodes/talker" in line)
+    hello, talker = (
+        line for line in tree.splitlines() if "robot/hello" in line or "demo_nodes/talker" in line
+    )
     assert "inferred from its source" in hello and "inferred" not in talker
     assert "publish: /chatter /greeting" in tree
 
@@ -69,13 +71,17 @@ def test_a_policy_of_nothing_known_is_an_error(
     assert "no NoDL manifest for robot/engine" in run.stderr and "there is no policy to print" in run.stderr
 
 
-def test_an_attribute_that_its_own_arguments_overrule_is_told(secure_launch: SecureLaunch, write: Write) -> None:
+def test_an_attribute_that_its_own_arguments_overrule_is_told(
+    secure_launch: SecureLaunch, write: Write
+) -> None:
     file = write('<node pkg="demo_nodes" exec="talker" ros_args="--enclave /mine" enclave="other"/>')
     tree = secure_launch("--dry-run", file).stdout
     assert "enclave /mine" in tree and "enclave attribute 'other' is not used" in tree
 
 
-def test_a_target_that_forgets_the_pushed_namespace_is_told(secure_launch: SecureLaunch, write: Write) -> None:
+def test_a_target_that_forgets_the_pushed_namespace_is_told(
+    secure_launch: SecureLaunch, write: Write
+) -> None:
     file = write(
         '<push_ros_namespace namespace="robot"/>'
         '<node_container pkg="demo_nodes" exec="component_container" name="box" namespace=""/>'
@@ -83,11 +89,16 @@ def test_a_target_that_forgets_the_pushed_namespace_is_told(secure_launch: Secur
         '<composable_node pkg="demo_nodes" plugin="demo_nodes::Talker" name="talker"/></load_composable_node>'
     )
     tree = secure_launch("--dry-run", file).stdout
-    assert "container 'box'" in tree and "this launch file starts /robot/box: a target needs its full name" in tree
+    assert (
+        "container 'box'" in tree
+        and "this launch file starts /robot/box: a target needs its full name" in tree
+    )
 
 
 def test_a_prefix_that_is_not_there_is_named(secure_launch: SecureLaunch) -> None:
-    run = secure_launch("--dry-run", "--prefix", "/no/such/prefix", "demo_nodes", "talker_listener.launch.xml")
+    run = secure_launch(
+        "--dry-run", "--prefix", "/no/such/prefix", "demo_nodes", "talker_listener.launch.xml"
+    )
     assert run.returncode == 2
     assert "--prefix /no/such/prefix: no such directory" in run.stderr
 
@@ -99,7 +110,11 @@ def test_no_keys_are_made_for_a_launch_that_cannot_run(
     """Loading components needs rclpy; these tests run without ROS."""
     if importlib.util.find_spec("rclpy") is not None:
         pytest.skip("ROS is sourced")
-    target = ["demo_nodes", content] if content.endswith(".xml") else [write('<executable cmd="no-such-program"/>')]
+    target = (
+        ["demo_nodes", content]
+        if content.endswith(".xml")
+        else [write('<executable cmd="no-such-program"/>')]
+    )
     run = secure_launch("--secure", "--keystore", tmp_path / "ks", *target)
     assert run.returncode == 1
     assert "rclpy is not importable here" in run.stderr or "no-such-program" in run.stderr

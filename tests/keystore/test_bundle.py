@@ -92,7 +92,9 @@ def test_the_crl_goes_along(root: Path, tmp_path: Path) -> None:
     export(root, tmp_path / "out", ["/robot1"])
     assert {"public/crl.pem", "enclaves/robot1/crl.pem"} <= set(contents(tmp_path / "out"))
     export(root, tmp_path / "copies", ["/robot1"], public=PublicFiles.COPY)
-    assert (tmp_path / "copies/enclaves/robot1/crl.pem").read_bytes() == (root / "public/crl.pem").read_bytes()
+    assert (tmp_path / "copies/enclaves/robot1/crl.pem").read_bytes() == (
+        root / "public/crl.pem"
+    ).read_bytes()
 
 
 def test_strays_stay_at_home(root: Path, tmp_path: Path) -> None:

@@ -37,7 +37,9 @@ def test_openssl_accepts_an_enclave_below_its_ca(identity_ca: Authority, tmp_pat
     (tmp_path / "cert.pem").write_bytes(made.cert)
     at = str(int(NOW.timestamp()))
     openssl("verify", "-x509_strict", "-attime", at, "-CAfile", tmp_path / "ca.pem", tmp_path / "cert.pem")
-    assert openssl("x509", "-noout", "-subject", "-in", tmp_path / "cert.pem").strip() == "subject=CN = ros.a.b"
+    assert (
+        openssl("x509", "-noout", "-subject", "-in", tmp_path / "cert.pem").strip() == "subject=CN = ros.a.b"
+    )
 
 
 def test_the_profile_of_an_enclave(identity_ca: Authority) -> None:

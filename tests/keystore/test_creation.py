@@ -63,7 +63,9 @@ def test_names_curve_and_validity(tmp_path: Path) -> None:
     ca = KeystoreView(root).ca(Role.IDENTITY)
     assert ca.common_name == "acme robots"
     assert ca.validity == Validity(NOW - DAY, NOW + 90 * DAY)
-    assert "ASN1 OID: secp384r1" in openssl("x509", "-noout", "-text", "-in", root / "public/identity_ca.cert.pem")
+    assert "ASN1 OID: secp384r1" in openssl(
+        "x509", "-noout", "-text", "-in", root / "public/identity_ca.cert.pem"
+    )
 
 
 def test_p384_is_warned_about(tmp_path: Path) -> None:
@@ -127,7 +129,11 @@ def test_encrypted_ca_keys(tmp_path: Path) -> None:
     (tmp_path / "sentence").write_bytes(SENTENCE + b"\n")
     access = CaAccess(passphrase=Secret(file=tmp_path / "sentence"))
     root = created(tmp_path / "ks", encrypt_ca_keys=True, access=access)
-    assert (root / "private/identity_ca.key.pem").read_bytes().startswith(b"-----BEGIN ENCRYPTED PRIVATE KEY-----")
+    assert (
+        (root / "private/identity_ca.key.pem")
+        .read_bytes()
+        .startswith(b"-----BEGIN ENCRYPTED PRIVATE KEY-----")
+    )
     provision(root, [policy("/a")], options=options(access=access))
     assert findings(root, access) == set()
     assert findings(root) == {"ca-key-locked"}
@@ -216,7 +222,9 @@ def test_sros2_accepts_ours(tmp_path: Path) -> None:
 
 def test_keys_never_travel_in_arguments() -> None:
     """The command offers no option that takes a secret itself."""
-    done = subprocess.run([sys.executable, "-m", "keystore.verb", "create", "--help"], capture_output=True, text=True)
+    done = subprocess.run(
+        [sys.executable, "-m", "keystore.verb", "create", "--help"], capture_output=True, text=True
+    )
     offered = {word.strip("[],") for word in done.stdout.split() if word.strip("[").startswith("--")}
     secrets = {word for word in offered if "pass" in word or "pin" in word}
     assert secrets == {"--passphrase-file", "--passphrase-fd", "--passphrase-env", "--pin-file", "--pin-env"}

@@ -86,7 +86,9 @@ def visible_enclaves_are_whole(root: Path) -> None:
             assert (directory / file).is_file(), f"{enclave} is visible without {file}"
 
 
-@pytest.mark.parametrize("name", ["create", "provision", "renew", "repair", "remove", "start", "switch", "finish"])
+@pytest.mark.parametrize(
+    "name", ["create", "provision", "renew", "repair", "remove", "start", "switch", "finish"]
+)
 def test_killed_at_every_step(tmp_path: Path, name: str) -> None:
     prepared(name, tmp_path / "start")
     if (tmp_path / "start").exists():
@@ -192,7 +194,9 @@ def test_sixteen_at_once_make_one_keystore(tmp_path: Path) -> None:
     )
     runs = [
         subprocess.Popen(
-            [sys.executable, "-c", program, str(tmp_path / "ks"), str(number)], cwd=HERE, stderr=subprocess.PIPE
+            [sys.executable, "-c", program, str(tmp_path / "ks"), str(number)],
+            cwd=HERE,
+            stderr=subprocess.PIPE,
         )
         for number in range(16)
     ]

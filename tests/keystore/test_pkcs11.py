@@ -40,7 +40,9 @@ def token(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, str]:
         pytest.skip("SoftHSM2 is not installed (apt install softhsm2)")
     home = tmp_path_factory.mktemp("softhsm")
     (home / "tokens").mkdir()
-    (home / "softhsm2.conf").write_text(f"directories.tokendir = {home / 'tokens'}\nobjectstore.backend = file\n")
+    (home / "softhsm2.conf").write_text(
+        f"directories.tokendir = {home / 'tokens'}\nobjectstore.backend = file\n"
+    )
     os.environ["SOFTHSM2_CONF"] = str(home / "softhsm2.conf")
     subprocess.run(
         ["softhsm2-util", "--init-token", "--free", "--label", "robots", "--pin", PIN, "--so-pin", "12345678"],
@@ -71,7 +73,9 @@ def root(token: Mapping[str, str], tmp_path: Path) -> Path:
     imported = {}
     for role in Role:
         signer = Pkcs11Signer.open(uri(role), Secret(file=Path(token["pin"])), token)
-        made = authority.self_signed_ca(role, f"token {role.value}", signer, Validity.starting(utc_now(), 90 * DAY))
+        made = authority.self_signed_ca(
+            role, f"token {role.value}", signer, Validity.starting(utc_now(), 90 * DAY)
+        )
         (tmp_path / f"{role.value}.pem").write_bytes(made.pem())
         (tmp_path / f"{role.value}.uri").write_text(uri(role) + "\n")
         imported[role] = ImportedCa(tmp_path / f"{role.value}.pem", tmp_path / f"{role.value}.uri")
@@ -99,10 +103,20 @@ def test_a_crl_by_the_token(root: Path, token: Mapping[str, str]) -> None:
     provision(root, [policy("/a"), policy("/b")], options=options(access=access(token)))
     remove(root, ["/b"], options=RemoveOptions(access=access(token), durable=False))
     ca = root / "public/identity_ca.cert.pem"
-    openssl("verify", "-crl_check", "-CAfile", ca, "-CRLfile", root / "public/crl.pem", root / "enclaves/a/cert.pem")
+    openssl(
+        "verify",
+        "-crl_check",
+        "-CAfile",
+        ca,
+        "-CRLfile",
+        root / "public/crl.pem",
+        root / "enclaves/a/cert.pem",
+    )
 
 
-def test_without_pin_or_module_the_message_says_so(root: Path, token: Mapping[str, str], tmp_path: Path) -> None:
+def test_without_pin_or_module_the_message_says_so(
+    root: Path, token: Mapping[str, str], tmp_path: Path
+) -> None:
     """The wrong PIN in a process of its own: in ours the token is logged in already."""
     (tmp_path / "wrong").write_text("9999")
     done = subprocess.run(

@@ -178,7 +178,9 @@ def test_other_enclaves_are_left_alone(tmp_path: Path) -> None:
         ("key.pem", ("key and certificate", "permissions")),
     ],
 )
-def test_what_is_lost_is_made_again_and_nothing_else(tmp_path: Path, lost: str, repaired: tuple[str, ...]) -> None:
+def test_what_is_lost_is_made_again_and_nothing_else(
+    tmp_path: Path, lost: str, repaired: tuple[str, ...]
+) -> None:
     root = filled(tmp_path / "ks", ["/a"])
     key = (root / "enclaves/a/key.pem").read_bytes()
     (root / "enclaves/a" / lost).unlink()
@@ -208,7 +210,9 @@ def test_a_wrong_key_gets_a_new_certificate_rather_than_a_silent_robot(tmp_path:
     root = filled(tmp_path / "ks", ["/a", "/b"])
     shutil.copy(root / "enclaves/b/key.pem", root / "enclaves/a/key.pem")
     assert "key-mismatch" in codes(root)
-    assert actions(provision(root, [policy("/a")], options=options())) == {"/a": ("certificate", "permissions")}
+    assert actions(provision(root, [policy("/a")], options=options())) == {
+        "/a": ("certificate", "permissions")
+    }
     assert codes(root) == set()
 
 
@@ -369,7 +373,9 @@ def test_a_ca_file_that_links_out_of_the_keystore_is_refused(tmp_path: Path, nam
 
 
 @pytest.mark.parametrize("private", ["private", "private/identity_ca.key.pem", "enclaves/a/key.pem"])
-def test_private_parts_that_others_can_write_are_refused_with_the_repair(tmp_path: Path, private: str) -> None:
+def test_private_parts_that_others_can_write_are_refused_with_the_repair(
+    tmp_path: Path, private: str
+) -> None:
     root = filled(tmp_path / "ks", ["/a"])
     path = root / private
     path.chmod(stat.S_IMODE(path.stat().st_mode) | 0o020)

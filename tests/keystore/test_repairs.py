@@ -77,7 +77,9 @@ def moved_away(root: Path) -> None:
 
 def governance_by_an_enclave(root: Path) -> None:
     credential = sros2_style.Credential.read(root / "enclaves/b")
-    (root / "enclaves/governance.p7s").write_bytes(credential.sign((root / "enclaves/governance.xml").read_text()))
+    (root / "enclaves/governance.p7s").write_bytes(
+        credential.sign((root / "enclaves/governance.xml").read_text())
+    )
 
 
 def junk_among_retired(root: Path) -> None:
@@ -210,7 +212,11 @@ def type_in(line: str) -> None:
 
 
 def faults(root: Path) -> list[Finding]:
-    return [finding for finding in verify(root).findings if finding.severity.value in ("error", "exposure", "warning")]
+    return [
+        finding
+        for finding in verify(root).findings
+        if finding.severity.value in ("error", "exposure", "warning")
+    ]
 
 
 def check(root: Path, code: str, plant: Plant) -> None:
@@ -261,7 +267,9 @@ def test_one_damaged_part_does_not_hide_the_others(sound: Path, tmp_path: Path) 
     assert {"unsafe-owner", "governance", "permissions"} <= {finding.code for finding in faults(root)}
 
 
-def test_a_revoked_enclave_is_not_certified_again_with_its_old_key(sound_with_crl: Path, tmp_path: Path) -> None:
+def test_a_revoked_enclave_is_not_certified_again_with_its_old_key(
+    sound_with_crl: Path, tmp_path: Path
+) -> None:
     root = tmp_path / "ks"
     shutil.copytree(sound_with_crl, root, symlinks=True)
     shutil.copytree(root / "enclaves/a", tmp_path / "backup", symlinks=True)

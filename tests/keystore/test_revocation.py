@@ -82,7 +82,9 @@ def test_what_an_enclave_had_before_is_revoked_with_it(root: Path, tmp_path: Pat
         renew(root, ["/c"], options=RenewOptions(provisioning=options()))
     assert not (root / "public/crl.pem").exists()
     assert remove(root, ["/c"], options=quick()).revoked == 3
-    assert crl(root).get_revoked_certificate_by_serial_number(read_pem((tmp_path / "first.pem").read_bytes()).serial)
+    assert crl(root).get_revoked_certificate_by_serial_number(
+        read_pem((tmp_path / "first.pem").read_bytes()).serial
+    )
     assert codes(root) == set()
 
 

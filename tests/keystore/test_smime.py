@@ -85,7 +85,9 @@ def test_what_sros2_signs_is_read(line_ends: bytes) -> None:
     assert check(made.replace(b"\r\n", b"\n").replace(b"\n", line_ends)) == DOCUMENT
 
 
-printable_lines = st.lists(st.text(st.characters(codec="utf-8", exclude_characters="\r\n\0"), max_size=40), max_size=8)
+printable_lines = st.lists(
+    st.text(st.characters(codec="utf-8", exclude_characters="\r\n\0"), max_size=40), max_size=8
+)
 
 
 @given(printable_lines)
@@ -120,7 +122,9 @@ def test_another_ca_is_refused() -> None:
 def test_a_certificate_below_the_ca_is_refused() -> None:
     """CVE-2023-24010 and -24011: it chains to the CA, and that is not enough."""
     made = new_identity(IdentityIssuer(CA), "ros.a", VALIDITY)
-    enclave = Authority(certificate.read_pem(made.cert), FileSigner(load_private_key(made.key or b"", None, "key")))
+    enclave = Authority(
+        certificate.read_pem(made.cert), FileSigner(load_private_key(made.key or b"", None, "key"))
+    )
     with pytest.raises(DamagedKeystore, match="not the permissions CA"):
         check(sign(DOCUMENT, enclave))
 
@@ -132,7 +136,9 @@ def test_a_forger_with_the_cas_name_and_serial_is_refused() -> None:
         check(forged)
 
 
-@pytest.mark.parametrize("p7s", [b"", b"x", b"\0" * 50, DOCUMENT, b'Content-Type: multipart/signed; boundary=""\n\n'])
+@pytest.mark.parametrize(
+    "p7s", [b"", b"x", b"\0" * 50, DOCUMENT, b'Content-Type: multipart/signed; boundary=""\n\n']
+)
 def test_what_is_no_smime_is_refused(p7s: bytes) -> None:
     with pytest.raises(DamagedKeystore):
         check(p7s)

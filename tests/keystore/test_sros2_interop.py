@@ -19,7 +19,9 @@ from keystore.view import KeystoreView
 from tests.keystore import sros2_peer
 from tests.keystore.kit import created, filled, options, policy
 
-pytestmark = pytest.mark.skipif(not sros2_peer.available(), reason="SROS2_PYTHON and SROS2_PYTHONPATH are not set")
+pytestmark = pytest.mark.skipif(
+    not sros2_peer.available(), reason="SROS2_PYTHON and SROS2_PYTHONPATH are not set"
+)
 
 CREATE = """
 import pathlib, sys

@@ -199,7 +199,9 @@ def recalled(root: Path) -> object:
 def test_rules_that_read_alike_are_told_apart(root: Path, compared: list[str]) -> None:
     """The policy is remembered as text; free text in one field must not look like two."""
     rule = A.profiles[0].rules[0]
-    joined = A._replace(profiles=(A.profiles[0]._replace(rules=(rule._replace(expression="/x', 'publish ALLOW /y"),)),))
+    joined = A._replace(
+        profiles=(A.profiles[0]._replace(rules=(rule._replace(expression="/x', 'publish ALLOW /y"),)),)
+    )
     with pytest.raises(InvalidInput, match="not a valid name"):
         provision(root, [joined], options=WANTED)
     assert compared == ["compared"]

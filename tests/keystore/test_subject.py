@@ -12,7 +12,11 @@ from keystore.subject import SubjectScheme, borrowable, common_name, scheme_of, 
 from tests.keystore.kit import ARTICLE
 
 segment = st.text(alphabet="ab_Z", min_size=1, max_size=30)
-enclave = st.lists(segment, max_size=6).map(lambda parts: "/" + "/".join(parts)).filter(lambda name: len(name) <= 245)
+enclave = (
+    st.lists(segment, max_size=6)
+    .map(lambda parts: "/" + "/".join(parts))
+    .filter(lambda name: len(name) <= 245)
+)
 
 
 @pytest.mark.parametrize(

@@ -64,7 +64,12 @@ def test_status_for_monitoring(
     assert main(["status", ks, "--within", within, "--format", "json"]) == status
     shown = json.loads(capsys.readouterr().out)
     first = shown["expiries"][0]
-    assert (first["what"], first["enclave"], first["valid"], first["due"]) == ("certificate", "/a", True, status == 3)
+    assert (first["what"], first["enclave"], first["valid"], first["due"]) == (
+        "certificate",
+        "/a",
+        True,
+        status == 3,
+    )
     assert {"not_before", "not_after", "days_left"} <= first.keys()
 
 
@@ -158,12 +163,16 @@ def test_the_progress_bar_is_for_terminals_that_wait(monkeypatch: pytest.MonkeyP
 
 def test_no_bar_without_a_terminal(tmp_path: Path) -> None:
     done = subprocess.run(
-        [sys.executable, "-m", "keystore.verb", "create", str(tmp_path / "ks")], capture_output=True, text=True
+        [sys.executable, "-m", "keystore.verb", "create", str(tmp_path / "ks")],
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 0 and done.stderr == ""
 
 
-@pytest.mark.parametrize(("written", "said"), [("chatter", ""), ("camera/*", "camera/*"), ("imu[12]", "imu[12]")])
+@pytest.mark.parametrize(
+    ("written", "said"), [("chatter", ""), ("camera/*", "camera/*"), ("imu[12]", "imu[12]")]
+)
 def test_each_wildcard_of_a_policy_is_said(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], written: str, said: str
 ) -> None:

@@ -110,8 +110,12 @@ DAMAGES: list[tuple[str, str, Damage]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(("code", "place", "damage"), DAMAGES, ids=[f"{row[0]}-{n}" for n, row in enumerate(DAMAGES)])
-def test_damage_is_found_with_its_place_and_repair(tmp_path: Path, code: str, place: str, damage: Damage) -> None:
+@pytest.mark.parametrize(
+    ("code", "place", "damage"), DAMAGES, ids=[f"{row[0]}-{n}" for n, row in enumerate(DAMAGES)]
+)
+def test_damage_is_found_with_its_place_and_repair(
+    tmp_path: Path, code: str, place: str, damage: Damage
+) -> None:
     root = filled(tmp_path / "ks", ["/a", "/b"])
     assert verify(root).findings == ()
     damage(root)
@@ -141,7 +145,9 @@ def second_grant() -> bytes:
     return document[document.index(b"<grant") : document.index(b"</permissions>")]
 
 
-@pytest.mark.parametrize(("code", "damage"), WARNINGS, ids=[f"{row[0]}-{n}" for n, row in enumerate(WARNINGS)])
+@pytest.mark.parametrize(
+    ("code", "damage"), WARNINGS, ids=[f"{row[0]}-{n}" for n, row in enumerate(WARNINGS)]
+)
 def test_what_will_matter_is_a_warning(tmp_path: Path, code: str, damage: Damage) -> None:
     root = filled(tmp_path / "ks", ["/a", "/b"])
     damage(root)
@@ -153,10 +159,15 @@ def test_wildcards_are_noted(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", [])
     provision(root, [policy("/a", "/camera/*")], options=options())
     (finding,) = verify(root).findings
-    assert (finding.severity, finding.code) == (Severity.NOTE, "wildcard") and "rt/camera/*" in finding.message
+    assert (finding.severity, finding.code) == (
+        Severity.NOTE,
+        "wildcard",
+    ) and "rt/camera/*" in finding.message
 
 
-def test_names_of_strays_cannot_speak_to_the_terminal(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_names_of_strays_cannot_speak_to_the_terminal(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     from keystore.verb import main
 
     root = filled(tmp_path / "ks", ["/a"])

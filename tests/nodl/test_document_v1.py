@@ -55,7 +55,9 @@ def test_every_element_and_role() -> None:
 
 def test_one_name_in_two_roles_keeps_both() -> None:
     """The parser of nodl_python keeps the last one only."""
-    interface = one('<topic name="a" type="T" role="publisher"/><topic name="a" type="T" role="subscription"/>')
+    interface = one(
+        '<topic name="a" type="T" role="publisher"/><topic name="a" type="T" role="subscription"/>'
+    )
     assert endpoints(interface) == ["publisher a T :3", "subscription a T :3"]
 
 
@@ -168,7 +170,11 @@ for _label, _element, _error in (
     ("a digit first", TOPIC.replace('"a"', '"1a"'), errors.InvalidElementError),
     ("an unknown substitution", TOPIC.replace('"a"', '"{robot}/a"'), errors.InvalidElementError),
 ):
-    BROKEN[_label] = (NODE.replace(TOPIC, _element).join(('<interface version="1">\n', "</interface>")), _error, 3)
+    BROKEN[_label] = (
+        NODE.replace(TOPIC, _element).join(('<interface version="1">\n', "</interface>")),
+        _error,
+        3,
+    )
 
 
 @pytest.mark.parametrize("label", BROKEN)
@@ -187,7 +193,9 @@ def test_too_large_a_document() -> None:
 
 
 @settings(max_examples=80, deadline=None)
-@given(st.text(max_size=60), st.sampled_from(["", "<interface version='1'>", "<interface version='1'><node "]))
+@given(
+    st.text(max_size=60), st.sampled_from(["", "<interface version='1'>", "<interface version='1'><node "])
+)
 def test_any_text_is_nodes_or_an_error_of_ours(text: str, start: str) -> None:
     with contextlib.suppress(errors.InvalidNoDLError):
         assert parse_v1((start + text).encode("utf-8", "surrogatepass"), "x")

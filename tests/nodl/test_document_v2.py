@@ -92,7 +92,11 @@ def test_our_section_says_who_runs_the_node() -> None:
     )
     interface = node.interface
     assert (interface.executable, interface.name, interface.namespace) == ("talker.py", "mouth", "/tester")
-    assert (interface.library, interface.lifecycle, node.explicit_executable) == (ClientLibrary.RCLPY, True, True)
+    assert (interface.library, interface.lifecycle, node.explicit_executable) == (
+        ClientLibrary.RCLPY,
+        True,
+        True,
+    )
 
 
 def doc(body: str) -> str:
@@ -113,7 +117,11 @@ BROKEN = {
         "needs the key 'depth'",
         3,
     ),
-    "depth 0": (doc(f"publishers:\n- name: a\n  type: p/T\n  qos: {QOS.replace('10', '0')}"), "at least 1", 5),
+    "depth 0": (
+        doc(f"publishers:\n- name: a\n  type: p/T\n  qos: {QOS.replace('10', '0')}"),
+        "at least 1",
+        5,
+    ),
     "unknown qos key": (
         doc("publishers:\n- {name: a, type: p/T, qos: {history: KEEP_ALL, reliability: RELIABLE, x: 1}}"),
         "no key 'x'",
@@ -135,7 +143,11 @@ BROKEN = {
     "unknown parameter type": (doc("parameters:\n  a: {type: integer}"), "not a parameter type", 3),
     "unknown validator": (doc("parameters:\n  a: {type: int, validation: {max: 1}}"), "no key 'max'", 3),
     "bounds of one number": (doc("parameters:\n  a: {type: int, validation: {bounds: [1]}}"), "exactly 2", 3),
-    "bytes over 255": (doc("parameters:\n  a: {type: byte_array, default_value: [256]}"), "between 0 and 255", 3),
+    "bytes over 255": (
+        doc("parameters:\n  a: {type: byte_array, default_value: [256]}"),
+        "between 0 and 255",
+        3,
+    ),
     "read_only as text": (doc("parameters:\n  a: {type: int, read_only: 'yes'}"), "true or false", 3),
     "codegen of a scalar": (doc("codegen: {cpp: 1}"), "must be a mapping", 2),
     "unknown identity": (doc("codegen: {enclave_launch: {nodes: a}}"), "no key 'nodes'", 2),
@@ -152,7 +164,13 @@ BROKEN = {
     "control characters": ("nodl_version: 2\x00", "not", None),
 }
 for _label, _name in {
-    **{"wildcard": "/*", "class": "[ab]", "tilde alone": "'~'", "tilde without slash": "~ab", "blank": "'a b'"},
+    **{
+        "wildcard": "/*",
+        "class": "[ab]",
+        "tilde alone": "'~'",
+        "tilde without slash": "~ab",
+        "blank": "'a b'",
+    },
     **{"empty part": "a//b", "trailing slash": "a/", "digit after slash": "a/1", "empty": "''"},
 }.items():
     BROKEN[f"name with {_label}"] = (doc(f"service_clients:\n- {{name: {_name}, type: p/T}}"), "name", 3)
@@ -215,7 +233,9 @@ def write(folder: Path, name: str, *references: str, client: str = "") -> Path:
 
 
 def register(prefix: Path, package: str, name: str, *references: str, client: str = "") -> Path:
-    return write(prefix / "share/ament_index/resource_index/nodl", f"{package}__{name}", *references, client=client)
+    return write(
+        prefix / "share/ament_index/resource_index/nodl", f"{package}__{name}", *references, client=client
+    )
 
 
 def read(path: Path, *prefixes: Path) -> list[str]:
@@ -255,7 +275,10 @@ REFUSED = {
     "itself": (["local://main.nodl.yaml"], "a second time"),
     "itself round about": (["local://sub/../main.nodl.yaml"], "a second time"),
     "itself through a link": (["local://self.yaml"], "a second time"),
-    "a cycle of two": (["local://ping.yaml"], "local://ping.yaml > local://sub/../pong.yaml > local://ping.yaml"),
+    "a cycle of two": (
+        ["local://ping.yaml"],
+        "local://ping.yaml > local://sub/../pong.yaml > local://ping.yaml",
+    ),
     "a diamond": (["local://left.yaml", "local://right.yaml"], "a second time"),
     "a diamond spelled differently": (["local://left.yaml", "local://sub/../top.yaml"], "a second time"),
     "an unknown resource": (["nodl://common/none"], "no document 'nodl://common/none'"),
@@ -289,7 +312,9 @@ def test_includes_that_are_refused(label: str, tmp_path: Path) -> None:
 def test_names_that_collide_between_documents_are_an_error(tmp_path: Path) -> None:
     write(tmp_path, "more.yaml", client="a")
     main = write(tmp_path, "main.nodl.yaml", "local://more.yaml", client="a")
-    with pytest.raises(errors.InvalidNoDLDocumentError, match=r"listed twice under service_clients, first at .*main"):
+    with pytest.raises(
+        errors.InvalidNoDLDocumentError, match=r"listed twice under service_clients, first at .*main"
+    ):
         read_document(main)
 
 

@@ -157,7 +157,9 @@ CONFLICTS = {
 @pytest.mark.parametrize("label", CONFLICTS)
 def test_definitions_that_disagree_are_an_error_that_lists_the_files(prefix: Prefix, label: str) -> None:
     files = CONFLICTS[label](prefix)
-    with pytest.raises(errors.ConflictingNoDLError, match="conflicting NoDL definitions of demo/talker") as caught:
+    with pytest.raises(
+        errors.ConflictingNoDLError, match="conflicting NoDL definitions of demo/talker"
+    ) as caught:
         find(prefix, "demo", "talker")
     assert all(f"\n  {file}:" in str(caught.value) for file in files)
     assert "--nodl" in str(caught.value)

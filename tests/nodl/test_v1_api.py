@@ -85,7 +85,11 @@ def test_parsing_a_path_or_a_stream(share: Path) -> None:
     path = share / "example.nodl.xml"
     by_path, by_text, by_stream = nodl.parse(path), nodl.parse(str(path)), nodl.parse(io.StringIO(DOCUMENT))
     assert [node.name for node in by_path] == ["node_1", "node_2"]
-    assert [str(node) for node in by_path] == [str(node) for node in by_text] == [str(node) for node in by_stream]
+    assert (
+        [str(node) for node in by_path]
+        == [str(node) for node in by_text]
+        == [str(node) for node in by_stream]
+    )
 
 
 ERRORS = {
@@ -153,7 +157,9 @@ def test_errors_made_by_their_v1_constructors() -> None:
 
 
 def test_importing_nodl_loads_nothing_else() -> None:
-    code = "import sys, nodl; print([m for m in sys.modules if m.startswith('nodl.') or m in ('lxml', 'yaml')])"
+    code = (
+        "import sys, nodl; print([m for m in sys.modules if m.startswith('nodl.') or m in ('lxml', 'yaml')])"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.strip() == "[]"
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):

@@ -42,7 +42,9 @@ def test_validating_files(folder: Path, capsys: pytest.CaptureFixture[str]) -> N
     assert capsys.readouterr().out == "demo.nodl.xml: valid NoDL v1: talker, listener\n"
 
 
-def test_validating_a_folder_tells_every_broken_file(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_validating_a_folder_tells_every_broken_file(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     (folder / "bad.nodl.xml").write_text(V1.replace("both", "all"))
     (folder / "bad.nodl.yaml").write_text("nodl_version: 2\nx: 1\n")
     assert main(["validate"]) == 1
@@ -95,7 +97,9 @@ def test_converting_v1_to_v2(folder: Path, capsys: pytest.CaptureFixture[str]) -
     assert main(["convert", "demo.nodl.xml", "-o", "out"]) == 0
     captured = capsys.readouterr()
     assert captured.out == "out/talker.py.nodl.yaml\nout/listener.nodl.yaml\n"
-    assert captured.err == "note: talker: v1 says nothing of QoS; ROS's default profile was written, check it\n"
+    assert (
+        captured.err == "note: talker: v1 says nothing of QoS; ROS's default profile was written, check it\n"
+    )
     qos = "{history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
     assert (folder / "out/talker.py.nodl.yaml").read_text() == (
         "nodl_version: 2\n"
@@ -113,7 +117,9 @@ def test_converting_v1_to_v2(folder: Path, capsys: pytest.CaptureFixture[str]) -
     )
 
 
-def test_converting_there_and_back_keeps_the_meaning(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_converting_there_and_back_keeps_the_meaning(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["convert", "demo.nodl.xml", "-o", "out"]) == 0
     files = [str(path) for path in sorted((folder / "out").iterdir(), reverse=True)]
     assert main(["convert", *files, "-o", "back.nodl.xml"]) == 0
@@ -140,7 +146,9 @@ FAILURES = {
 
 
 @pytest.mark.parametrize("label", FAILURES)
-def test_conversions_that_fail_write_nothing(folder: Path, capsys: pytest.CaptureFixture[str], label: str) -> None:
+def test_conversions_that_fail_write_nothing(
+    folder: Path, capsys: pytest.CaptureFixture[str], label: str
+) -> None:
     text, reason = FAILURES[label]
     (folder / "bad.nodl.xml").write_text(text)
     output = [] if label == "a folder is needed" else ["-o", "out"]
@@ -171,7 +179,12 @@ def test_wrong_usage(arguments: list[str]) -> None:
 
 def meaning(nodes: tuple[ManifestNode, ...]) -> object:
     return {
-        (node.interface.executable, node.interface.plugin, node.interface.name, node.interface.namespace or "/"): (
+        (
+            node.interface.executable,
+            node.interface.plugin,
+            node.interface.name,
+            node.interface.namespace or "/",
+        ): (
             frozenset((e.kind, e.name, e.type) for e in node.interface.endpoints),
             dict(node.parameter_types),
         )
@@ -187,12 +200,18 @@ middles = {"topic": "msg", "service": "srv", "action": "action"}
 
 
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(words, words, st.dictionaries(names, kinds, min_size=1, max_size=5), st.dictionaries(words, st.just("int")))
+@given(
+    words,
+    words,
+    st.dictionaries(names, kinds, min_size=1, max_size=5),
+    st.dictionaries(words, st.just("int")),
+)
 def test_law_v1_to_v2_to_v1_keeps_the_meaning(
     node: str, executable: str, found: dict[str, tuple[str, str]], parameters: dict[str, str]
 ) -> None:
     body = "".join(
-        f'<{kind} name="{name}" type="pkg/{middles[kind]}/Type" role="{role}"/>' for name, (kind, role) in found.items()
+        f'<{kind} name="{name}" type="pkg/{middles[kind]}/Type" role="{role}"/>'
+        for name, (kind, role) in found.items()
     )
     body += "".join(f'<parameter name="{name}" type="{kind}"/>' for name, kind in parameters.items())
     text = f'<interface version="1"><node name="{node}" executable="{executable}">{body}</node></interface>'

@@ -288,7 +288,9 @@ def test_a_name_that_leaves_no_room_for_its_services_is_a_problem(node: NodeMake
     derived = derive(node(name="n" * 60, namespace="/" + "a" * 170))
     (problem,) = derived.problems
     assert problem.startswith("demo.launch.xml:5: node /aaa")
-    assert problem.endswith("is longer than 247 characters; it could not start: give it another name or namespace")
+    assert problem.endswith(
+        "is longer than 247 characters; it could not start: give it another name or namespace"
+    )
     assert not derive(node(name="n" * 40, namespace="/" + "a" * 170)).problems
 
 

@@ -190,7 +190,9 @@ class LaunchContext:
     def save(self) -> dict[str, Any]:
         """Everything that an event could change, for ``restore``."""
         return {
-            "configurations": {k: list(v) if isinstance(v, list) else v for k, v in self.__configurations.items()},
+            "configurations": {
+                k: list(v) if isinstance(v, list) else v for k, v in self.__configurations.items()
+            },
             "configurations_stack": list(self.__configurations_stack),
             "locals": dict(self.__locals),
             "locals_stack": list(self.__locals_stack),

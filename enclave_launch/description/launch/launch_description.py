@@ -52,7 +52,9 @@ class LaunchDescription(LaunchDescriptionEntity):
     def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         if self.__deprecated_reason is not None:
             file = context.get_locals_as_dict().get("current_launch_file_path")
-            subject = "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
+            subject = (
+                "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
+            )
             context.host.warn(f"{subject}: {self.__deprecated_reason}")
         return self.__entities
 

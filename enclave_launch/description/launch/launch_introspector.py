@@ -31,7 +31,9 @@ def tree_like_indent(lines: Iterable[str]) -> list[str]:
     for line in lines:
         if line.startswith(_INDENT):
             depth = len(line) - len(line.lstrip())
-            drawn.append("│" + line[1 : depth - 4] + "└── " + line[depth:] if depth > 4 else "├── " + line[4:])
+            drawn.append(
+                "│" + line[1 : depth - 4] + "└── " + line[depth:] if depth > 4 else "├── " + line[4:]
+            )
     if drawn:
         drawn[-1] = drawn[-1].replace("├", "└", 1)
     return drawn

@@ -22,9 +22,7 @@ class Entity(BaseEntity):
 
     __slots__ = ("_element", "_file", "_parent", "_read_attributes", "_read_children")
 
-    def __init__(
-        self, xml_element: XmlElement, *, parent: Entity | None = None, file: str = ""
-    ) -> None:
+    def __init__(self, xml_element: XmlElement, *, parent: Entity | None = None, file: str = "") -> None:
         self._element = xml_element
         self._parent = parent
         self._file = file

@@ -63,9 +63,7 @@ class Entity(BaseEntity):
     def children(self) -> list[BaseEntity]:
         self._children_called = True
         if not isinstance(self._element, dict | list):
-            raise TypeError(
-                f"Expected a dict or list, got {type(self._element)}:\n---\n{self._element}\n---"
-            )
+            raise TypeError(f"Expected a dict or list, got {type(self._element)}:\n---\n{self._element}\n---")
         if isinstance(self._element, list):
             return self._entities(self._element)
         if "children" not in self._element:

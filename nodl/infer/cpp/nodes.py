@@ -205,7 +205,9 @@ def _endpoint_of_call(call: Node, scope: Scope, found: _Found, receivers: set[st
     elif name == "add_on_set_parameters_callback" or not any(text(a) in _HANDED for a in arguments):
         return
     elif not whole.startswith(("std::", "rclcpp", "tf2_ros::", "image_transport::")) and name not in _CREATES:
-        found.gaps[Gap(source, f"the node is handed to {whole[:80]}, which may create endpoints on it")] = None
+        found.gaps[Gap(source, f"the node is handed to {whole[:80]}, which may create endpoints on it")] = (
+            None
+        )
 
 
 _HANDED = frozenset({"this", "*this", "shared_from_this()", "this->shared_from_this()"})
@@ -243,7 +245,10 @@ def _member_types(cls: CppClass, member: str) -> Iterator[str]:
     for function in cls.functions:
         parent = function.node.parent
         for sibling in parent.named_children if parent is not None else ():
-            if sibling.type == "field_declaration" and text(sibling.child_by_field_name("declarator")) == member:
+            if (
+                sibling.type == "field_declaration"
+                and text(sibling.child_by_field_name("declarator")) == member
+            ):
                 yield text(sibling.child_by_field_name("type"))
         return
 
@@ -378,4 +383,7 @@ def _keys(found: _Found, unit: CppUnit, build: Build) -> list[tuple[str | None, 
 
 
 def _mentions(function: Function, name: str) -> bool:
-    return any(child.type in ("type_identifier", "identifier") and text(child) == name for child in walk(function.node))
+    return any(
+        child.type in ("type_identifier", "identifier") and text(child) == name
+        for child in walk(function.node)
+    )

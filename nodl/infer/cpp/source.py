@@ -27,7 +27,9 @@ def _parser() -> Parser:
         import tree_sitter_cpp
         from tree_sitter import Language, Parser
     except ImportError as error:
-        raise CppSupportMissing("C++ sources need the extra cpp: pip install 'enclave-launch[cpp]'") from error
+        raise CppSupportMissing(
+            "C++ sources need the extra cpp: pip install 'enclave-launch[cpp]'"
+        ) from error
     return Parser(Language(tree_sitter_cpp.language()))
 
 

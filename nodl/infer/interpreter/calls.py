@@ -206,7 +206,9 @@ def _call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
 
 def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
     args = call.args.preceded(*partial.positional)
-    args = Arguments(args.positional, {**dict(partial.keywords), **args.keywords}, args.more, args.more_keywords)
+    args = Arguments(
+        args.positional, {**dict(partial.keywords), **args.keywords}, args.more, args.more_keywords
+    )
     return run.call(partial.function, args, call.node, call.frame)
 
 

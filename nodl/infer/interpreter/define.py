@@ -27,7 +27,9 @@ _TRANSPARENT = frozenset(
     }
 )  # fmt: skip
 _PROPERTIES = frozenset({"builtins.property", "functools.cached_property", "abc.abstractproperty"})
-_DATACLASSES = frozenset({"dataclasses.dataclass", "attr.s", "attrs.define", "attr.dataclass", "attrs.frozen"})
+_DATACLASSES = frozenset(
+    {"dataclasses.dataclass", "attr.s", "attrs.define", "attr.dataclass", "attrs.frozen"}
+)
 
 
 def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> FunctionValue:
@@ -66,9 +68,7 @@ def define_function(run: Run, node: ast.FunctionDef | ast.AsyncFunctionDef, fram
     return True
 
 
-def _decorated(
-    run: Run, value: Value, function: FunctionValue, decorator: ast.expr, frame: Frame
-) -> Value:
+def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.expr, frame: Frame) -> Value:
     if isinstance(decorator, ast.Attribute) and decorator.attr in ("setter", "deleter", "getter"):
         return frame.cells.get(function.name, value)
     made_by_call = isinstance(decorator, ast.Call)
@@ -156,9 +156,7 @@ def linearized(cls: ClassValue) -> tuple[object, ...]:
     """The method resolution order: C3 as in Python, ending in ``External`` or ``Unknown`` bases."""
     if cls.linear is None:
         cls.linear = (cls,)  # guards against a class among its own bases
-        orders = [
-            list(linearized(base)) if isinstance(base, ClassValue) else [base] for base in cls.bases
-        ]
+        orders = [list(linearized(base)) if isinstance(base, ClassValue) else [base] for base in cls.bases]
         cls.linear = (cls, *_merge(orders, list(cls.bases)))
     return cls.linear
 

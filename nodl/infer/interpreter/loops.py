@@ -58,7 +58,9 @@ def _may_name(node: ast.For | ast.AsyncFor) -> bool:
     """Whether the loop's number can become part of a text: one stands in the body, or the number is passed on."""
     numbers = {name.id for name in ast.walk(node.target) if isinstance(name, ast.Name)}
     for part in (inner for statement in node.body for inner in ast.walk(statement)):
-        if isinstance(part, ast.JoinedStr) or (isinstance(part, ast.Constant) and isinstance(part.value, str)):
+        if isinstance(part, ast.JoinedStr) or (
+            isinstance(part, ast.Constant) and isinstance(part.value, str)
+        ):
             return True
         if isinstance(part, ast.Call):
             given = (*part.args, *(keyword.value for keyword in part.keywords))

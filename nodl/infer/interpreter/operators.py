@@ -116,9 +116,7 @@ def _text_side(value: Value) -> list[TextAtom]:
     return found or as_texts(value)
 
 
-def _added_sequences(
-    run: Run, node: ast.AST, left: Value, right: Value, sequences: list[Sequence]
-) -> Value:
+def _added_sequences(run: Run, node: ast.AST, left: Value, right: Value, sequences: list[Sequence]) -> Value:
     kind = sequences[0].kind
     if len(left) == len(right) == 1 and len(sequences) == 2:
         first, second = sequences[0].items, sequences[1].items
@@ -288,7 +286,8 @@ def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
             automatic += 1
         value = _format_argument(name, args)
         operands.append(
-            formatted(value, spec or "") if not conversion and "{" not in (spec or "")
+            formatted(value, spec or "")
+            if not conversion and "{" not in (spec or "")
             else [make_text((Hole("formatted text"),))]
         )
     return concatenations(operands)

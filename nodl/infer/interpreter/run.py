@@ -365,5 +365,3 @@ class Run:
 
     def gap(self, node: ast.AST, frame: Frame, why: str) -> None:
         self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)
-
-

@@ -101,7 +101,9 @@ def _sequence(kind: str) -> Model:
 
 def _set(run: Run, call: Call) -> Value:
     items = argument_items(run, call)
-    if items.exact is not None and not all(len(item) == 1 and isinstance(item[0], str) for item in items.exact):
+    if items.exact is not None and not all(
+        len(item) == 1 and isinstance(item[0], str) for item in items.exact
+    ):
         items = Items(None, items.any_element())
     return run.sequence(call.node, "set", items)
 
@@ -133,9 +135,7 @@ def _enumerate(run: Run, call: Call) -> Value:
     items = argument_items(run, call)
     start = sole(call.args.at(1, "start") or (0,))
     if items.exact is not None and type(start) is int:
-        pairs = tuple(
-            run.tuple_of(((start + index,), element)) for index, element in enumerate(items.exact)
-        )
+        pairs = tuple(run.tuple_of(((start + index,), element)) for index, element in enumerate(items.exact))
         return run.sequence(call.node, "list", Items(pairs))
     pair = run.tuple_of((unknown("a number of a loop"), items.any_element() or ANY))
     return run.sequence(call.node, "list", Items(None, pair))

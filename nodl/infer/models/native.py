@@ -204,10 +204,7 @@ def _values(run: Run, owner: Dictionary, call: Call) -> Value:
 def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
     keys, values = keys_of(owner), values_of(owner)
     if keys.exact is not None and values.exact is not None:
-        pairs = tuple(
-            run.tuple_of((key, value))
-            for key, value in zip(keys.exact, values.exact, strict=True)
-        )
+        pairs = tuple(run.tuple_of((key, value)) for key, value in zip(keys.exact, values.exact, strict=True))
         return run.sequence(call.node, "list", Items(pairs))
     pair = run.tuple_of((keys.any_element() or ANY, values.any_element() or ANY))
     return run.sequence(call.node, "list", Items(None, pair))

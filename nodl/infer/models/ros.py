@@ -326,7 +326,9 @@ def _wait_until_active(run: Run, record: NodeRecord, call: Call) -> Value:
         for name in as_texts(call.args.at(index, keyword) or (default,)):
             service = concatenate(name, "/get_state")
             record.add_endpoint(
-                FoundEndpoint(EndpointKind.SERVICE_CLIENT, service, "lifecycle_msgs/srv/GetState", call.source)
+                FoundEndpoint(
+                    EndpointKind.SERVICE_CLIENT, service, "lifecycle_msgs/srv/GetState", call.source
+                )
             )
     return NONE
 
@@ -466,9 +468,7 @@ def image_transport_method(run: Run, record: NodeRecord, name: str, call: Call) 
         record.add_endpoint(FoundEndpoint(kind, text, "sensor_msgs/msg/Image", call.source))
         if isinstance(text, str):
             below = concatenate(text, "/compressed")
-            record.add_endpoint(
-                FoundEndpoint(kind, below, "sensor_msgs/msg/CompressedImage", call.source)
-            )
+            record.add_endpoint(FoundEndpoint(kind, below, "sensor_msgs/msg/CompressedImage", call.source))
     if name.startswith("subscribe"):
         run.register_callback(call.args.at(2, "callback") or BOTTOM, 1)
     return ANY

@@ -125,11 +125,19 @@ HELPERS: dict[tuple[str, str], Helper] = {
         _NODE,
         (
             FixedEndpoint(
-                SERVER, "/get_interactive_markers", "visualization_msgs/srv/GetInteractiveMarkers", below=_NAMESPACE
+                SERVER,
+                "/get_interactive_markers",
+                "visualization_msgs/srv/GetInteractiveMarkers",
+                below=_NAMESPACE,
             ),
-            FixedEndpoint(PUBLISHER, "/update", "visualization_msgs/msg/InteractiveMarkerUpdate", below=_NAMESPACE),
             FixedEndpoint(
-                SUBSCRIPTION, "/feedback", "visualization_msgs/msg/InteractiveMarkerFeedback", below=_NAMESPACE
+                PUBLISHER, "/update", "visualization_msgs/msg/InteractiveMarkerUpdate", below=_NAMESPACE
+            ),
+            FixedEndpoint(
+                SUBSCRIPTION,
+                "/feedback",
+                "visualization_msgs/msg/InteractiveMarkerFeedback",
+                below=_NAMESPACE,
             ),
         ),
     ),

@@ -40,7 +40,9 @@ def _enclave(node: Node, accept_patterns: bool) -> list[str]:
         f"        <profile ns={quoteattr(node.namespace)} node={quoteattr(node.name)}>",
     ]
     for group, child, attribute, kind in _GROUPS:
-        names = sorted({i.name for i in node.interfaces if i.kind is kind and _allowed(i.name, accept_patterns)})
+        names = sorted(
+            {i.name for i in node.interfaces if i.kind is kind and _allowed(i.name, accept_patterns)}
+        )
         if names:
             lines.append(f'          <{group} {attribute}="ALLOW">')
             lines.extend(f"            <{child}>{escape(name)}</{child}>" for name in names)

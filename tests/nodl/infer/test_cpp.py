@@ -92,7 +92,10 @@ def test_names_and_types(system: InferredSystem) -> None:
 
 
 def test_executables_and_components(system: InferredSystem) -> None:
-    assert (node(system, "talker").plugin, node(system, "talker").executable) == ("demo::Talker", "talker_node")
+    assert (node(system, "talker").plugin, node(system, "talker").executable) == (
+        "demo::Talker",
+        "talker_node",
+    )
     assert node(system, "plain").executable == "main_node"
     assert node(system, "derived").executable == "main_node"
 

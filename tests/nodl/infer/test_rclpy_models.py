@@ -247,7 +247,11 @@ navigator.waitUntilNav2Active(localizer="slam")
     [
         ("", "BasicNavigator()", "basic_navigator"),
         ("", "BasicNavigator('mine', namespace='robot1')", "mine"),
-        ("class Mine(BasicNavigator):\n    def __init__(self):\n        super().__init__('sub')", "Mine()", "sub"),
+        (
+            "class Mine(BasicNavigator):\n    def __init__(self):\n        super().__init__('sub')",
+            "Mine()",
+            "sub",
+        ),
         ("class Mine(BasicNavigator):\n    pass", "Mine()", "basic_navigator"),
     ],
 )
@@ -266,7 +270,9 @@ def test_lifecycle_managers_found_at_run_time_are_unknown(names: Callable[..., l
     assert "?" in names(text)
 
 
-def test_interactive_markers_lie_below_the_namespace_of_their_server(node_body: Callable[..., list[str]]) -> None:
+def test_interactive_markers_lie_below_the_namespace_of_their_server(
+    node_body: Callable[..., list[str]],
+) -> None:
     server = "interactive_markers.InteractiveMarkerServer(self, self.declare_parameter('ns', 'm').value)"
     found = node_body(server, before="import interactive_markers")
     assert found == ["param:ns/feedback", "param:ns/get_interactive_markers", "param:ns/update"]

@@ -84,7 +84,9 @@ def stand_in(recorder: Recorder) -> dict[str, types.ModuleType]:
         def create_timer(self, _: float, callback: Any) -> None:
             recorder.callbacks.append(callback)
 
-    modules = {name: types.ModuleType(name) for name in ("rclpy", "rclpy.node", "std_msgs", "std_msgs.msg", "tosses")}
+    modules = {
+        name: types.ModuleType(name) for name in ("rclpy", "rclpy.node", "std_msgs", "std_msgs.msg", "tosses")
+    }
     vars(modules["rclpy"]).update(init=lambda: None, spin=lambda node: recorder.call_back())
     vars(modules["rclpy.node"]).update(Node=Node)
     vars(modules["std_msgs.msg"]).update(String=object)
@@ -112,7 +114,9 @@ literals = st.sampled_from(["'x'", "'y1'", "'scan'", "'/abs'", "'p/q'"])
 
 
 def expressions() -> st.SearchStrategy[str]:
-    base = st.one_of(literals, st.sampled_from(VARIABLES), st.sampled_from(["self.f", "self.g", "TOPIC", "self.K"]))
+    base = st.one_of(
+        literals, st.sampled_from(VARIABLES), st.sampled_from(["self.f", "self.g", "TOPIC", "self.K"])
+    )
 
     def compound(inner: st.SearchStrategy[str]) -> st.SearchStrategy[str]:
         pair = st.tuples(inner, inner)
@@ -155,7 +159,9 @@ def simple_statements() -> st.SearchStrategy[list[str]]:
         EXPRESSION.map(lambda e: f"self.create_client(String, {e})"),
         EXPRESSION.map(lambda e: f"self.create_subscription(String, {e}, self.heard, 10)"),
         st.just("self.create_timer(1.0, self.tick)"),
-        variable.map(lambda v: f"self.create_timer(1.0, lambda {v}={v}: self.create_publisher(String, {v}, 1))"),
+        variable.map(
+            lambda v: f"self.create_timer(1.0, lambda {v}={v}: self.create_publisher(String, {v}, 1))"
+        ),
         variable.map(lambda v: f"self.create_timer(1.0, lambda: self.create_client(String, {v}))"),
         EXPRESSION.map(lambda e: f"a, *rest = [{e}, 'r1', 'r2']"),
         st.just("items.pop()"),
@@ -280,4 +286,6 @@ def test_everything_that_is_created_was_inferred(program: str, seed: int) -> Non
             if kind == "node":
                 assert name in {node.name for node in system.nodes}
                 continue
-            assert any(k == kind and pattern.match(name) for k, pattern in inferred), f"{kind} {name}\n{program}"
+            assert any(k == kind and pattern.match(name) for k, pattern in inferred), (
+                f"{kind} {name}\n{program}"
+            )

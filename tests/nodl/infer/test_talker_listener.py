@@ -56,9 +56,7 @@ def test_policy_contains_the_conditional_publisher(infer: Infer) -> None:
     root = ElementTree.fromstring(to_policy(expand(infer(LISTENER))).encode())
     profile = root.find("./enclaves/enclave[@path='/listener']/profiles/profile")
     assert profile is not None
-    groups = {
-        (group.tag, *group.attrib.items()): [child.text for child in group] for group in profile
-    }
+    groups = {(group.tag, *group.attrib.items()): [child.text for child in group] for group in profile}
     assert groups == {
         ("topics", ("publish", "ALLOW")): ["/chatter2", "/parameter_events", "/rosout"],
         ("topics", ("subscribe", "ALLOW")): ["/chatter"],
@@ -161,7 +159,9 @@ def prefix(tmp_path: Path) -> Path:
 def test_the_source_behind_an_executable(wrapper: str, prefix: Path) -> None:
     source = prefix / "lib/python3.12/site-packages/demo/listener.py"
     script = prefix / "lib/demo/listener"
-    script.write_text("#!/usr/bin/python3\n" + WRAPPERS[wrapper].replace("{source}", str(source)), encoding="utf-8")
+    script.write_text(
+        "#!/usr/bin/python3\n" + WRAPPERS[wrapper].replace("{source}", str(source)), encoding="utf-8"
+    )
     script.chmod(0o755)
     inferred = infer_executable("demo", "listener", prefixes=[str(prefix)])
     (node,) = inferred.interfaces

@@ -37,7 +37,9 @@ class DeclareLaunchArgument(Action):
     ) -> None:
         super().__init__(**kwargs)
         self.__name = name
-        self.__default_value = None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        self.__default_value = (
+            None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        )
         self.__choices = choices
         self._conditionally_included = False  # set by the argument scan
         if choices is not None:

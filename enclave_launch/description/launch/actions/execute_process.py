@@ -39,7 +39,9 @@ class ExecuteProcess(ExecuteLocal):
         additional_env: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
         **kwargs: Any,
     ) -> None:
-        executable = Executable(cmd=cmd, prefix=prefix, name=name, cwd=cwd, env=env, additional_env=additional_env)
+        executable = Executable(
+            cmd=cmd, prefix=prefix, name=name, cwd=cwd, env=env, additional_env=additional_env
+        )
         super().__init__(process_description=executable, **kwargs)
 
     @classmethod
@@ -142,7 +144,9 @@ def _environment(entity: Entity, parser: Parser, name: str) -> Any:
     return environment
 
 
-_Attribute = tuple[str, str, Callable[[Entity, "Parser", str], Any]]  # attribute, constructor argument, reader
+_Attribute = tuple[
+    str, str, Callable[[Entity, "Parser", str], Any]
+]  # attribute, constructor argument, reader
 
 _ATTRIBUTES: tuple[_Attribute, ...] = (
     ("cwd", "cwd", _text),

@@ -60,7 +60,9 @@ class GroupAction(Action):
         keeps = entity.get_attr("keep", data_type=list[Entity], optional=True)
         if keeps is not None:
             kwargs["launch_configurations"] = parse_keeps(keeps, parser)
-        kwargs["actions"] = [parser.parse_action(child) for child in entity.children if child.type_name != "keep"]
+        kwargs["actions"] = [
+            parser.parse_action(child) for child in entity.children if child.type_name != "keep"
+        ]
         return cls, kwargs
 
     def get_sub_entities(self) -> list[LaunchDescriptionEntity]:

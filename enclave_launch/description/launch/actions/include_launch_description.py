@@ -58,7 +58,11 @@ class IncludeLaunchDescription(Action):
         _, kwargs = super().parse(entity, parser)
         kwargs["launch_description_source"] = parser.parse_substitution(entity.get_attr("file"))
         tags = ["arg", "let"] if current_release().has(Feature.LET_IN_INCLUDE) else ["arg"]
-        given = [child for tag in tags for child in entity.get_attr(tag, data_type=list[Entity], optional=True) or ()]
+        given = [
+            child
+            for tag in tags
+            for child in entity.get_attr(tag, data_type=list[Entity], optional=True) or ()
+        ]
         if given:
             parse = parser.parse_substitution
             kwargs["launch_arguments"] = [

@@ -15,7 +15,6 @@ class InvalidConditionExpressionError(ValueError):
     def __init__(
         self, expression: str, unexpanded_expression: Iterable[Substitution], valid_expressions: Iterable[str]
     ) -> None:
-        self.reason = (
-            f"invalid condition expression, expected one of [{', '.join(valid_expressions)}] but got '{expression}'"
-        )
+        expected = ", ".join(valid_expressions)
+        self.reason = f"invalid condition expression, expected one of [{expected}] but got '{expression}'"
         super().__init__(f"{self.reason}, expanded from '{' + '.join(map(str, unexpanded_expression))}'")

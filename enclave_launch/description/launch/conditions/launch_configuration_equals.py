@@ -30,7 +30,9 @@ class LaunchConfigurationEquals(Condition):
                 stacklevel=2,
             )
         self.__name = launch_configuration_name
-        self.__expected = None if expected_value is None else normalize_to_list_of_substitutions(expected_value)
+        self.__expected = (
+            None if expected_value is None else normalize_to_list_of_substitutions(expected_value)
+        )
         super().__init__(predicate=self._predicate_func)
 
     def _predicate_func(self, context: LaunchContext) -> bool:

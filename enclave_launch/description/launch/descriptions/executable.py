@@ -109,7 +109,9 @@ class Executable:
             prefix = perform_substitutions(context, self.__prefix)
             cmd = [*shlex.split(prefix), *cmd] if prefix else cmd
         self.__final_cmd = cmd
-        name = os.path.basename(cmd[0]) if self.__name is None else perform_substitutions(context, self.__name)
+        name = (
+            os.path.basename(cmd[0]) if self.__name is None else perform_substitutions(context, self.__name)
+        )
         self.__final_name = f"{name}-{context.host.next_process_index()}"
         self.__final_cwd = None if self.__cwd is None else perform_substitutions(context, self.__cwd)
         self.__final_env = self.__environment(context)
@@ -139,4 +141,7 @@ def _normalize(variables: Mapping[SomeSubstitutionsType, SomeSubstitutionsType])
 
 
 def _perform(context: LaunchContext, variables: Variables) -> dict[str, str]:
-    return {perform_substitutions(context, name): perform_substitutions(context, value) for name, value in variables}
+    return {
+        perform_substitutions(context, name): perform_substitutions(context, value)
+        for name, value in variables
+    }

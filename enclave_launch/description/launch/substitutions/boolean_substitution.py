@@ -102,7 +102,9 @@ class _Variadic(Substitution):
         self.__args = [normalize_to_list_of_substitutions(arg) for arg in args]
 
     @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[Callable[..., Substitution], dict[str, Any]]:
+    def parse(
+        cls, data: Sequence[SomeSubstitutionsType]
+    ) -> tuple[Callable[..., Substitution], dict[str, Any]]:
         """Older releases pass the arguments by a keyword that the constructor does not have."""
         if current_release().has(Feature.ANY_ALL_ARGUMENTS):
             return partial(cls, *data), {}

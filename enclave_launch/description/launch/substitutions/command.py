@@ -72,7 +72,9 @@ def _check(context: LaunchContext, text: str, mode: str, result: CommandResult) 
         raise SubstitutionFailure(f"executed command failed. Command: {text}{captured}")
     if not result.stderr:
         return
-    message = f"executed command showed stderr output. Command: {text}\nCaptured stderr output:\n{result.stderr}"
+    message = (
+        f"executed command showed stderr output. Command: {text}\nCaptured stderr output:\n{result.stderr}"
+    )
     if mode == "fail":
         raise SubstitutionFailure(message)
     if mode == "warn":

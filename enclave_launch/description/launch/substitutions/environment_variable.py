@@ -22,9 +22,13 @@ if TYPE_CHECKING:
 class EnvironmentVariable(Substitution):
     """The value of an environment variable. The default is performed in any case."""
 
-    def __init__(self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None) -> None:
+    def __init__(
+        self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None
+    ) -> None:
         self.__name = normalize_to_list_of_substitutions(name)
-        self.__default_value = None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        self.__default_value = (
+            None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        )
 
     @classmethod
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
@@ -44,7 +48,9 @@ class EnvironmentVariable(Substitution):
         return f"EnvVar({' + '.join(sub.describe() for sub in self.__name)})"
 
     def perform(self, context: LaunchContext) -> str:
-        default = None if self.__default_value is None else perform_substitutions(context, self.__default_value)
+        default = (
+            None if self.__default_value is None else perform_substitutions(context, self.__default_value)
+        )
         name = perform_substitutions(context, self.__name)
         value = context.environment.get(name, default)
         if value is None:

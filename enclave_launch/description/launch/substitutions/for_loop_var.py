@@ -27,9 +27,13 @@ def local_name(name: str) -> str:
 class ForEachVar(Substitution):
     """A value of the round of ``for_each`` that is being visited."""
 
-    def __init__(self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None) -> None:
+    def __init__(
+        self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None
+    ) -> None:
         self._name = normalize_to_list_of_substitutions(name)
-        self._default_value = None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        self._default_value = (
+            None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        )
 
     @classmethod
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
