@@ -31,10 +31,10 @@ from cryptography.hazmat.primitives.asymmetric import ec  # noqa: E402
 from cryptography.hazmat.primitives.serialization import pkcs7  # noqa: E402
 
 import keystore  # noqa: E402
-from keystore.domains import Domains  # noqa: E402
-from keystore.permissions import permissions_document  # noqa: E402
-from keystore.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule  # noqa: E402
-from keystore.validity import Validity, utc_now  # noqa: E402
+from keystore.formats.domains import Domains  # noqa: E402
+from keystore.formats.permissions import permissions_document  # noqa: E402
+from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule  # noqa: E402
+from keystore.formats.validity import Validity, utc_now  # noqa: E402
 from tests.keystore import sros2_peer  # noqa: E402
 
 RUNS = int(os.environ.get("BENCH_RUNS", "3"))

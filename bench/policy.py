@@ -17,10 +17,10 @@ from time import process_time
 from enclave_launch.policy import RunningNode, derive_policy
 from enclave_launch.policy.explanation import explain
 from enclave_launch.source_location import SourceLocation
-from keystore.domains import Domains
-from keystore.permissions import permissions_document
-from keystore.policy_xml import policy_xml
-from keystore.validity import Validity
+from keystore.formats.domains import Domains
+from keystore.formats.permissions import permissions_document
+from keystore.formats.policy_xml import policy_xml
+from keystore.formats.validity import Validity
 from nodl.name_template import NameTemplate
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 from nodl.remap import RemapRules, parse_rule

@@ -15,8 +15,8 @@ from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 
 if TYPE_CHECKING:
-    from keystore.policy_xml import PolicyDocument
-    from keystore.provisioning import ProvisionOptions
+    from keystore.formats.policy_xml import PolicyDocument
+    from keystore.steps.provisioning import ProvisionOptions
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +51,7 @@ class ResolveOptions:
 
 def _read_policy(path: Path) -> PolicyDocument:
     from keystore.errors import KeystoreError
-    from keystore.policy_xml import read_policy
+    from keystore.formats.policy_xml import read_policy
 
     try:
         return read_policy(path)

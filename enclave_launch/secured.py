@@ -21,10 +21,10 @@ from enclave_launch.security_environment import (
     launcher_environment,
     secured_environment,
 )
+from keystore.disk.stamps import enclave_stamp
 from keystore.errors import KeystoreError
-from keystore.policy import EnclavePolicy
-from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
-from keystore.stamps import enclave_stamp
+from keystore.formats.policy import EnclavePolicy
+from keystore.steps.provisioning import ProvisionOptions, ProvisionReport, provision
 
 
 class ProvisionedLaunch(NamedTuple):
@@ -135,7 +135,7 @@ class PlanProvider:
         """
         if self._is_untouched(policy):
             return
-        from keystore.provisioning_check import what_is_wrong
+        from keystore.steps.provisioning_check import what_is_wrong
 
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
@@ -163,7 +163,7 @@ class PlanProvider:
 
 
 def _who_changed_it(wrong: tuple[str, ...]) -> str:
-    from keystore.enclave_state import OTHER_PERMISSIONS
+    from keystore.steps.enclave_state import OTHER_PERMISSIONS
 
     if OTHER_PERMISSIONS in wrong:
         return (

@@ -14,8 +14,8 @@ from typing import NamedTuple
 from enclave_launch.enclave import Reason
 from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlannedProcess
-from keystore.domains import HIGHEST_ID, Domains
 from keystore.errors import printable
+from keystore.formats.domains import HIGHEST_ID, Domains
 
 ENABLE = "ROS_SECURITY_ENABLE"
 KEYSTORE = "ROS_SECURITY_KEYSTORE"

@@ -16,74 +16,74 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from keystore.bundle import PublicFiles as PublicFiles
-    from keystore.bundle import export as export
-    from keystore.ca_access import CaAccess as CaAccess
-    from keystore.ca_access import Secret as Secret
-    from keystore.creation import CreateOptions as CreateOptions
-    from keystore.creation import CreateReport as CreateReport
-    from keystore.creation import ImportedCa as ImportedCa
-    from keystore.creation import create_keystore as create_keystore
-    from keystore.enclaves import apply_policy as apply_policy
-    from keystore.enclaves import create_enclave as create_enclave
-    from keystore.enclaves import create_enclaves as create_enclaves
-    from keystore.enclaves import list_enclaves as list_enclaves
     from keystore.errors import KeystoreError as KeystoreError
-    from keystore.expiry import Expiry as Expiry
-    from keystore.expiry import StatusReport as StatusReport
-    from keystore.expiry import expires_soon as expires_soon
-    from keystore.expiry import status as status
-    from keystore.governance_setting import GovernanceOptions as GovernanceOptions
-    from keystore.governance_setting import set_governance as set_governance
-    from keystore.provisioning import EnclaveReport as EnclaveReport
-    from keystore.provisioning import ProvisionOptions as ProvisionOptions
-    from keystore.provisioning import ProvisionReport as ProvisionReport
-    from keystore.provisioning import provision as provision
-    from keystore.renewal import RenewOptions as RenewOptions
-    from keystore.renewal import renew as renew
-    from keystore.revocation import RemoveOptions as RemoveOptions
-    from keystore.revocation import RemoveReport as RemoveReport
-    from keystore.revocation import remove as remove
-    from keystore.rollover import Step as Step
-    from keystore.rollover import roll_over as roll_over
-    from keystore.subject import SubjectScheme as SubjectScheme
+    from keystore.formats.subject import SubjectScheme as SubjectScheme
+    from keystore.signing.ca_access import CaAccess as CaAccess
+    from keystore.signing.ca_access import Secret as Secret
+    from keystore.steps.bundle import PublicFiles as PublicFiles
+    from keystore.steps.bundle import export as export
+    from keystore.steps.creation import CreateOptions as CreateOptions
+    from keystore.steps.creation import CreateReport as CreateReport
+    from keystore.steps.creation import ImportedCa as ImportedCa
+    from keystore.steps.creation import create_keystore as create_keystore
+    from keystore.steps.enclaves import apply_policy as apply_policy
+    from keystore.steps.enclaves import create_enclave as create_enclave
+    from keystore.steps.enclaves import create_enclaves as create_enclaves
+    from keystore.steps.enclaves import list_enclaves as list_enclaves
+    from keystore.steps.expiry import Expiry as Expiry
+    from keystore.steps.expiry import StatusReport as StatusReport
+    from keystore.steps.expiry import expires_soon as expires_soon
+    from keystore.steps.expiry import status as status
+    from keystore.steps.governance_setting import GovernanceOptions as GovernanceOptions
+    from keystore.steps.governance_setting import set_governance as set_governance
+    from keystore.steps.provisioning import EnclaveReport as EnclaveReport
+    from keystore.steps.provisioning import ProvisionOptions as ProvisionOptions
+    from keystore.steps.provisioning import ProvisionReport as ProvisionReport
+    from keystore.steps.provisioning import provision as provision
+    from keystore.steps.renewal import RenewOptions as RenewOptions
+    from keystore.steps.renewal import renew as renew
+    from keystore.steps.revocation import RemoveOptions as RemoveOptions
+    from keystore.steps.revocation import RemoveReport as RemoveReport
+    from keystore.steps.revocation import remove as remove
+    from keystore.steps.rollover import Step as Step
+    from keystore.steps.rollover import roll_over as roll_over
     from keystore.verification import Finding as Finding
     from keystore.verification import Severity as Severity
     from keystore.verification import VerifyReport as VerifyReport
     from keystore.verification import verify as verify
 
 _HOMES = {
-    "CreateOptions": "creation",
-    "CreateReport": "creation",
-    "ImportedCa": "creation",
-    "create_keystore": "creation",
-    "apply_policy": "enclaves",
-    "create_enclave": "enclaves",
-    "create_enclaves": "enclaves",
-    "list_enclaves": "enclaves",
+    "CreateOptions": "steps.creation",
+    "CreateReport": "steps.creation",
+    "ImportedCa": "steps.creation",
+    "create_keystore": "steps.creation",
+    "apply_policy": "steps.enclaves",
+    "create_enclave": "steps.enclaves",
+    "create_enclaves": "steps.enclaves",
+    "list_enclaves": "steps.enclaves",
     "KeystoreError": "errors",
-    "PublicFiles": "bundle",
-    "export": "bundle",
-    "GovernanceOptions": "governance_setting",
-    "set_governance": "governance_setting",
-    "EnclaveReport": "provisioning",
-    "ProvisionOptions": "provisioning",
-    "ProvisionReport": "provisioning",
-    "provision": "provisioning",
-    "RenewOptions": "renewal",
-    "renew": "renewal",
-    "RemoveOptions": "revocation",
-    "RemoveReport": "revocation",
-    "remove": "revocation",
-    "Step": "rollover",
-    "roll_over": "rollover",
-    "CaAccess": "ca_access",
-    "Secret": "ca_access",
-    "Expiry": "expiry",
-    "StatusReport": "expiry",
-    "expires_soon": "expiry",
-    "status": "expiry",
-    "SubjectScheme": "subject",
+    "PublicFiles": "steps.bundle",
+    "export": "steps.bundle",
+    "GovernanceOptions": "steps.governance_setting",
+    "set_governance": "steps.governance_setting",
+    "EnclaveReport": "steps.provisioning",
+    "ProvisionOptions": "steps.provisioning",
+    "ProvisionReport": "steps.provisioning",
+    "provision": "steps.provisioning",
+    "RenewOptions": "steps.renewal",
+    "renew": "steps.renewal",
+    "RemoveOptions": "steps.revocation",
+    "RemoveReport": "steps.revocation",
+    "remove": "steps.revocation",
+    "Step": "steps.rollover",
+    "roll_over": "steps.rollover",
+    "CaAccess": "signing.ca_access",
+    "Secret": "signing.ca_access",
+    "Expiry": "steps.expiry",
+    "StatusReport": "steps.expiry",
+    "expires_soon": "steps.expiry",
+    "status": "steps.expiry",
+    "SubjectScheme": "formats.subject",
     "Finding": "verification",
     "Severity": "verification",
     "VerifyReport": "verification",

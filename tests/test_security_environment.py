@@ -6,7 +6,7 @@ import pytest
 
 from enclave_launch.errors import UsageError
 from enclave_launch.security_environment import environment_domains
-from keystore.domains import Domains
+from keystore.formats.domains import Domains
 
 
 @pytest.mark.parametrize(("text", "domain"), [("", 0), ("0", 0), ("42", 42), ("007", 7), ("230", 230)])

@@ -26,8 +26,8 @@ from enclave_launch.process import (
     EnclaveRequest,
     ResolvedProcess,
 )
-from keystore.enclave_name import validate_enclave_name
 from keystore.errors import InvalidEnclaveName
+from keystore.formats.enclave_name import validate_enclave_name
 
 
 class EnclaveScope(str, Enum):

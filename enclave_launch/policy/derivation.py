@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
-from keystore.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 
 if TYPE_CHECKING:
-    from keystore.policy_xml import PolicyDocument
+    from keystore.formats.policy_xml import PolicyDocument
 
 # Distributions whose rcl remaps the name of an action as a whole (ros2/rcl pull request 1170).
 _REMAPS_ACTION_NAMES = frozenset({"kilted", "lyrical", "rolling"})
@@ -162,7 +162,7 @@ def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[str]:
     large = [enclave for enclave in enclaves if sum(len(p.rules) for p in enclave.profiles) > _MANY_RULES]
     if not large:
         return []
-    from keystore.permissions_size import expected_concern
+    from keystore.formats.permissions_size import expected_concern
 
     concerns = (expected_concern(enclave) for enclave in large)
     return [concern.text for concern in concerns if concern]

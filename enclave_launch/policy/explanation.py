@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 from enclave_launch.policy.derivation import DerivedPolicy
 from enclave_launch.policy.node_permissions import Reason
-from keystore.policy import Qualifier, Rule
+from keystore.formats.policy import Qualifier, Rule
 
 Wanted = Callable[[Rule, Reason], bool]
 

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 
 from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
-from keystore.policy import Operation
+from keystore.formats.policy import Operation
 from nodl.builtin_interfaces import Condition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import MAX_NAME_LENGTH, InvalidNameError, validate_namespace, validate_node_name

@@ -10,11 +10,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from enclave_launch.policy.node_permissions import Reason
-from keystore.permissions import dds_rules
-from keystore.permissions_names import full_name
-from keystore.permissions_patterns import can_meet
-from keystore.policy import EnclavePolicy, Policy, Profile, Qualifier, Rule
-from keystore.policy_xml import PolicyDocument
+from keystore.formats.permissions import dds_rules
+from keystore.formats.permissions_names import full_name
+from keystore.formats.permissions_patterns import can_meet
+from keystore.formats.policy import EnclavePolicy, Policy, Profile, Qualifier, Rule
+from keystore.formats.policy_xml import PolicyDocument
 
 Added = Mapping[tuple[str, str], Mapping[Rule, Reason]]  # (namespace, node) -> rule with its full name ->
 ReasonsByEnclave = Mapping[str, Mapping[Rule, tuple[Reason, ...]]]

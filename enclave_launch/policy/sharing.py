@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from enclave_launch.policy.derivation import DerivedPolicy
-from keystore.policy import Qualifier, Rule
+from keystore.formats.policy import Qualifier, Rule
 
 
 @dataclass(frozen=True, slots=True)

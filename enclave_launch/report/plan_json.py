@@ -9,7 +9,7 @@ from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.process import ParameterValue, RemapRule
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
-from keystore.policy import EnclavePolicy, Qualifier
+from keystore.formats.policy import EnclavePolicy, Qualifier
 
 VERSION = 1
 

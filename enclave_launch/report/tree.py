@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from enclave_launch.plan import LaunchPlan, PlannedProcess
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.plan_json import allowed_names
-from keystore.policy import EnclavePolicy
+from keystore.formats.policy import EnclavePolicy
 
 _LABELS = {
     "publish": "publish",

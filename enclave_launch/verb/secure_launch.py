@@ -173,7 +173,7 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
 
 def _policy_text(plan: LaunchPlan) -> str:
     """Raises ``ManifestError`` when there is no enclave to write: SROS2's schema wants at least one."""
-    from keystore.policy_xml import policy_xml
+    from keystore.formats.policy_xml import policy_xml
 
     if not plan.derived.policy.enclaves:
         nothing = "no enclave with known permissions: there is no policy to print"

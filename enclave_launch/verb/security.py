@@ -10,11 +10,11 @@ from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.options import SecurityOptions
 from enclave_launch.secured import ProvisionedLaunch
 from enclave_launch.security_environment import environment_domains
-from keystore.ca_access import CaAccess, Secret
-from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError
-from keystore.provisioning import ProvisionOptions
-from keystore.validity import later, parse_duration, parse_end, utc_now
+from keystore.formats.domains import Domains
+from keystore.formats.validity import later, parse_duration, parse_end, utc_now
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.steps.provisioning import ProvisionOptions
 
 
 def security_options(options: argparse.Namespace) -> SecurityOptions:
@@ -29,8 +29,8 @@ def security_options(options: argparse.Namespace) -> SecurityOptions:
 def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
     subjects, creation = None, None
     if options.compatible_subjects:
-        from keystore.creation import CreateOptions  # much to import, and rarely needed
-        from keystore.subject import SubjectScheme
+        from keystore.formats.subject import SubjectScheme
+        from keystore.steps.creation import CreateOptions  # much to import, and rarely needed
 
         subjects, creation = SubjectScheme.COMPATIBLE, CreateOptions(subjects=SubjectScheme.COMPATIBLE)
     return ProvisionOptions(
@@ -61,7 +61,7 @@ def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
     within, ends = parse_duration(margin), launch.report.ends
     if ends is not None and later(utc_now(), within) < ends:
         return
-    from keystore.expiry import expires_soon
+    from keystore.steps.expiry import expires_soon
 
     keystore, known = launch.settings.keystore, launch.report.validities
     enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from importlib import import_module
 
 from keystore.errors import KeystoreError
-from keystore.policy import PolicyError
+from keystore.formats.policy import PolicyError
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",

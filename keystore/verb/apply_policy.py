@@ -21,9 +21,9 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.domains import Domains
-    from keystore.enclaves import apply_policy
-    from keystore.policy_xml import read_policy
+    from keystore.formats.domains import Domains
+    from keystore.formats.policy_xml import read_policy
+    from keystore.steps.enclaves import apply_policy
 
     document = read_policy(arguments.policy)
     common.warn(document.warnings)

@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from keystore.errors import InvalidInput
-from keystore.validity import parse_duration, parse_end, utc_now
+from keystore.formats.validity import parse_duration, parse_end, utc_now
 
 if TYPE_CHECKING:
-    from keystore.ca_access import CaAccess
-    from keystore.provisioning import ProvisionOptions, ProvisionReport
+    from keystore.signing.ca_access import CaAccess
+    from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
 
 DEFAULT_LOCK_TIMEOUT = 30.0
 _BAR_WIDTH = 30
@@ -83,7 +83,7 @@ def add_subjects(parser: argparse.ArgumentParser) -> None:
 
 
 def access(arguments: argparse.Namespace) -> CaAccess:
-    from keystore.ca_access import CaAccess, Secret
+    from keystore.signing.ca_access import CaAccess, Secret
 
     given = vars(arguments)
     passphrase = Secret(given["passphrase_file"], given["passphrase_fd"], given["passphrase_env"])
@@ -104,7 +104,7 @@ class Span:
 
 
 def span(arguments: argparse.Namespace) -> Span:
-    from keystore.validity import DEFAULT_BACKDATE
+    from keystore.formats.validity import DEFAULT_BACKDATE
 
     text: str | None = arguments.valid_for
     backdate = parse_duration(arguments.backdate) if arguments.backdate else DEFAULT_BACKDATE
@@ -118,8 +118,8 @@ def span(arguments: argparse.Namespace) -> Span:
 
 def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
     """From the arguments of ``add_signing``, ``add_lock``, ``add_validity`` and ``add_subjects``."""
-    from keystore.provisioning import ProvisionOptions
-    from keystore.subject import SubjectScheme
+    from keystore.formats.subject import SubjectScheme
+    from keystore.steps.provisioning import ProvisionOptions
 
     validity = span(arguments)
     return ProvisionOptions(

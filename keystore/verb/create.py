@@ -39,13 +39,13 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.authority import Curve
-    from keystore.creation import CreateOptions, ImportedCa, create_keystore
-    from keystore.domains import Domains
-    from keystore.governance_yaml import load_governance_yaml
-    from keystore.role import Role
-    from keystore.subject import SubjectScheme
-    from keystore.validity import DEFAULT_LIFETIME, parse_end, utc_now
+    from keystore.formats.domains import Domains
+    from keystore.formats.governance_yaml import load_governance_yaml
+    from keystore.formats.role import Role
+    from keystore.formats.subject import SubjectScheme
+    from keystore.formats.validity import DEFAULT_LIFETIME, parse_end, utc_now
+    from keystore.signing.authority import Curve
+    from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
 
     validity = common.span(arguments)
     now = utc_now()

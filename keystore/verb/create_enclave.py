@@ -21,7 +21,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.enclaves import create_enclaves
+    from keystore.steps.enclaves import create_enclaves
 
     options = common.provision_options(arguments)
     report = create_enclaves(

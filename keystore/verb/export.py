@@ -26,7 +26,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.bundle import PublicFiles, export
+    from keystore.steps.bundle import PublicFiles, export
 
     names = export(
         arguments.keystore, arguments.output, arguments.enclave, public=PublicFiles(arguments.public)

@@ -21,8 +21,8 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.governance_setting import GovernanceOptions, set_governance
-    from keystore.governance_yaml import load_governance_yaml
+    from keystore.formats.governance_yaml import load_governance_yaml
+    from keystore.steps.governance_setting import GovernanceOptions, set_governance
 
     governance = load_governance_yaml(arguments.file)
     options = GovernanceOptions(access=common.access(arguments), lock_timeout=arguments.lock_timeout)

@@ -13,7 +13,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.enclaves import list_enclaves
+    from keystore.steps.enclaves import list_enclaves
 
     names = list_enclaves(arguments.keystore)
     if arguments.format == "json":

@@ -20,7 +20,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.revocation import RemoveOptions, remove
+    from keystore.steps.revocation import RemoveOptions, remove
 
     options = RemoveOptions(
         revoke=not arguments.no_revoke,

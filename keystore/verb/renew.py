@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from keystore.verb import common
 
 if TYPE_CHECKING:
-    from keystore.provisioning import ProvisionOptions, ProvisionReport
+    from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
 
 _ROLES = ("identity", "permissions", "both")
 
@@ -41,8 +41,8 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.creation import CreateOptions
-    from keystore.validity import parse_end, utc_now
+    from keystore.formats.validity import parse_end, utc_now
+    from keystore.steps.creation import CreateOptions
 
     now = utc_now()
     creation = CreateOptions(ca_lifetime=parse_end(arguments.ca_valid_for, now) - now)
@@ -53,8 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
-    from keystore.renewal import RenewOptions, renew
-    from keystore.validity import parse_duration
+    from keystore.formats.validity import parse_duration
+    from keystore.steps.renewal import RenewOptions, renew
 
     wanted = RenewOptions(
         within=parse_duration(arguments.within),
@@ -69,8 +69,8 @@ def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> Provisio
 
 def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
     from keystore.errors import InvalidInput
-    from keystore.role import Role
-    from keystore.rollover import Step, roll_over
+    from keystore.formats.role import Role
+    from keystore.steps.rollover import Step, roll_over
 
     if arguments.enclaves:
         raise InvalidInput("--ca concerns all enclaves; do not name any")

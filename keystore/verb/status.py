@@ -13,7 +13,7 @@ from keystore.verb import common
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from keystore.expiry import Expiry, StatusReport
+    from keystore.steps.expiry import Expiry, StatusReport
 
 SOON, ENDED = 3, 4
 
@@ -28,8 +28,8 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.expiry import status
-    from keystore.validity import parse_duration
+    from keystore.formats.validity import parse_duration
+    from keystore.steps.expiry import status
 
     report = status(arguments.keystore)
     due = report.due(parse_duration(arguments.within))
@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
-    from keystore.validity import iso
+    from keystore.formats.validity import iso
 
     return {
         "version": 1,
@@ -66,7 +66,7 @@ def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
 
 
 def _print(report: StatusReport, shown: tuple[Expiry, ...]) -> None:
-    from keystore.validity import iso
+    from keystore.formats.validity import iso
 
     print(f"{len(report.enclaves)} enclaves in {report.keystore}")
     for one in shown:

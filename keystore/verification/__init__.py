@@ -10,18 +10,18 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from keystore import layout
-from keystore.ca_access import CaAccess
+from keystore.disk import layout
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, StorageError
-from keystore.safe_files import resolve_root
-from keystore.validity import utc_now
+from keystore.formats.validity import utc_now
+from keystore.signing.ca_access import CaAccess
 from keystore.verification import repair
 from keystore.verification.authorities import check_authorities
 from keystore.verification.enclaves import check_enclaves
 from keystore.verification.files import check_files
 from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
-from keystore.view import KeystoreView
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +54,7 @@ def verify(
 
 
 def _findings(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[Finding]:
-    from keystore.revocation import revoked_serials
+    from keystore.steps.revocation import revoked_serials
 
     yield from check_files(view.root)
     try:

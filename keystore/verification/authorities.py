@@ -6,19 +6,21 @@ import os
 from collections.abc import Iterator
 from datetime import datetime
 
-from keystore import der, layout, safe_files, smime
-from keystore.ca_access import CaAccess
-from keystore.certificate import CertificateFacts
-from keystore.creation import check_can_serve
-from keystore.crl_file import crl_validity
+from keystore.disk import layout, safe_files
+from keystore.disk.crl_file import crl_validity
+from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, SigningUnavailable, UnsafeKeystore
-from keystore.governance import parse_governance
-from keystore.public_key import key_kind, signature_is_valid
-from keystore.role import Role
-from keystore.validity import iso
+from keystore.formats import der
+from keystore.formats.certificate import CertificateFacts
+from keystore.formats.governance import parse_governance
+from keystore.formats.role import Role
+from keystore.formats.validity import iso
+from keystore.signing import smime
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.public_key import key_kind, signature_is_valid
+from keystore.steps.creation import check_can_serve
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
-from keystore.view import KeystoreView
 
 CYCLONE_KINDS = ("P-256", "RSA-2048")
 
@@ -129,7 +131,7 @@ def check_governance(view: KeystoreView) -> Iterator[Finding]:
 
 
 def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:
-    from keystore.revocation import load_crl
+    from keystore.steps.revocation import load_crl
 
     try:
         load_crl(view)

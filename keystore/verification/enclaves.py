@@ -6,18 +6,16 @@ import re
 from collections.abc import Iterator
 from datetime import datetime
 
-from keystore import certificate, layout, safe_files, smime
-from keystore.certificate import CertificateFacts
-from keystore.der import DerError
-from keystore.enclave_state import key_matches
+from keystore.disk import layout, safe_files
+from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInput, KeystoreError, SigningUnavailable, UnsafeKeystore
-from keystore.identity import public_half
-from keystore.permissions_read import Grant, parse_permissions
-from keystore.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
-from keystore.public_key import key_kind
-from keystore.role import Role
-from keystore.signer import load_private_key
-from keystore.subject import (
+from keystore.formats import certificate
+from keystore.formats.certificate import CertificateFacts
+from keystore.formats.der import DerError
+from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
+from keystore.formats.role import Role
+from keystore.formats.subject import (
     SubjectScheme,
     borrowable,
     cannot_be_told_apart,
@@ -25,11 +23,15 @@ from keystore.subject import (
     scheme_of,
     subject_name,
 )
-from keystore.validity import LATEST, Validity, iso, parse_moment
+from keystore.formats.validity import LATEST, Validity, iso, parse_moment
+from keystore.signing import smime
+from keystore.signing.identity import public_half
+from keystore.signing.public_key import key_kind
+from keystore.signing.signer import load_private_key
+from keystore.steps.enclave_state import key_matches
 from keystore.verification import repair
 from keystore.verification.authorities import CYCLONE_KINDS, issued_by
 from keystore.verification.finding import Finding, Severity
-from keystore.view import KeystoreView
 
 _WILDCARD = re.compile(r"[*?\[]")
 

@@ -7,10 +7,10 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from keystore import layout, safe_files
-from keystore.enclave_name import check_distinct, validate_enclave_name
+from keystore.disk import layout, safe_files
 from keystore.errors import InvalidEnclaveName, printable
-from keystore.role import Role
+from keystore.formats.enclave_name import check_distinct, validate_enclave_name
+from keystore.formats.role import Role
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from keystore import layout
+from keystore.disk import layout
 
 BACKUP = "restore it from a backup"
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import keystore
-from keystore.domains import Domains
-from keystore.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore.formats.domains import Domains
+from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from tests.dds.sros2_style import Grant
 
 PARAMETER_SERVICES = (

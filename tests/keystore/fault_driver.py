@@ -15,12 +15,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from keystore.creation import CreateOptions, create_keystore
 from keystore.errors import KeystoreError
-from keystore.renewal import RenewOptions, renew
-from keystore.revocation import RemoveOptions, remove
-from keystore.role import Role
-from keystore.rollover import Step, roll_over
+from keystore.formats.role import Role
+from keystore.steps.creation import CreateOptions, create_keystore
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.revocation import RemoveOptions, remove
+from keystore.steps.rollover import Step, roll_over
 from tests.keystore.kit import filled, options
 
 KILLED = 97

@@ -9,9 +9,9 @@ from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from keystore.creation import CreateOptions, create_keystore
-from keystore.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
-from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
+from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore.steps.creation import CreateOptions, create_keystore
+from keystore.steps.provisioning import ProvisionOptions, ProvisionReport, provision
 
 NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
 DAY = timedelta(days=1)

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from keystore import layout
-from keystore.bundle import PublicFiles, export
+from keystore.disk import layout
 from keystore.errors import DamagedKeystore, InvalidInput
-from keystore.revocation import RemoveOptions, remove
+from keystore.steps.bundle import PublicFiles, export
+from keystore.steps.revocation import RemoveOptions, remove
 from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, contents, filled, mode, openssl
 
@@ -130,7 +130,7 @@ def test_a_failed_export_leaves_nothing(root: Path, tmp_path: Path) -> None:
     place.mkdir()
     program = (
         "import resource, signal\n"
-        "from keystore.bundle import export\n"
+        "from keystore.steps.bundle import export\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (600, 600))\n"
         f"export({str(root)!r}, {str(place / 'out')!r}, ['*'])\n"

@@ -11,12 +11,13 @@ from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore import authority, certificate, der
-from keystore.authority import Authority, Curve, IdentityIssuer
 from keystore.errors import InvalidInput, SigningUnavailable
-from keystore.identity import new_identity
-from keystore.role import Role
-from keystore.validity import Validity
+from keystore.formats import certificate, der
+from keystore.formats.role import Role
+from keystore.formats.validity import Validity
+from keystore.signing import authority
+from keystore.signing.authority import Authority, Curve, IdentityIssuer
+from keystore.signing.identity import new_identity
 from tests.keystore.kit import DAY, NOW, openssl
 
 VALIDITY = Validity.starting(NOW, 90 * DAY)

@@ -9,19 +9,19 @@ from pathlib import Path
 
 import pytest
 
-from keystore import authority
-from keystore.authority import Authority, Curve
-from keystore.ca_access import CaAccess, Secret
-from keystore.creation import CreateOptions, ImportedCa, create_keystore
-from keystore.domains import Domains
+from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInput, NotAKeystore, SigningUnavailable
-from keystore.governance import DomainRule, Governance, Protection
-from keystore.provisioning import provision
-from keystore.role import Role
-from keystore.signer import FileSigner
-from keystore.validity import Validity
+from keystore.formats.domains import Domains
+from keystore.formats.governance import DomainRule, Governance, Protection
+from keystore.formats.role import Role
+from keystore.formats.validity import Validity
+from keystore.signing import authority
+from keystore.signing.authority import Authority, Curve
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.signer import FileSigner
+from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
+from keystore.steps.provisioning import provision
 from keystore.verification import verify
-from keystore.view import KeystoreView
 from tests.keystore.kit import DAY, NOW, actions, created, mode, openssl, options, policy, snapshot
 
 SENTENCE = b"correct horse battery staple"

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore import layout
-from keystore.enclave_name import MAX_LENGTH, check_distinct, segments, validate_enclave_name
+from keystore.disk import layout
 from keystore.errors import InvalidEnclaveName
+from keystore.formats.enclave_name import MAX_LENGTH, check_distinct, segments, validate_enclave_name
 
 GOOD = ["/", "/a", "/_", "/a/_b", "/Front/camera_2", "/" + "a" * 244, "/" + "/".join("abcdefghijklmnopqrs")]
 BAD = {

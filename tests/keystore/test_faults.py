@@ -14,11 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from keystore import layout, verification
-from keystore.creation import CreateOptions, create_keystore
-from keystore.expiry import status
+from keystore import verification
+from keystore.disk import layout
+from keystore.disk.view import KeystoreView
+from keystore.steps.creation import CreateOptions, create_keystore
+from keystore.steps.expiry import status
 from keystore.verification import Finding
-from keystore.view import KeystoreView
 from tests.dds import sros2_style
 from tests.keystore.fault_driver import KILLED, NAMES, REPORTED, install_fault, work
 from tests.keystore.kit import contents, filled, snapshot
@@ -116,7 +117,7 @@ def _complete(name: str, root: Path) -> None:
     if name != "remove":
         work(name, root)
         return
-    from keystore.revocation import RemoveOptions, remove
+    from keystore.steps.revocation import RemoveOptions, remove
 
     left = [enclave for enclave in NAMES[:2] if enclave in KeystoreView(root).enclaves()]
     if left:
@@ -155,7 +156,7 @@ def test_a_file_that_cannot_be_written_whole_is_never_seen(tmp_path: Path) -> No
         "import resource, signal, sys\n"
         "from pathlib import Path\n"
         "from tests.keystore.kit import options, policy\n"
-        "from keystore.provisioning import provision\n"
+        "from keystore.steps.provisioning import provision\n"
         "from keystore.errors import StorageError\n"
         "signal.signal(signal.SIGXFSZ, signal.SIG_IGN)\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (900, 900))\n"
@@ -187,7 +188,7 @@ def test_sixteen_at_once_make_one_keystore(tmp_path: Path) -> None:
         "import sys\n"
         "from pathlib import Path\n"
         "from tests.keystore.kit import options, policy\n"
-        "from keystore.provisioning import provision\n"
+        "from keystore.steps.provisioning import provision\n"
         "mine = int(sys.argv[2])\n"
         "names = [f'/shared{n}' for n in range(10)] + [f'/own{mine}']\n"
         "provision(Path(sys.argv[1]), [policy(n) for n in names], options=options(lock_timeout=120))\n"
@@ -213,8 +214,8 @@ def test_a_dead_run_does_not_hold_the_lock(tmp_path: Path) -> None:
 
 
 def test_the_holder_of_the_lock_is_named(tmp_path: Path) -> None:
+    from keystore.disk.lock import exclusive
     from keystore.errors import KeystoreBusy
-    from keystore.lock import exclusive
 
     root = tmp_path / "ks"
     create_keystore(root, CreateOptions(durable=False))

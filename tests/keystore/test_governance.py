@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore.domains import Domains
 from keystore.errors import InvalidInput
-from keystore.governance import (
+from keystore.formats.domains import Domains
+from keystore.formats.governance import (
     DomainRule,
     Governance,
     Protection,
@@ -18,9 +18,9 @@ from keystore.governance import (
     governance_document,
     parse_governance,
 )
-from keystore.governance_setting import GovernanceOptions, set_governance
-from keystore.governance_yaml import parse_governance_yaml
-from keystore.provisioning import provision
+from keystore.formats.governance_yaml import parse_governance_yaml
+from keystore.steps.governance_setting import GovernanceOptions, set_governance
+from keystore.steps.provisioning import provision
 from keystore.verification import verify
 from tests.dds.sros2_style import GOVERNANCE
 from tests.keystore.kit import contents, filled, options, policy, snapshot

@@ -8,19 +8,19 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore.domains import Domains
-from keystore.permissions import dds_rules, permissions_document
-from keystore.permissions_names import dds_topics, full_name
-from keystore.permissions_patterns import can_meet, covers
-from keystore.permissions_read import parse_permissions
-from keystore.permissions_size import (
+from keystore.formats.domains import Domains
+from keystore.formats.permissions import dds_rules, permissions_document
+from keystore.formats.permissions_names import dds_topics, full_name
+from keystore.formats.permissions_patterns import can_meet, covers
+from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.permissions_size import (
     FAST_DDS_LIMIT_BYTES,
     expected_concern,
     signed_size,
     size_concern,
 )
-from keystore.policy import EnclavePolicy, Operation, PolicyError, Profile, Qualifier, Rule
-from keystore.validity import Validity
+from keystore.formats.policy import EnclavePolicy, Operation, PolicyError, Profile, Qualifier, Rule
+from keystore.formats.validity import Validity
 
 START = datetime(2026, 1, 1, tzinfo=timezone.utc)
 VALIDITY = Validity(START, START + timedelta(days=365))

@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from keystore.domains import Domains
-from keystore.permissions import permissions_document
-from keystore.permissions_read import Grant, parse_permissions
-from keystore.policy_xml import read_policy
-from keystore.validity import Validity
+from keystore.formats.domains import Domains
+from keystore.formats.permissions import permissions_document
+from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.policy_xml import read_policy
+from keystore.formats.validity import Validity
 
 GOLDEN = Path(__file__).parent / "golden_permissions"
 CASES = sorted(path.name.removesuffix(".policy.xml") for path in GOLDEN.glob("*.policy.xml"))

@@ -6,12 +6,12 @@ import re
 
 import pytest
 
-from keystore.domains import Domains
+from keystore.disk.governance_file import covers
 from keystore.errors import InvalidInput
-from keystore.governance_file import covers
-from keystore.permissions_names import ros_rules
-from keystore.permissions_read import parse_permissions
-from keystore.policy import Operation, Qualifier
+from keystore.formats.domains import Domains
+from keystore.formats.permissions_names import ros_rules
+from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.policy import Operation, Qualifier
 
 RULE = "<allow_rule><domains>{domains}</domains><publish><topics>{topics}</topics></publish></allow_rule>"
 

@@ -10,15 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from keystore import authority
-from keystore.ca_access import CaAccess, Secret
-from keystore.creation import ImportedCa
 from keystore.errors import InvalidInput, SigningUnavailable
-from keystore.pkcs11_signer import Pkcs11Signer, parse_uri
-from keystore.provisioning import provision
-from keystore.revocation import RemoveOptions, remove
-from keystore.role import Role
-from keystore.validity import Validity, utc_now
+from keystore.formats.role import Role
+from keystore.formats.validity import Validity, utc_now
+from keystore.signing import authority
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.pkcs11_signer import Pkcs11Signer, parse_uri
+from keystore.steps.creation import ImportedCa
+from keystore.steps.provisioning import provision
+from keystore.steps.revocation import RemoveOptions, remove
 from keystore.verification import verify
 from tests.keystore.kit import DAY, created, openssl, options, policy
 

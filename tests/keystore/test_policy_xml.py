@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from keystore.errors import InvalidInput
-from keystore.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
-from keystore.policy_xml import parse_policy, policy_xml, read_policy
-from keystore.safe_xml import check_schema, parse_xml
+from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
+from keystore.formats.policy_xml import parse_policy, policy_xml, read_policy
+from keystore.formats.safe_xml import check_schema, parse_xml
 
 GROUP = '<topics publish="ALLOW"><topic>chatter</topic></topics>'
 

@@ -12,18 +12,18 @@ from pathlib import Path
 
 import pytest
 
-from keystore import layout
-from keystore.domains import Domains
-from keystore.enclaves import apply_policy, create_enclave, list_enclaves
+from keystore.disk import layout
+from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidEnclaveName, InvalidInput, NotAKeystore, UnsafeKeystore
-from keystore.permissions_read import parse_permissions
-from keystore.policy import EnclavePolicy, Policy
-from keystore.provisioning import provision
-from keystore.role import Role
-from keystore.subject import SubjectScheme
-from keystore.trusted_documents import trusted_document
+from keystore.formats.domains import Domains
+from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.policy import EnclavePolicy, Policy
+from keystore.formats.role import Role
+from keystore.formats.subject import SubjectScheme
+from keystore.steps.enclaves import apply_policy, create_enclave, list_enclaves
+from keystore.steps.provisioning import provision
 from keystore.verification import verify
-from keystore.view import KeystoreView
 from tests.keystore.kit import (
     ARTICLE,
     DAY,
@@ -123,8 +123,8 @@ def test_the_warm_path_imports_neither_cryptography_nor_parsers(tmp_path: Path) 
     program = (
         "import sys\n"
         "from tests.keystore.kit import policy\n"
-        "from keystore.expiry import expires_soon\n"
-        "from keystore.provisioning import provision\n"
+        "from keystore.steps.expiry import expires_soon\n"
+        "from keystore.steps.provisioning import provision\n"
         "from datetime import timedelta\n"
         f"report = provision({str(root)!r}, [policy('/a'), policy('/b')])\n"
         f"assert not expires_soon({str(root)!r}, timedelta(days=30))\n"

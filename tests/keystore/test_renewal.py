@@ -6,21 +6,21 @@ from pathlib import Path
 
 import pytest
 
-from keystore import layout
-from keystore.certificate import read_certificates
-from keystore.creation import CreateOptions
-from keystore.enclaves import create_enclave, list_enclaves
+from keystore.disk import layout
+from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystore, InvalidInput
-from keystore.expiry import expires_soon, status
-from keystore.permissions_read import parse_permissions
-from keystore.provisioning import provision
-from keystore.renewal import RenewOptions, renew
-from keystore.revocation import RemoveOptions, remove
-from keystore.role import Role
-from keystore.rollover import Step, roll_over
-from keystore.trusted_documents import trusted_document
+from keystore.formats.certificate import read_certificates
+from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.role import Role
+from keystore.steps.creation import CreateOptions
+from keystore.steps.enclaves import create_enclave, list_enclaves
+from keystore.steps.expiry import expires_soon, status
+from keystore.steps.provisioning import provision
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.revocation import RemoveOptions, remove
+from keystore.steps.rollover import Step, roll_over
 from keystore.verification import Severity, verify
-from keystore.view import KeystoreView
 from tests.dds import sros2_style
 from tests.keystore.kit import (
     ARTICLE,

@@ -8,17 +8,17 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
-from keystore import layout
-from keystore.bundle import export
-from keystore.ca_access import CaAccess
-from keystore.certificate import read_pem
-from keystore.enclaves import list_enclaves
+from keystore.disk import layout
+from keystore.disk.store import opened
 from keystore.errors import DamagedKeystore, InvalidInput
-from keystore.expiry import status
-from keystore.provisioning import provision
-from keystore.renewal import RenewOptions, renew
-from keystore.revocation import RemoveOptions, remove, revoke_replaced
-from keystore.store import opened
+from keystore.formats.certificate import read_pem
+from keystore.signing.ca_access import CaAccess
+from keystore.steps.bundle import export
+from keystore.steps.enclaves import list_enclaves
+from keystore.steps.expiry import status
+from keystore.steps.provisioning import provision
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.revocation import RemoveOptions, remove, revoke_replaced
 from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot
 

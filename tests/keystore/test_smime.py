@@ -12,13 +12,14 @@ from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore import authority, certificate, smime
-from keystore.authority import Authority, Curve, IdentityIssuer
 from keystore.errors import DamagedKeystore, InvalidInput
-from keystore.identity import new_identity
-from keystore.role import Role
-from keystore.signer import FileSigner, load_private_key
-from keystore.validity import Validity
+from keystore.formats import certificate
+from keystore.formats.role import Role
+from keystore.formats.validity import Validity
+from keystore.signing import authority, smime
+from keystore.signing.authority import Authority, Curve, IdentityIssuer
+from keystore.signing.identity import new_identity
+from keystore.signing.signer import FileSigner, load_private_key
 from tests.keystore.kit import DAY, NOW, openssl
 
 VALIDITY = Validity.starting(NOW, 90 * DAY)

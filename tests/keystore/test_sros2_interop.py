@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from keystore import layout
-from keystore.enclaves import create_enclave, list_enclaves
-from keystore.permissions_read import parse_permissions
-from keystore.provisioning import provision
-from keystore.renewal import RenewOptions, renew
-from keystore.subject import SubjectScheme
-from keystore.trusted_documents import trusted_document
+from keystore.disk import layout
+from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.view import KeystoreView
+from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.subject import SubjectScheme
+from keystore.steps.enclaves import create_enclave, list_enclaves
+from keystore.steps.provisioning import provision
+from keystore.steps.renewal import RenewOptions, renew
 from keystore.verification import Severity, verify
-from keystore.view import KeystoreView
 from tests.keystore import sros2_peer
 from tests.keystore.kit import created, filled, options, policy
 

@@ -12,14 +12,14 @@ from pathlib import Path
 
 import pytest
 
-from keystore import provisioning_check
-from keystore.domains import Domains
 from keystore.errors import InvalidInput, KeystoreError, UnsafeKeystore
-from keystore.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
-from keystore.provisioning import ProvisionOptions, ProvisionReport, provision
-from keystore.revocation import RemoveOptions, remove
-from keystore.standing import Question, recall
-from keystore.validity import utc_now
+from keystore.formats.domains import Domains
+from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore.formats.validity import utc_now
+from keystore.steps import provisioning_check
+from keystore.steps.provisioning import ProvisionOptions, ProvisionReport, provision
+from keystore.steps.revocation import RemoveOptions, remove
+from keystore.steps.standing import Question, recall
 from tests.keystore.kit import DAY, NOW, options, policy, snapshot
 
 A, B = policy("/robot/a", "/chatter", "/orders"), policy("/b")

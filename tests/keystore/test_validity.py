@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 import pytest
 
 from keystore.errors import InvalidInput
-from keystore.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_moment
+from keystore.formats.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_moment
 from tests.keystore.kit import DAY, NOW
 
 

@@ -9,16 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from keystore import smime
-from keystore.ca_access import CaAccess
-from keystore.domains import Domains
+from keystore.disk.view import KeystoreView
 from keystore.errors import NotAKeystore
-from keystore.permissions import permissions_document
-from keystore.provisioning import provision
-from keystore.role import Role
-from keystore.validity import Validity
+from keystore.formats.domains import Domains
+from keystore.formats.permissions import permissions_document
+from keystore.formats.role import Role
+from keystore.formats.validity import Validity
+from keystore.signing import smime
+from keystore.signing.ca_access import CaAccess
+from keystore.steps.provisioning import provision
 from keystore.verification import Severity, verify
-from keystore.view import KeystoreView
 from tests.dds import sros2_style
 from tests.keystore.kit import DAY, NOW, filled, options, policy
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from enclave_launch.policy import RunningNode, derive_policy
-from keystore.policy_xml import policy_xml
+from keystore.formats.policy_xml import policy_xml
 
 GOLDEN = Path(__file__).parent.parent / "keystore" / "golden_permissions" / "derived.policy.xml"
 

@@ -17,7 +17,7 @@ from enclave_launch.process import (
     ResolvedProcess,
 )
 from enclave_launch.source_location import SourceLocation
-from keystore.policy_xml import policy_xml
+from keystore.formats.policy_xml import policy_xml
 from nodl.lookup import find_node_interfaces
 
 MANIFEST = """\

@@ -11,10 +11,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
-from keystore.domains import Domains
-from keystore.permissions import permissions_document
-from keystore.policy_xml import parse_policy, policy_xml
-from keystore.validity import Validity
+from keystore.formats.domains import Domains
+from keystore.formats.permissions import permissions_document
+from keystore.formats.policy_xml import parse_policy, policy_xml
+from keystore.formats.validity import Validity
 from nodl.builtin_interfaces import DISTROS, TABLE, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap

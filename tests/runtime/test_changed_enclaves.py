@@ -27,9 +27,9 @@ from enclave_launch import (
 )
 from enclave_launch.process import RemapRule, ResolvedProcess
 from enclave_launch.secured import PlanProvider
-from keystore.ca_access import CaAccess, Secret
-from keystore.provisioning import ProvisionOptions
-from keystore.provisioning_check import what_is_wrong
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.steps.provisioning import ProvisionOptions
+from keystore.steps.provisioning_check import what_is_wrong
 
 DEMO = Path(__file__).parents[2] / "fixtures/demo_ws"
 TALKER = '<node pkg="demo_nodes" exec="talker" name="talker"/>'
@@ -184,7 +184,7 @@ def test_the_cheap_look_is_repeated_only_for_files_that_were_touched(
         looks.append("looked")
         return what_is_wrong(*words, **options)
 
-    monkeypatch.setattr("keystore.provisioning_check.what_is_wrong", counted)
+    monkeypatch.setattr("keystore.steps.provisioning_check.what_is_wrong", counted)
     respawn(provider)
     respawn(provider)
     assert len(looks) == 1

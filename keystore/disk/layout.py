@@ -1,0 +1,99 @@
+"""Which file lives where, as SROS2 lays it out (ros2/sros2 keystore package, ros2/rcl security.c). Pure.
+
+    <keystore>/public/{identity,permissions}_ca.cert.pem      trust anchors; SROS2: links to ca.cert.pem
+               private/{identity,permissions}_ca.key.pem      CA keys, mode 0600 in a 0700 directory
+               enclaves/governance.{xml,p7s}                  one for all
+               enclaves/<path>/...                            one directory per enclave; / is enclaves/ itself
+
+All paths here are POSIX text relative to the keystore, so that they read the same in reports and tests.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+
+from keystore.formats.enclave_name import segments, validate_enclave_name
+from keystore.formats.role import Role
+
+PUBLIC, PRIVATE, ENCLAVES = "public", "private", "enclaves"
+STAGING = ".staging"
+LOCK = ".lock"
+SETTINGS = "secure-keystore.json"
+GOVERNANCE_XML = "enclaves/governance.xml"
+GOVERNANCE = "enclaves/governance.p7s"
+CRL = "public/crl.pem"
+SHARED_CA_CERT, SHARED_CA_KEY = "public/ca.cert.pem", "private/ca.key.pem"
+RETIRED = "private/retired"
+INCOMING = "private/incoming"
+NEXT = "private/next"
+SUPERSEDED = "private/superseded.json"
+
+KEY, CERT = "key.pem", "cert.pem"
+PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"
+ENCLAVE_GOVERNANCE = "governance.p7s"
+ENCLAVE_CRL = "crl.pem"
+ENCLAVE_FILES = frozenset({
+    KEY, CERT, PERMISSIONS_XML, PERMISSIONS, ENCLAVE_GOVERNANCE, ENCLAVE_CRL,
+    "identity_ca.cert.pem", "permissions_ca.cert.pem",
+})  # fmt: skip
+RUNTIME_FILES = (
+    "identity_ca.cert.pem", CERT, KEY, "permissions_ca.cert.pem", ENCLAVE_GOVERNANCE, PERMISSIONS,
+)  # fmt: skip
+"""What a process needs to start (rmw_dds_common security.cpp): all six, or none."""
+
+
+def ca_cert(role: Role) -> str:
+    return f"{PUBLIC}/{role.value}.cert.pem"
+
+
+def ca_key(role: Role) -> str:
+    return f"{PRIVATE}/{role.value}.key.pem"
+
+
+def ca_key_uri(role: Role) -> str:
+    """Instead of a key file: the ``pkcs11:`` URI of a key in a token, named as rcl names such files."""
+    return f"{PRIVATE}/{role.value}.key.p11"
+
+
+def enclave_directory(enclave: str) -> str:
+    """``enclaves/a/b``; raises InvalidEnclaveName, so that no path is ever built from an unchecked name."""
+    return "/".join((ENCLAVES, *segments(validate_enclave_name(enclave))))
+
+
+def enclave_links(enclave: str, *, crl: bool = False) -> dict[str, str]:
+    """Link name -> relative target of an enclave directory; the root enclave shares ``governance.p7s``.
+
+    ``crl``: with the link that each enclave has once the keystore revokes something.
+    """
+    links = dict(_links(len(segments(enclave))))
+    if not crl:
+        del links[ENCLAVE_CRL]
+    return links
+
+
+@cache  # a keystore has enclaves by the hundred at a few depths
+def _links(depth: int) -> Mapping[str, str]:
+    links = {f"{role.value}.cert.pem": "../" * (depth + 1) + ca_cert(role) for role in Role}
+    if depth:
+        links[ENCLAVE_GOVERNANCE] = "../" * depth + "governance.p7s"
+    links[ENCLAVE_CRL] = "../" * (depth + 1) + CRL
+    return links
+
+
+def crl_link(enclave: str) -> str:
+    return _links(len(segments(enclave)))[ENCLAVE_CRL]
+
+
+def link_source(name: str) -> str:
+    """The keystore file that an enclave's link called ``name`` stands for."""
+    if name == ENCLAVE_CRL:
+        return CRL
+    return GOVERNANCE if name == ENCLAVE_GOVERNANCE else f"{PUBLIC}/{name}"
+
+
+CA_LINKS = {
+    **{ca_cert(role): "ca.cert.pem" for role in Role},
+    **{ca_key(role): "ca.key.pem" for role in Role},
+}
+"""The links SROS2 makes for its single CA: the only ones allowed in ``public/`` and ``private/``."""

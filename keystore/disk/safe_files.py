@@ -1,0 +1,197 @@
+"""Reading a keystore without being led out of it, and refusing one that others could have changed.
+
+Used by everything that reads; ``keystore.disk.store`` is the only module that writes. Errors say what is wrong and
+which command repairs it.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import shlex
+import stat
+from pathlib import Path
+
+from keystore.disk import layout
+from keystore.errors import DamagedKeystore, NotAKeystore, StorageError, UnsafeKeystore, printable
+
+_MAX_FILE = 8_000_000
+_WRITABLE_BY_OTHERS = 0o022
+
+
+def resolve_root(keystore: Path | str) -> Path:
+    """Raises NotAKeystore for what can be no path."""
+    try:
+        return Path(os.path.realpath(keystore))
+    except ValueError:
+        raise NotAKeystore(f"{printable(keystore)} is no path") from None
+
+
+def read(root: Path, relative: str) -> bytes:
+    """The content of a keystore file; raises DamagedKeystore when it is missing, UnsafeKeystore for a strange
+    link, StorageError otherwise."""
+    try:
+        return _read(root, relative)
+    except FileNotFoundError:
+        raise DamagedKeystore(f"{printable(root / relative)} is missing") from None
+    except OSError as error:
+        raise StorageError.of(error, "reading the keystore") from None
+
+
+def read_if_there(root: Path, relative: str) -> bytes | None:
+    """As ``read``, None when there is no such file (a dangling link counts as none)."""
+    try:
+        return _read(root, relative)
+    except (FileNotFoundError, NotADirectoryError):
+        return None
+    except OSError as error:
+        raise StorageError.of(error, "reading the keystore") from None
+
+
+def read_private(root: Path, relative: str) -> bytes:
+    """As ``read``, for key material: also refuses foreign owners and files that others can write."""
+    refuse_unsafe_private(root, relative)
+    return read(root, relative)
+
+
+def _read(root: Path, relative: str) -> bytes:
+    """Text paths, not ``Path``: this runs a few hundred times before a launch."""
+    descriptor = _open(root, relative)
+    try:
+        info = os.fstat(descriptor)
+        if not stat.S_ISREG(info.st_mode):
+            raise UnsafeKeystore(f"{printable(root / relative)} is not a regular file; remove it")
+        if info.st_size > _MAX_FILE:
+            raise DamagedKeystore(f"{printable(root / relative)} is larger than {_MAX_FILE} bytes")
+        content = os.read(descriptor, info.st_size + 1)
+        if len(content) != info.st_size:
+            raise DamagedKeystore(f"{printable(root / relative)} changed while it was read; try again")
+        return content
+    finally:
+        os.close(descriptor)
+
+
+def _open(root: Path, relative: str) -> int:
+    """Links are followed only where SROS2 has them; O_NONBLOCK keeps a planted FIFO from hanging us."""
+    flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
+    try:
+        return os.open(f"{root}/{relative}", flags | os.O_NOFOLLOW)
+    except OSError as error:
+        if error.errno != errno.ELOOP:
+            raise
+    target = link_target(root, relative) or ""
+    if target not in allowed_targets(relative):
+        raise strange_link(root, relative, target)
+    return os.open(f"{root}/{relative}", flags)
+
+
+def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystore:
+    path = root / relative
+    return UnsafeKeystore(
+        f"{printable(path)} is a link to {printable(target)}, which no keystore has there; "
+        f"look at it and remove it: rm {shlex.quote(str(path))}"
+    )
+
+
+def link_target(root: Path, relative: str) -> str | None:
+    """Where the file points if it is a link, else None (also when it does not exist)."""
+    try:
+        return os.readlink(f"{root}/{relative}")
+    except OSError:
+        return None
+
+
+def allowed_targets(relative: str) -> tuple[str, ...]:
+    """Every link target that may stand at this place of a keystore."""
+    if relative in layout.CA_LINKS:
+        return (layout.CA_LINKS[relative],)
+    directory, _, name = relative.rpartition("/")
+    if not relative.startswith(layout.ENCLAVES + "/") or name not in layout.ENCLAVE_FILES:
+        return ()
+    enclave = "/" + directory.removeprefix(layout.ENCLAVES).lstrip("/")
+    target = layout.enclave_links(enclave, crl=True).get(name)
+    return (target,) if target else ()
+
+
+def refuse_unsafe_private(root: Path, relative: str) -> None:
+    """Key files and the directory they are in must be ours, and writable by nobody else."""
+    path = root / relative
+    try:
+        found = (path.parent, os.lstat(path.parent)), (path, os.stat(path))
+    except OSError:
+        return  # missing: the read that follows says so
+    for place, info in found:
+        if problem := private_problem(place, info):
+            raise UnsafeKeystore(problem)
+
+
+def refuse_unsafe_private_directories(root: Path) -> None:
+    """What waits in ``private/`` is installed as a CA, what is retired there is trusted: nobody else may add to it."""
+    for relative in (layout.PRIVATE, layout.INCOMING, layout.NEXT, layout.RETIRED):
+        path = root / relative
+        if not os.path.lexists(path):
+            continue
+        refuse_unsafe_directory(path)
+        info = os.lstat(path)
+        if info.st_mode & _WRITABLE_BY_OTHERS:
+            raise UnsafeKeystore(
+                f"{printable(path)} can be written by others (mode {mode_text(info)}); for the whole keystore: "
+                f"{close_to_others(root)}"
+            )
+
+
+def private_problem(path: Path | str, info: os.stat_result) -> str | None:
+    """What is wrong with the owner or mode of a private file or directory, with the repairing command."""
+    if info.st_uid == os.geteuid() and not info.st_mode & _WRITABLE_BY_OTHERS:
+        return None
+    if info.st_uid != os.geteuid():
+        return (
+            f"{printable(path)} belongs to user {info.st_uid}, not to you ({os.geteuid()}): run as that "
+            f"user, or take it over: {private_repair(path, info)}"
+        )
+    return (
+        f"{printable(path)} can be written by others (mode {mode_text(info)}): {private_repair(path, info)}"
+    )
+
+
+def close_to_others(root: Path) -> str:
+    """One command for all that SROS2 leaves under the usual umask 002."""
+    return f"chmod -R go-w {shlex.quote(str(root))}"
+
+
+def private_repair(path: Path | str, info: os.stat_result) -> str:
+    quoted = shlex.quote(str(path))
+    if info.st_uid != os.geteuid():
+        return f"chown -R {os.geteuid()} {quoted}"
+    return f"chmod go-rwx {quoted}"
+
+
+def refuse_unsafe_directory(path: Path) -> None:
+    """A directory we are about to write in: a real one, ours, and not open to everybody."""
+    try:
+        info = os.lstat(path)
+    except OSError as error:
+        raise StorageError.of(error, "looking at the directory") from None
+    quoted = shlex.quote(str(path))
+    if stat.S_ISLNK(info.st_mode) or not stat.S_ISDIR(info.st_mode):
+        raise UnsafeKeystore(f"{printable(path)} is not a directory (a link?); remove it: rm {quoted}")
+    if info.st_uid != os.geteuid():
+        raise UnsafeKeystore(private_problem(path, info) or "")
+    if info.st_mode & stat.S_IWOTH:
+        raise UnsafeKeystore(
+            f"everybody can write in {printable(path)} (mode {mode_text(info)}): chmod o-w {quoted}"
+        )
+
+
+def refuse_unsafe_parent(root: Path) -> None:
+    """Whoever can rename the keystore can replace it: its parent must not be open without the sticky bit."""
+    info = os.stat(root.parent)
+    if info.st_mode & stat.S_IWOTH and not info.st_mode & stat.S_ISVTX:
+        raise UnsafeKeystore(
+            f"everybody can rename what is in {printable(root.parent)}: "
+            f"chmod o-w {shlex.quote(str(root.parent))}, or put the keystore elsewhere"
+        )
+
+
+def mode_text(info: os.stat_result) -> str:
+    return f"{stat.S_IMODE(info.st_mode):04o}"

@@ -1,0 +1,57 @@
+"""What a keystore remembers about itself: ``secure-keystore.json``, beside what SROS2 knows. Pure.
+
+Absent in keystores made by SROS2; then the defaults hold. It also marks a directory as a keystore in the
+making, so that an interrupted ``create`` can be completed while a foreign directory is left alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import timedelta
+from typing import Any
+
+from keystore.errors import DamagedKeystore
+from keystore.formats.subject import SubjectScheme
+from keystore.formats.validity import DEFAULT_LIFETIME
+from keystore.signing.authority import Curve
+
+_VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """``lifetime`` is for new certificates of enclaves, ``curve`` for new keys of CAs and enclaves."""
+
+    subjects: SubjectScheme = SubjectScheme.EXACT
+    curve: Curve = Curve.P256
+    lifetime: timedelta = DEFAULT_LIFETIME
+
+    def to_json(self) -> bytes:
+        import json
+
+        content = {
+            "version": _VERSION,
+            "subjects": self.subjects.value,
+            "curve": self.curve.value,
+            "lifetime_seconds": int(self.lifetime.total_seconds()),
+        }
+        return json.dumps(content, indent=2, sort_keys=True).encode() + b"\n"
+
+    @classmethod
+    def from_json(cls, text: bytes, place: str) -> Settings:
+        """Raises DamagedKeystore for anything but what ``to_json`` writes."""
+        import json
+
+        try:
+            content: Any = json.loads(text)
+            if content["version"] != _VERSION:
+                raise DamagedKeystore(f"{place} was written by a newer version; update secure-keystore")
+            return cls(
+                SubjectScheme(content["subjects"]),
+                Curve(content["curve"]),
+                timedelta(seconds=int(content["lifetime_seconds"])),
+            )
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+            raise DamagedKeystore(
+                f"{place} is not the settings file of a keystore; restore or remove it"
+            ) from None

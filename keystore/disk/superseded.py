@@ -1,0 +1,72 @@
+"""Certificates that were replaced but have not ended: whoever copied one, with its key, can still use it.
+
+``private/superseded.json`` remembers their serial numbers, so that removing an enclave revokes all it ever had.
+Written in the batch that replaces them, before them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any
+
+from keystore.disk import layout, safe_files
+from keystore.disk.store import PRIVATE_MODE, Batch
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystore, printable
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.validity import iso, parse_moment
+
+_VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Superseded:
+    enclave: str
+    serial: int
+    not_after: datetime
+
+
+def superseded(view: KeystoreView) -> tuple[Superseded, ...]:
+    """All that is remembered; raises DamagedKeystore when the file is not ours."""
+    if safe_files.read_if_there(view.root, layout.SUPERSEDED) is None:
+        return ()
+    text = safe_files.read_private(view.root, layout.SUPERSEDED)
+    try:
+        content: Any = json.loads(text)
+        if content["version"] != _VERSION:
+            raise KeyError("version")
+        return tuple(_entry(entry) for entry in content["certificates"])
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise DamagedKeystore(
+            f"{printable(view.root / layout.SUPERSEDED)} is no list of replaced certificates; restore it from a backup"
+        ) from None
+
+
+def _entry(entry: dict[str, str]) -> Superseded:
+    """InvalidInput and InvalidEnclaveName are ValueErrors."""
+    return Superseded(
+        validate_enclave_name(entry["enclave"]), int(entry["serial"], 16), parse_moment(entry["not_after"])
+    )
+
+
+def remember(batch: Batch, view: KeystoreView, replaced: Iterable[Superseded], now: datetime) -> None:
+    """Add these to the file, first of the batch; those that have ended are forgotten."""
+    fresh = tuple(replaced)
+    if not fresh:
+        return
+    kept = {one for one in (*superseded(view), *fresh) if one.not_after > now}
+    ordered = sorted(kept, key=lambda one: (one.enclave, one.serial))
+    entries = [
+        {"enclave": one.enclave, "serial": f"{one.serial:040x}", "not_after": iso(one.not_after)}
+        for one in ordered
+    ]
+    text = json.dumps({"version": _VERSION, "certificates": entries}, indent=1) + "\n"
+    batch.file(layout.SUPERSEDED, text.encode(), PRIVATE_MODE)
+
+
+def serials_of(view: KeystoreView, enclaves: Iterable[str]) -> set[int]:
+    names = set(enclaves)
+    return {one.serial for one in superseded(view) if one.enclave in names}

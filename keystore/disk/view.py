@@ -1,0 +1,148 @@
+"""A keystore as it stands on disk, read only and without ``cryptography``: what the other modules ask.
+
+A view caches what does not change while the lock is held (CA certificates, settings); make a new one after
+writing. It proves nothing about signatures, see ``keystore.verify`` for that.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from keystore.disk import layout, safe_files
+from keystore.errors import (
+    DamagedKeystore,
+    InvalidEnclaveName,
+    NotAKeystore,
+    SigningUnavailable,
+    StorageError,
+    printable,
+)
+from keystore.formats.certificate import CertificateFacts, read_certificates
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.role import Role
+
+if TYPE_CHECKING:
+    from keystore.disk.settings import Settings
+    from keystore.signing.authority import Authority
+    from keystore.signing.ca_access import CaAccess
+
+_OWN_ENTRIES = frozenset({
+    layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS,
+})  # fmt: skip
+
+
+class KeystoreView:
+    """``root`` should be resolved by the caller: links above the keystore are the user's business."""
+
+    def __init__(self, root: Path):
+        self.root = root
+
+    @property
+    def is_complete(self) -> bool:
+        """Trust anchors and governance are there; a deployed copy without ``private/`` is complete too."""
+        needed = (*(layout.ca_cert(role) for role in Role), layout.GOVERNANCE)
+        return all(os.path.isfile(self.root / name) for name in needed)
+
+    @property
+    def can_be_completed(self) -> bool:
+        """The directory is empty, or holds nothing but the beginnings of a keystore."""
+        try:
+            return set(os.listdir(self.root)) <= _OWN_ENTRIES
+        except (FileNotFoundError, NotADirectoryError):
+            return not os.path.lexists(self.root)
+        except OSError as error:
+            raise StorageError.of(error, "looking for a keystore at") from None
+
+    def require_complete(self) -> None:
+        if not self.root.is_dir():
+            raise NotAKeystore(
+                f"there is no keystore at {printable(self.root)}; to make one: "
+                f"secure-keystore create {shlex.quote(str(self.root))}"
+            )
+        if not self.is_complete:
+            raise NotAKeystore(
+                f"{printable(self.root)} is not a complete keystore (public/, enclaves/governance.p7s); "
+                f"to make or complete it: secure-keystore create {shlex.quote(str(self.root))}"
+            )
+
+    @cached_property
+    def settings(self) -> Settings:
+        from keystore.disk.settings import Settings
+
+        text = safe_files.read_if_there(self.root, layout.SETTINGS)
+        return Settings.from_json(text, str(self.root / layout.SETTINGS)) if text is not None else Settings()
+
+    def ca_bundle(self, role: Role) -> list[CertificateFacts]:
+        """All certificates of a trust anchor file, the one in use first."""
+        return self._bundles[role]
+
+    def ca(self, role: Role) -> CertificateFacts:
+        return self._bundles[role][0]
+
+    @cached_property
+    def _bundles(self) -> dict[Role, list[CertificateFacts]]:
+        bundles = {}
+        for role in Role:
+            name = layout.ca_cert(role)
+            bundles[role] = read_certificates(safe_files.read(self.root, name), printable(self.root / name))
+            if not bundles[role]:
+                raise DamagedKeystore(f"{printable(self.root / name)} holds no certificate")
+        return bundles
+
+    @property
+    def shares_one_ca(self) -> bool:
+        return self.ca(Role.IDENTITY).public_key == self.ca(Role.PERMISSIONS).public_key
+
+    def key_file(self, role: Role) -> str | None:
+        """The file with the CA's key or token URI, None on a machine that does not hold it."""
+        candidates = (layout.ca_key_uri(role), layout.ca_key(role))
+        return next((name for name in candidates if os.path.lexists(self.root / name)), None)
+
+    def authority(self, role: Role, access: CaAccess) -> Authority:
+        """The CA ready to sign; raises SigningUnavailable where its key is not, or does not open."""
+        from keystore.signing.authority import authority_of
+        from keystore.signing.signer import open_signer
+
+        name = self.key_file(role)
+        if name is None:
+            raise SigningUnavailable(
+                f"{printable(self.root / layout.ca_key(role))} is not here, so nothing can be signed; "
+                "run this where the CA key is"
+            )
+        reference = safe_files.read_private(self.root, name)
+        signer = open_signer(reference, printable(self.root / name), access)
+        cert = safe_files.read(self.root, layout.ca_cert(role))
+        return authority_of(cert, signer, printable(self.root / layout.ca_cert(role)))
+
+    @cached_property
+    def has_crl(self) -> bool:
+        return os.path.lexists(self.root / layout.CRL)
+
+    def enclaves(self) -> list[str]:
+        """Names of all enclaves (directories with a key or a certificate), sorted; links are not followed."""
+        found: list[str] = []
+        try:
+            _collect(self.root / layout.ENCLAVES, "", found)
+        except OSError as error:
+            raise StorageError.of(error, "reading the keystore") from None
+        return sorted(found)
+
+
+def _collect(directory: Path | str, prefix: str, found: list[str]) -> None:
+    with os.scandir(directory) as entries:
+        children = list(entries)
+    names = {entry.name for entry in children}
+    if names & {layout.KEY, layout.CERT}:
+        found.append(prefix or "/")
+    for entry in children:
+        if not entry.is_dir(follow_symlinks=False):
+            continue
+        try:
+            validate_enclave_name(f"{prefix}/{entry.name}")
+        except InvalidEnclaveName:
+            continue  # a stray, which verify reports
+        _collect(entry.path, f"{prefix}/{entry.name}", found)

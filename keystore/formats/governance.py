@@ -1,0 +1,213 @@
+"""The governance of a keystore: what is protected how, one document for all enclaves. Pure.
+
+    Governance (plain values) <-> governance.xml        YAML is ``keystore.formats.governance_yaml``
+
+It must be identical everywhere in a domain: participants whose protection kinds differ do not talk,
+without an error. Defaults are SROS2's. Element order is the schema's, which Fast DDS insists on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from keystore.errors import InvalidInput, printable
+from keystore.formats.domains import Domains
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+
+class Protection(str, Enum):
+    """ProtectionKind of DDS-Security 1.1 section 9.4.1.2.3."""
+
+    NONE = "NONE"
+    SIGN = "SIGN"
+    ENCRYPT = "ENCRYPT"
+    SIGN_WITH_ORIGIN_AUTHENTICATION = "SIGN_WITH_ORIGIN_AUTHENTICATION"
+    ENCRYPT_WITH_ORIGIN_AUTHENTICATION = "ENCRYPT_WITH_ORIGIN_AUTHENTICATION"
+
+
+_DATA_KINDS = (Protection.NONE, Protection.SIGN, Protection.ENCRYPT)
+
+
+@dataclass(frozen=True, slots=True)
+class TopicRule:
+    """``topic_expression`` is an fnmatch pattern over DDS names (``rt/chatter``); the first match wins."""
+
+    topic_expression: str = "*"
+    enable_discovery_protection: bool = True
+    enable_liveliness_protection: bool = True
+    enable_read_access_control: bool = True
+    enable_write_access_control: bool = True
+    metadata_protection_kind: Protection = Protection.ENCRYPT
+    data_protection_kind: Protection = Protection.ENCRYPT
+
+    def __post_init__(self) -> None:
+        expression = self.topic_expression
+        if not expression or not expression.isascii() or not expression.isprintable() or " " in expression:
+            raise InvalidInput(f"governance: topic_expression {printable(expression)} is empty or has blanks")
+        if self.data_protection_kind not in _DATA_KINDS:
+            raise InvalidInput("governance: data_protection_kind is NONE, SIGN or ENCRYPT")
+
+
+@dataclass(frozen=True, slots=True)
+class DomainRule:
+    """Rules for a set of domains. The last topic rule always matches every topic: what no rule matches is
+    refused by both implementations."""
+
+    domains: Domains = field(default_factory=lambda: Domains.single(0))
+    allow_unauthenticated_participants: bool = False
+    enable_join_access_control: bool = True
+    discovery_protection_kind: Protection = Protection.ENCRYPT
+    liveliness_protection_kind: Protection = Protection.ENCRYPT
+    rtps_protection_kind: Protection = Protection.SIGN
+    topic_rules: tuple[TopicRule, ...] = (TopicRule(),)
+
+    def __post_init__(self) -> None:
+        if not self.topic_rules or self.topic_rules[-1].topic_expression != "*":
+            object.__setattr__(self, "topic_rules", (*self.topic_rules, TopicRule()))
+        if self.allow_unauthenticated_participants and self.rtps_protection_kind is not Protection.NONE:
+            raise InvalidInput(
+                "governance: allow_unauthenticated_participants needs rtps_protection_kind NONE; "
+                "Fast DDS refuses the document otherwise, and no such participant could be heard"
+            )
+
+
+@dataclass(frozen=True, slots=True)
+class Governance:
+    domain_rules: tuple[DomainRule, ...] = (DomainRule(),)
+
+    def __post_init__(self) -> None:
+        if not self.domain_rules:
+            raise InvalidInput("governance: at least one domain rule is needed")
+
+    @classmethod
+    def for_domains(cls, domains: Domains) -> Governance:
+        """SROS2's default for these domains."""
+        return cls((DomainRule(domains=domains),))
+
+    def domains(self) -> Domains:
+        """All domains with a rule; in any other Cyclone DDS refuses the participant."""
+        return Domains(tuple(part for rule in self.domain_rules for part in rule.domains.ranges))
+
+    def extended_to(self, domains: Domains) -> Governance:
+        """The same rules for more domains; only unambiguous with a single rule, else raises InvalidInput."""
+        if len(self.domain_rules) != 1:
+            raise InvalidInput(
+                f"the governance has no rule for domains {domains} and several to choose from; "
+                "add the domains to its YAML file and run: secure-keystore governance KEYSTORE FILE.yaml"
+            )
+        rule = self.domain_rules[0]
+        both = Domains((*rule.domains.ranges, *domains.ranges))
+        return Governance((replace(rule, domains=both),))
+
+
+_HEAD = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation='
+    '"http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_governance.xsd">\n<domain_access_rules>\n'
+)
+
+
+def governance_document(governance: Governance) -> bytes:
+    """Canonical XML (UTF-8, LF, no blanks in values), the form both implementations read alike."""
+    rules = "".join(_domain_rule(rule) for rule in governance.domain_rules)
+    return f"{_HEAD}{rules}</domain_access_rules>\n</dds>\n".encode()
+
+
+def _domain_rule(rule: DomainRule) -> str:
+    settings = "".join(_leaf(name, getattr(rule, name)) for name in _DOMAIN_LEAVES)
+    topics = "".join(
+        "<topic_rule>\n"
+        + "".join(_leaf(name, getattr(topic, name)) for name in _TOPIC_LEAVES)
+        + "</topic_rule>\n"
+        for topic in rule.topic_rules
+    )
+    return (
+        f"<domain_rule>\n{rule.domains.xml()}\n{settings}"
+        f"<topic_access_rules>\n{topics}</topic_access_rules>\n</domain_rule>\n"
+    )
+
+
+def _leaf(name: str, value: bool | str | Protection) -> str:
+    if isinstance(value, bool):
+        text = "true" if value else "false"
+    else:
+        text = value.value if isinstance(value, Protection) else value
+    # Only a topic expression could hold a character that XML reserves.
+    escaped = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
+    return f"<{name}>{escaped}</{name}>\n"
+
+
+_DOMAIN_LEAVES = (
+    "allow_unauthenticated_participants", "enable_join_access_control", "discovery_protection_kind",
+    "liveliness_protection_kind", "rtps_protection_kind",
+)  # fmt: skip
+_TOPIC_LEAVES = (
+    "topic_expression", "enable_discovery_protection", "enable_liveliness_protection",
+    "enable_read_access_control", "enable_write_access_control", "metadata_protection_kind",
+    "data_protection_kind",
+)  # fmt: skip
+
+
+def check_governance_schema(document: bytes, where: str) -> None:
+    """Raises InvalidInput with file:line for what the schema (and so Fast DDS) would refuse."""
+    from keystore.formats.safe_xml import check_schema, parse_xml
+
+    check_schema(parse_xml(document, where), "governance.xsd", where, "DDS governance document")
+
+
+def parse_governance(document: bytes, where: str) -> Governance:
+    """A governance document, ours or SROS2's, as values. Raises InvalidInput with file:line."""
+    from keystore.formats.safe_xml import check_schema, parse_xml
+
+    root = parse_xml(document, where)
+    check_schema(root, "governance.xsd", where, "DDS governance document")
+    return Governance(tuple(_read_rule(element) for element in root.iter("domain_rule")))
+
+
+def _read_rule(element: etree._Element) -> DomainRule:
+    return DomainRule(
+        domains=Domains(tuple(_range(part) for part in element[0])),
+        allow_unauthenticated_participants=_flag(element, "allow_unauthenticated_participants"),
+        enable_join_access_control=_flag(element, "enable_join_access_control"),
+        discovery_protection_kind=_kind(element, "discovery_protection_kind"),
+        liveliness_protection_kind=_kind(element, "liveliness_protection_kind"),
+        rtps_protection_kind=_kind(element, "rtps_protection_kind"),
+        topic_rules=tuple(_read_topic_rule(rule) for rule in element.iter("topic_rule")),
+    )
+
+
+def _read_topic_rule(element: etree._Element) -> TopicRule:
+    return TopicRule(
+        topic_expression=_text(element, "topic_expression"),
+        enable_discovery_protection=_flag(element, "enable_discovery_protection"),
+        enable_liveliness_protection=_flag(element, "enable_liveliness_protection"),
+        enable_read_access_control=_flag(element, "enable_read_access_control"),
+        enable_write_access_control=_flag(element, "enable_write_access_control"),
+        metadata_protection_kind=_kind(element, "metadata_protection_kind"),
+        data_protection_kind=_kind(element, "data_protection_kind"),
+    )
+
+
+def _text(element: etree._Element, name: str) -> str:
+    return (element.findtext(name) or "").strip()
+
+
+def _flag(element: etree._Element, name: str) -> bool:
+    return _text(element, name) in ("true", "1")
+
+
+def _kind(element: etree._Element, name: str) -> Protection:
+    return Protection(_text(element, name))
+
+
+def _range(element: etree._Element) -> tuple[int, int]:
+    if element.tag == "id":
+        return int(element.text or "0"), int(element.text or "0")
+    low, high = element.findtext("min"), element.findtext("max")
+    # The schema's open ranges: only "min" means that id to Cyclone DDS and Fast DDS (measured).
+    first = int(low or "0")
+    return first, int(high) if high is not None else first

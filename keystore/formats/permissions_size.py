@@ -1,0 +1,92 @@
+"""How large a permissions document may be: Fast DDS sends it whole in a handshake message. Pure.
+
+Measured on Fast DDS 2.9.1: a signed document of 62,830 bytes works; with 63,976 bytes no peer ever
+matches. Cyclone DDS 0.10.2 handles 140 kB.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from keystore.formats.permissions_names import dds_topics, full_name
+from keystore.formats.policy import EnclavePolicy, Operation, Profile
+
+WARN_BYTES = 48_000
+FAST_DDS_LIMIT_BYTES = 62_830
+_SIGNATURE_BYTES = 2_600  # MIME frame, PKCS#7 and one certificate in base64, rounded up
+_FRAME_BYTES = _SIGNATURE_BYTES + 700  # with the head and tail of the document
+_TOPIC_BYTES = 17  # <topic></topic> and CRLF
+
+
+def _bytes_without_name(operation: Operation) -> tuple[int, int]:
+    """How many DDS topics an operation needs, and what they take besides the name in each of them."""
+    topics = [topic for direction in dds_topics(operation, "") for topic in direction]
+    return len(topics), sum(len(topic) + _TOPIC_BYTES for topic in topics)
+
+
+_BYTES = {operation: _bytes_without_name(operation) for operation in Operation}
+
+
+@dataclass(frozen=True, slots=True)
+class SizeConcern:
+    """``fatal``: no Fast DDS participant will match this enclave. ``text`` says what to do about it."""
+
+    size: int
+    fatal: bool
+    text: str
+
+
+def signed_size(document: bytes) -> int:
+    """About how many bytes the document takes once signed: line ends become CRLF, the signature is added."""
+    return len(document) + document.count(b"\n") + _SIGNATURE_BYTES
+
+
+def size_concern(size: int, policy: EnclavePolicy) -> SizeConcern | None:
+    """Whether a signed document of ``size`` bytes is too large, or near it; ``None`` when all is well."""
+    if size < WARN_BYTES:
+        return None
+    fatal = size > FAST_DDS_LIMIT_BYTES
+    effect = (
+        f"over the {FAST_DDS_LIMIT_BYTES} bytes that Fast DDS can carry: its peers would never match"
+        if fatal
+        else f"close to the {FAST_DDS_LIMIT_BYTES} bytes that Fast DDS can carry"
+    )
+    text = f"the permissions of enclave {policy.path} take {size} bytes, {effect}. {_advice(policy)}"
+    return SizeConcern(size, fatal, text)
+
+
+def expected_concern(policy: EnclavePolicy) -> SizeConcern | None:
+    """The same before anything is signed, from the names alone (wildcards and denials count as names).
+
+    Raises ``PolicyError`` for a name that no permission can be written for.
+    """
+    names = {
+        (rule.operation, full_name(rule.expression, profile))
+        for profile in policy.profiles
+        for rule in profile.rules
+    }
+    return size_concern(_FRAME_BYTES + sum(_bytes_of(operation, name) for operation, name in names), policy)
+
+
+def _bytes_of(operation: Operation, name: str) -> int:
+    topics, fixed = _BYTES[operation]
+    return topics * len(name) + fixed
+
+
+def _advice(policy: EnclavePolicy) -> str:
+    weights = Counter({f"{p.ns.rstrip('/')}/{p.node}": _weight(p) for p in policy.profiles})
+    heaviest = ", ".join(f"{fqn} (about {weight} bytes)" for fqn, weight in weights.most_common(3))
+    if len(policy.profiles) > 1:
+        return f"Give some of its {len(policy.profiles)} nodes their own enclave; the largest: {heaviest}"
+    prefixes = Counter(
+        full_name(rule.expression, profile).rpartition("/")[0] or "/"
+        for profile in policy.profiles
+        for rule in profile.rules
+    )
+    common = ", ".join(f"{prefix}/* ({count} names)" for prefix, count in prefixes.most_common(3))
+    return f"Split node {heaviest}, or grant a group of names by a wildcard in a --policy file: {common}"
+
+
+def _weight(profile: Profile) -> int:
+    return sum(_bytes_of(rule.operation, full_name(rule.expression, profile)) for rule in profile.rules)

@@ -1,0 +1,79 @@
+"""An SROS2 access-control policy (version 0.2.0) as plain values.
+
+Source of the format: ros2/design articles/ros2_access_control_policies, and the schema
+sros2/policy/schemas/policy.xsd. Reading and writing the XML is ``keystore.formats.policy_xml``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+from typing import NamedTuple
+
+from keystore.errors import InvalidInput
+
+
+class PolicyError(InvalidInput):
+    """A policy, or a name in one, that must not become permissions. The text says what and where."""
+
+
+class Operation(str, Enum):
+    """What a rule is about; the value is the attribute of the policy XML."""
+
+    __hash__ = str.__hash__  # rules are sought by the thousand; that of Enum is Python
+
+    PUBLISH = "publish"
+    SUBSCRIBE = "subscribe"
+    REPLY = "reply"  # serve a service
+    REQUEST = "request"  # call a service
+    EXECUTE = "execute"  # serve an action
+    CALL = "call"  # call an action
+
+
+class Qualifier(str, Enum):
+    __hash__ = str.__hash__
+
+    ALLOW = "ALLOW"
+    DENY = "DENY"
+
+
+class Rule(NamedTuple):
+    """``expression`` is absolute (``/a/b``), relative or private to the profile; it may hold wildcards
+    only where a policy file had them."""
+
+    operation: Operation
+    qualifier: Qualifier
+    expression: str
+
+
+class Profile(NamedTuple):
+    """The rules of one node: ``ns`` is an absolute namespace, ``node`` a node name."""
+
+    ns: str
+    node: str
+    rules: tuple[Rule, ...]
+
+
+class EnclavePolicy(NamedTuple):
+    """All that one enclave may do: the union of its profiles; DENY of any beats ALLOW of any."""
+
+    path: str
+    profiles: tuple[Profile, ...]
+
+
+class Policy(NamedTuple):
+    """Enclaves sorted by path, each path once."""
+
+    enclaves: tuple[EnclavePolicy, ...]
+
+    def wildcards(self) -> dict[str, tuple[str, ...]]:
+        """Enclave -> what it is allowed by wildcard: granted because somebody wrote it, and worth saying."""
+        found = {enclave.path: tuple(sorted(set(_wildcards(enclave)))) for enclave in self.enclaves}
+        return {path: expressions for path, expressions in found.items() if expressions}
+
+
+def _wildcards(enclave: EnclavePolicy) -> Iterator[str]:
+    for profile in enclave.profiles:
+        for rule in profile.rules:
+            if rule.qualifier is Qualifier.ALLOW and any(character in rule.expression for character in "*?["):
+                yield rule.expression

@@ -1,0 +1,257 @@
+"""SROS2 policy XML, version 0.2.0 <-> ``keystore.formats.policy.Policy``.
+
+Reading accepts what the schema accepts (checked here, to tell file and line also in included files),
+merges profiles and enclaves that occur twice, and checks every name as permissions would need it.
+Writing is sorted and stable, so that a derived policy can be committed and reviewed.
+Format: ros2/design articles/ros2_access_control_policies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from keystore.errors import InvalidEnclaveName, InvalidInput, printable
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.permissions_names import full_name, has_wildcard
+from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
+from keystore.formats.policy_xml_include import IncludingReader, Place
+from keystore.formats.safe_xml import parse_xml
+
+if TYPE_CHECKING:
+    from lxml import etree
+
+VERSION = "0.2.0"
+
+# Group element -> its entries' element and the operations that are its attributes, in output order.
+_GROUPS: dict[str, tuple[str, tuple[Operation, Operation]]] = {
+    "topics": ("topic", (Operation.PUBLISH, Operation.SUBSCRIBE)),
+    "services": ("service", (Operation.REPLY, Operation.REQUEST)),
+    "actions": ("action", (Operation.EXECUTE, Operation.CALL)),
+}
+
+Rules = dict[Rule, str]  # rule -> "file:line" of its first mention
+Profiles = dict[tuple[str, str], Rules]  # (ns, node) ->
+
+
+@dataclass(frozen=True, slots=True)
+class PolicyDocument:
+    """A policy that was read. ``places``: (enclave, profile ns, profile node, rule) to ``file:line``.
+
+    ``warnings``: what is valid but surely not meant. ``notes``: every wildcard and every DENY, which
+    only a policy file can bring in and a person should look at.
+    """
+
+    policy: Policy
+    places: Mapping[tuple[str, str, str, Rule], str]
+    warnings: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def read_policy(path: str | Path) -> PolicyDocument:
+    """The policy of a file, its includes restricted to the file's own folder.
+
+    Raises ``PolicyError`` (an ``InvalidInput``) with file:line.
+    """
+    file = Path(path)
+    if file.is_fifo():
+        raise PolicyError(f"cannot read policy {printable(file)}: it is a pipe, not a file")
+    try:
+        document = file.read_bytes()
+    except OSError as error:
+        raise PolicyError(f"cannot read policy {printable(file)}: {error.strerror}") from None
+    return parse_policy(document, str(file), folder=file.parent)
+
+
+def parse_policy(document: bytes, where: str = "policy.xml", folder: Path | None = None) -> PolicyDocument:
+    """As ``read_policy``, from bytes; includes are followed only with a ``folder`` and below it."""
+    root = parse_xml(document, where)
+    return _PolicyReader(folder).read(root, Place(where if folder is None else str(Path(where).resolve())))
+
+
+class _PolicyReader:
+    """One walk over one policy; collects rules by enclave and profile."""
+
+    def __init__(self, folder: Path | None):
+        self._reader = IncludingReader(folder)
+        self._enclaves: dict[str, Profiles] = {}
+        self._warnings: list[str] = []
+        self._notes: list[str] = []
+
+    def read(self, root: etree._Element, place: Place) -> PolicyDocument:
+        self._expect(root, place, "policy", required=("version",))
+        if root.get("version") != VERSION:
+            raise PolicyError(
+                f"{place.at(root)}: policy version {printable(root.get('version', ''))} is not supported, "
+                f"only {VERSION}"
+            )
+        (enclaves, inner), *rest = list(self._reader.children(root, place)) or [(root, place)]
+        if rest:
+            raise PolicyError(f"{rest[0][1].at(rest[0][0])}: a policy has exactly one <enclaves>")
+        self._expect(enclaves, inner, "enclaves")
+        for element, at in self._some_children(enclaves, inner, "enclave"):
+            self._enclave(element, at)
+        return self._result()
+
+    def _enclave(self, element: etree._Element, place: Place) -> None:
+        self._expect(element, place, "enclave", required=("path",))
+        path = element.get("path", "")
+        try:
+            validate_enclave_name(path)
+        except InvalidEnclaveName as error:
+            raise PolicyError(f"{place.at(element)}: {error}") from None
+        if path in self._enclaves:
+            self._warnings.append(f"{place.at(element)}: enclave {path} is defined again; both are merged")
+        profiles = self._enclaves.setdefault(path, {})
+        for child, at in self._some_children(element, place, "profiles"):
+            self._expect(child, at, "profiles", optional=("type",))
+            self._profiles(path, child, at, profiles)
+
+    def _profiles(self, path: str, element: etree._Element, place: Place, profiles: Profiles) -> None:
+        found = 0
+        for child, at in self._reader.children(element, place):
+            if child.tag == "metadata" and found:
+                continue
+            self._expect(child, at, "profile", required=("ns", "node"))
+            key = (child.get("ns", ""), child.get("node", ""))
+            self._profile(path, Profile(*key, ()), child, at, profiles.setdefault(key, {}))
+            found += 1
+        if not found:
+            raise PolicyError(f"{place.at(element)}: <profiles> needs at least one <profile>")
+
+    def _profile(
+        self, path: str, profile: Profile, element: etree._Element, place: Place, rules: Rules
+    ) -> None:
+        self._check_name("~/x", profile, place.at(element))  # looks at ns and node
+        for group, at in self._reader.children(element, place):
+            if group.tag not in _GROUPS:
+                raise PolicyError(f"{at.at(group)}: <{group.tag}> is not allowed in a <profile>")
+            entry, operations = _GROUPS[str(group.tag)]
+            self._expect(group, at, str(group.tag), optional=tuple(o.value for o in operations))
+            qualifiers = self._qualifiers(group, at, operations)
+            for expression, spot in self._some_children(group, at, entry):
+                self._expect(expression, spot, entry)
+                self._rules(path, profile, expression, spot, qualifiers, rules)
+
+    def _qualifiers(
+        self, group: etree._Element, place: Place, operations: Iterable[Operation]
+    ) -> list[tuple[Operation, Qualifier]]:
+        found: list[tuple[Operation, Qualifier]] = []
+        for operation in operations:
+            value = group.get(operation.value)
+            if value is None:
+                continue
+            if value not in ("ALLOW", "DENY"):
+                raise PolicyError(
+                    f"{place.at(group)}: {operation.value}={printable(value)} must be ALLOW or DENY"
+                )
+            found.append((operation, Qualifier(value)))
+        if not found:
+            names = " or ".join(operation.value for operation in operations)
+            self._warnings.append(f"{place.at(group)}: <{group.tag}> without {names} has no effect")
+        return found
+
+    def _rules(
+        self,
+        path: str,
+        profile: Profile,
+        element: etree._Element,
+        place: Place,
+        qualifiers: Iterable[tuple[Operation, Qualifier]],
+        rules: Rules,
+    ) -> None:
+        expression = element.text or ""
+        if len(element):
+            raise PolicyError(f"{place.at(element)}: <{element.tag}> must hold a name only")
+        self._check_name(expression, profile, place.at(element))
+        for operation, qualifier in qualifiers:
+            rules.setdefault(Rule(operation, qualifier, expression), place.at(element))
+            if qualifier is Qualifier.DENY or has_wildcard(expression):
+                kind = "wildcard" if has_wildcard(expression) else "denial"
+                self._notes.append(
+                    f"{place.at(element)}: enclave {path}: {kind} {qualifier.value} {operation.value} {expression}"
+                )
+
+    def _check_name(self, expression: str, profile: Profile, where: str) -> None:
+        try:
+            full_name(expression, profile)
+        except PolicyError as error:
+            raise PolicyError(f"{where}: {error}") from None
+
+    def _some_children(
+        self, element: etree._Element, place: Place, tag: str
+    ) -> list[tuple[etree._Element, Place]]:
+        children = list(self._reader.children(element, place))
+        if not children:
+            raise PolicyError(f"{place.at(element)}: <{element.tag}> needs at least one <{tag}>")
+        return children
+
+    def _expect(
+        self,
+        element: etree._Element,
+        place: Place,
+        tag: str,
+        required: tuple[str, ...] = (),
+        optional: tuple[str, ...] = (),
+    ) -> None:
+        if element.tag != tag:
+            raise PolicyError(f"{place.at(element)}: expected <{tag}>, found <{element.tag}>")
+        missing = [name for name in required if name not in element.attrib]
+        unknown = [str(name) for name in element.attrib if name not in (*required, *optional)]
+        if missing or unknown:
+            text = f"needs the attribute {missing[0]}" if missing else f"has no attribute {unknown[0]}"
+            raise PolicyError(f"{place.at(element)}: <{tag}> {text}")
+
+    def _result(self) -> PolicyDocument:
+        enclaves: list[EnclavePolicy] = []
+        places: dict[tuple[str, str, str, Rule], str] = {}
+        for path, profiles in sorted(self._enclaves.items()):
+            for (ns, node), rules in profiles.items():
+                places.update({(path, ns, node, rule): place for rule, place in rules.items()})
+            enclaves.append(
+                EnclavePolicy(
+                    path,
+                    tuple(Profile(ns, node, tuple(sorted(r))) for (ns, node), r in sorted(profiles.items())),
+                )
+            )
+        return PolicyDocument(Policy(tuple(enclaves)), places, tuple(self._warnings), tuple(self._notes))
+
+
+def policy_xml(policy: Policy) -> bytes:
+    """The policy as UTF-8 text, valid against the schema, the same for the same policy.
+
+    An enclave without profiles (its process may join and nothing else) gets one without rules, which
+    the schema asks for. Raises ``InvalidInput`` for a policy without enclaves.
+    """
+    if not policy.enclaves:
+        raise InvalidInput("a policy needs at least one enclave")
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'<policy version="{VERSION}">', "  <enclaves>"]
+    for enclave in sorted(policy.enclaves):
+        lines.append(f'    <enclave path="{escape(enclave.path)}">')
+        lines.append("      <profiles>")
+        placeholder = Profile("/", enclave.path.rpartition("/")[2] or "root", ())
+        for profile in sorted(enclave.profiles) or [placeholder]:
+            lines.extend(_profile_lines(profile))
+        lines.extend(("      </profiles>", "    </enclave>"))
+    lines.extend(("  </enclaves>", "</policy>", ""))
+    return "\n".join(lines).encode()
+
+
+def _profile_lines(profile: Profile) -> list[str]:
+    head = f'        <profile ns="{escape(profile.ns)}" node="{escape(profile.node)}"'
+    if not profile.rules:
+        return [f"{head}/>"]
+    lines = [f"{head}>"]
+    for group, (entry, operations) in _GROUPS.items():
+        for operation in operations:
+            for qualifier in Qualifier:
+                key = (operation, qualifier)
+                names = sorted({r.expression for r in profile.rules if (r.operation, r.qualifier) == key})
+                if names:
+                    lines.append(f'          <{group} {operation.value}="{qualifier.value}">')
+                    lines.extend(f"            <{entry}>{escape(name)}</{entry}>" for name in names)
+                    lines.append(f"          </{group}>")
+    return [*lines, "        </profile>"]

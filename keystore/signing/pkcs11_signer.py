@@ -1,0 +1,162 @@
+"""A CA key in a PKCS#11 token (HSM, smart card, SoftHSM2), by the ``pkcs11:`` URI of RFC 7512.
+
+Optional: needs ``python-pkcs11`` (``pip install enclave-launch[pkcs11]``). The URI names token and
+object; the module comes from ``module-path`` or ``PKCS11_MODULE_PATH``, the PIN from a ``Secret`` or
+``pin-source``. A ``pin-value`` in a URI is refused: such a file would carry the secret in clear.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
+
+from keystore.errors import InvalidInput, SigningUnavailable
+from keystore.signing.ca_access import Secret
+
+if TYPE_CHECKING:
+    from keystore.signing.signer import PublicKey
+
+MODULE_VARIABLE = "PKCS11_MODULE_PATH"
+
+
+def parse_uri(uri: str) -> dict[str, str]:
+    """Attributes of a ``pkcs11:`` URI, percent-decoded; raises InvalidInput without showing the URI."""
+    body = uri.removeprefix("pkcs11:")
+    path, _, query = body.partition("?")
+    attributes: dict[str, str] = {}
+    for part in (*path.split(";"), *query.split("&")):
+        name, found, value = part.partition("=")
+        if part and (not found or name in attributes):
+            raise InvalidInput("a pkcs11: URI consists of different name=value pairs (RFC 7512)")
+        if part:
+            attributes[name] = unquote(value)
+    if "pin-value" in attributes:
+        raise InvalidInput("pin-value in a pkcs11: URI stores the PIN in clear; use pin-source or --pin-file")
+    if not {"object", "id"} & attributes.keys():
+        raise InvalidInput("a pkcs11: URI must name the key with object= or id=")
+    return attributes
+
+
+class Pkcs11Signer:
+    """One private key of a token, over a session that stays open as long as this object."""
+
+    __slots__ = ("_key", "_public")
+
+    def __init__(self, key: Any, public: PublicKey):
+        self._key = key
+        self._public = public
+
+    @classmethod
+    def open(cls, uri: str, pin: Secret | None, environment: Mapping[str, str]) -> Pkcs11Signer:
+        """Raises SigningUnavailable when module, token, PIN or key is not there."""
+        attributes = parse_uri(uri)
+        try:
+            import pkcs11
+            import pkcs11.exceptions
+        except ImportError:
+            raise SigningUnavailable(
+                "a key in a PKCS#11 token needs python-pkcs11: pip install 'enclave-launch[pkcs11]'"
+            ) from None
+        try:
+            key, public = _find(pkcs11, attributes, _module(attributes, environment), _pin(attributes, pin))
+        except pkcs11.exceptions.PKCS11Error as error:
+            raise SigningUnavailable(f"the PKCS#11 token refused: {type(error).__name__}") from None
+        except RuntimeError:
+            raise SigningUnavailable("the PKCS#11 module cannot be loaded; check module-path") from None
+        return cls(key, public)
+
+    def public_key(self) -> PublicKey:
+        return self._public
+
+    def sign(self, data: bytes) -> bytes:
+        import pkcs11
+        import pkcs11.exceptions
+
+        try:
+            if self._key.key_type == pkcs11.KeyType.RSA:
+                return bytes(self._key.sign(data, mechanism=pkcs11.Mechanism.SHA256_RSA_PKCS))
+            return _sign_ecdsa(pkcs11, self._key, data)
+        except pkcs11.exceptions.PKCS11Error as error:
+            raise SigningUnavailable(f"the PKCS#11 token refused to sign: {type(error).__name__}") from None
+
+
+def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
+    """Tokens return r and s side by side; X.509 and CMS want DER. Hashing here suits every token."""
+    import hashlib
+
+    from cryptography.hazmat.primitives.asymmetric.utils import encode_dss_signature
+
+    raw = bytes(key.sign(hashlib.sha256(data).digest(), mechanism=pkcs11.Mechanism.ECDSA))
+    half = len(raw) // 2
+    return encode_dss_signature(int.from_bytes(raw[:half], "big"), int.from_bytes(raw[half:], "big"))
+
+
+def _module(attributes: Mapping[str, str], environment: Mapping[str, str]) -> str:
+    module = attributes.get("module-path") or environment.get(MODULE_VARIABLE)
+    if not module:
+        raise SigningUnavailable(f"name the PKCS#11 module: module-path= in the URI or {MODULE_VARIABLE}")
+    return module
+
+
+def _pin(attributes: Mapping[str, str], pin: Secret | None) -> str | None:
+    source = attributes.get("pin-source")
+    if pin is None and source:
+        pin = Secret(file=Path(source.removeprefix("file:").replace("//", "/", 1)))
+    return pin.value().decode("utf-8", "replace") if pin else None
+
+
+def _find(pkcs11: Any, attributes: Mapping[str, str], module: str, pin: str | None) -> tuple[Any, PublicKey]:
+    token = pkcs11.lib(module).get_token(
+        token_label=attributes.get("token"), token_serial=_serial(attributes)
+    )
+    session = _session(pkcs11, token, pin)
+    wanted: dict[Any, Any] = {}
+    if "object" in attributes:
+        wanted[pkcs11.Attribute.LABEL] = attributes["object"]
+    if "id" in attributes:
+        wanted[pkcs11.Attribute.ID] = attributes["id"].encode("latin-1")
+    key = _single(session, pkcs11.ObjectClass.PRIVATE_KEY, wanted, pkcs11)
+    public = _single(session, pkcs11.ObjectClass.PUBLIC_KEY, wanted, pkcs11)
+    return key, _public_key(pkcs11, public)
+
+
+def _session(pkcs11: Any, token: Any, pin: str | None) -> Any:
+    """A login holds for all sessions of a process (PKCS#11 section 5.6): the second CA key needs none."""
+    try:
+        return token.open(user_pin=pin)
+    except pkcs11.exceptions.UserAlreadyLoggedIn:
+        return token.open()
+
+
+def _serial(attributes: Mapping[str, str]) -> bytes | None:
+    serial = attributes.get("serial")
+    return serial.encode() if serial else None
+
+
+def _single(session: Any, kind: Any, wanted: Mapping[Any, Any], pkcs11: Any) -> Any:
+    found = list(session.get_objects({pkcs11.Attribute.CLASS: kind, **wanted}))
+    if len(found) != 1:
+        raise SigningUnavailable(
+            f"the token holds {len(found)} objects of kind {kind.name} with that object/id, one is needed"
+        )
+    return found[0]
+
+
+def _public_key(pkcs11: Any, key: Any) -> PublicKey:
+    from cryptography.hazmat.primitives.asymmetric import ec, rsa
+    from cryptography.hazmat.primitives.serialization import load_der_public_key
+
+    if key.key_type == pkcs11.KeyType.RSA:
+        from pkcs11.util.rsa import encode_rsa_public_key
+
+        numbers = encode_rsa_public_key(key)
+        loaded = load_der_public_key(numbers)
+    else:
+        from pkcs11.util.ec import encode_ec_public_key
+
+        loaded = load_der_public_key(encode_ec_public_key(key))
+    if not isinstance(loaded, (ec.EllipticCurvePublicKey, rsa.RSAPublicKey)):
+        raise SigningUnavailable("the token's key is neither EC nor RSA")
+    return loaded

@@ -1,0 +1,71 @@
+"""Questions about public keys in DER: is this signature valid, which kind of key is it."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+from keystore.formats import der
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric.types import PublicKeyTypes
+
+# Imported CAs may certify themselves with more than SHA-256.
+_ECDSA_SHA384 = der.encode(der.SEQUENCE, der.object_identifier("1.2.840.10045.4.3.3"))
+_RSA_SHA384, _RSA_SHA512 = (
+    der.encode(der.SEQUENCE, der.object_identifier(f"1.2.840.113549.1.1.{arc}"), der.encode(der.NULL))
+    for arc in (12, 13)
+)
+
+
+@lru_cache(maxsize=16)
+def _load(spki: bytes) -> PublicKeyTypes:
+    from cryptography.hazmat.primitives.serialization import load_der_public_key
+
+    return load_der_public_key(spki)
+
+
+def _loaded(spki: bytes) -> PublicKeyTypes | None:
+    """None for what is no public key, or one of a kind that nobody knows."""
+    from cryptography.exceptions import UnsupportedAlgorithm
+
+    try:
+        return _load(spki)
+    except (ValueError, UnsupportedAlgorithm):
+        return None
+
+
+def signature_is_valid(spki: bytes, signature: bytes, data: bytes, algorithm: bytes | None = None) -> bool:
+    """ECDSA or RSA PKCS#1 v1.5; ``spki`` is the DER SubjectPublicKeyInfo.
+
+    ``algorithm`` is the DER AlgorithmIdentifier of a certificate; None and unknown ones count as SHA-256.
+    """
+    from cryptography.exceptions import InvalidSignature
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
+
+    key = _loaded(spki)
+    larger = {_ECDSA_SHA384: hashes.SHA384(), _RSA_SHA384: hashes.SHA384(), _RSA_SHA512: hashes.SHA512()}
+    digest = larger.get(algorithm or b"", hashes.SHA256())
+    try:
+        if isinstance(key, ec.EllipticCurvePublicKey):
+            key.verify(signature, data, ec.ECDSA(digest))
+        elif isinstance(key, rsa.RSAPublicKey):
+            key.verify(signature, data, padding.PKCS1v15(), digest)
+        else:
+            return False
+    except InvalidSignature:
+        return False
+    return True
+
+
+def key_kind(spki: bytes) -> str:
+    """``P-256``, ``P-384``, ``RSA-2048`` and so on."""
+    from cryptography.hazmat.primitives.asymmetric import ec, rsa
+
+    key = _loaded(spki)
+    if isinstance(key, ec.EllipticCurvePublicKey):
+        return {"secp256r1": "P-256", "secp384r1": "P-384"}.get(key.curve.name, key.curve.name)
+    if key is None:
+        return "damaged"
+    return f"RSA-{key.key_size}" if isinstance(key, rsa.RSAPublicKey) else type(key).__name__

@@ -1,0 +1,104 @@
+"""Where a CA's key lives: one small interface, a file and a PKCS#11 token behind it.
+
+    Signer.sign(data) -> signature      the only thing a CA key is ever asked
+
+``keystore.signing.authority`` makes certificates with it, ``keystore.signing.smime`` signed documents. Private keys and
+passphrases stay inside these objects: no ``repr``, message or attribute shows them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Protocol
+
+from keystore.errors import SigningUnavailable
+
+if TYPE_CHECKING:
+    from cryptography.hazmat.primitives.asymmetric import ec, rsa
+
+    from keystore.signing.ca_access import CaAccess, Secret
+
+    PublicKey = ec.EllipticCurvePublicKey | rsa.RSAPublicKey
+    PrivateKey = ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey
+
+
+class Signer(Protocol):
+    """Signs with SHA-256: ECDSA in DER form, or RSA PKCS#1 v1.5, after the kind of ``public_key()``."""
+
+    def public_key(self) -> PublicKey: ...
+
+    def sign(self, data: bytes) -> bytes:
+        """The signature over ``data``; raises SigningUnavailable."""
+
+
+class FileSigner:
+    """A key in memory, loaded from a PEM file of the keystore or just generated."""
+
+    __slots__ = ("_ec_algorithm", "_key")
+
+    def __init__(self, key: PrivateKey):
+        from cryptography.hazmat.primitives import hashes
+        from cryptography.hazmat.primitives.asymmetric import ec
+
+        self._key = key
+        self._ec_algorithm = ec.ECDSA(hashes.SHA256())
+
+    @property
+    def private_key(self) -> PrivateKey:
+        """For ``cryptography``'s certificate builder, which signs faster with its own key objects."""
+        return self._key
+
+    def public_key(self) -> PublicKey:
+        return self._key.public_key()
+
+    def sign(self, data: bytes) -> bytes:
+        from cryptography.hazmat.primitives.asymmetric import ec
+
+        if isinstance(self._key, ec.EllipticCurvePrivateKey):
+            return self._key.sign(data, self._ec_algorithm)
+        return _sign_rsa(self._key, data)
+
+
+def _sign_rsa(key: rsa.RSAPrivateKey, data: bytes) -> bytes:
+    from cryptography.hazmat.primitives import hashes
+    from cryptography.hazmat.primitives.asymmetric import padding
+
+    return key.sign(data, padding.PKCS1v15(), hashes.SHA256())
+
+
+def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> PrivateKey:
+    """The EC or RSA key of a PEM file (PKCS#8 or SEC1), encrypted or not.
+
+    Raises SigningUnavailable with ``place`` and without any of the content.
+    """
+    from cryptography.exceptions import UnsupportedAlgorithm
+    from cryptography.hazmat.primitives import serialization
+    from cryptography.hazmat.primitives.asymmetric import ec, rsa
+
+    encrypted = b"ENCRYPTED" in pem
+    if encrypted and passphrase is None:
+        raise SigningUnavailable(
+            f"{place} is encrypted; give its passphrase with --passphrase-file, -fd or -env"
+        )
+    try:
+        key = serialization.load_pem_private_key(
+            pem, passphrase.value() if encrypted and passphrase else None
+        )
+    except (ValueError, TypeError, UnsupportedAlgorithm):
+        wrong = (
+            "cannot be decrypted; is the passphrase right?" if encrypted else "holds no usable private key"
+        )
+        raise SigningUnavailable(f"{place} {wrong}") from None
+    if not isinstance(key, (ec.EllipticCurvePrivateKey, rsa.RSAPrivateKey)):
+        raise SigningUnavailable(f"{place} is neither an EC nor an RSA key; DDS-Security knows only these")
+    return key
+
+
+def open_signer(reference: bytes, place: str, access: CaAccess) -> Signer:
+    """The signer behind a key file of ``private/``: PEM, or the ``pkcs11:`` URI of a ``.p11`` file."""
+    if reference.lstrip().startswith(b"pkcs11:"):
+        from keystore.signing.pkcs11_signer import Pkcs11Signer
+
+        return Pkcs11Signer.open(
+            reference.split()[0].decode("ascii", "replace"), access.pin, access.environment
+        )
+    return FileSigner(load_private_key(reference, access.passphrase, place))

@@ -1,0 +1,1 @@
+"""What is done with a keystore, a module each: create, provision, renew, roll over, remove, export."""

@@ -1,0 +1,220 @@
+"""A bundle of some enclaves for one host: exactly the files their processes read, nothing that signs.
+
+Never copied: ``private/``, unsigned twins, keys of other enclaves (a nested enclave's directory holds
+those of the enclaves below it), strays. Every file is named one by one from the list in
+``keystore.disk.layout``.
+"""
+
+from __future__ import annotations
+
+import fnmatch
+import io
+import os
+import shutil
+import tarfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from datetime import datetime
+from enum import Enum
+from pathlib import Path
+
+from keystore.disk import layout, safe_files, store
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystore, InvalidInput, StorageError, printable
+from keystore.formats.validity import utc_now
+from keystore.verification.finding import Finding, Severity
+
+_LINKED = ("identity_ca.cert.pem", "permissions_ca.cert.pem", layout.ENCLAVE_GOVERNANCE, layout.ENCLAVE_CRL)
+
+
+class PublicFiles(str, Enum):
+    """How an enclave gets CA certificates, governance and CRL."""
+
+    LINK = "link"  # as in the keystore: public/ and governance once, relative links to them
+    COPY = "copy"  # every enclave directory stands alone, public/ is not needed
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFile:
+    """``path`` is relative to the bundle; either ``data`` or ``link`` (a relative target)."""
+
+    path: str
+    mode: int
+    data: bytes = field(default=b"", repr=False)
+    link: str | None = None
+
+
+def export(
+    keystore: Path | str,
+    output: Path | str,
+    patterns: Iterable[str],
+    *,
+    public: PublicFiles = PublicFiles.LINK,
+    now: datetime | None = None,
+) -> tuple[str, ...]:
+    """Write the bundle of all enclaves that match one of ``patterns`` (``/robot1/*``); returns their names.
+
+    ``output`` ending in ``.tar`` or ``.tar.gz`` becomes an archive with the same bytes for the same keystore,
+    otherwise a new directory. Raises InvalidInput when nothing matches or ``output`` exists, DamagedKeystore
+    for an enclave that could not start (incomplete, expired, revoked).
+    """
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    names = _matching(view.enclaves(), list(patterns))
+    _refuse_unfit(view, names, now or utc_now())
+    files = list(_files(view, names, public))
+    target = Path(output)
+    if target.exists() or target.is_symlink():
+        raise InvalidInput(f"{printable(target)} exists already; choose a new name or remove it")
+    if Path(os.path.realpath(target)).is_relative_to(view.root):
+        raise InvalidInput(f"{printable(target)} lies in the keystore; choose another place")
+    try:
+        _write(target, files)
+    except OSError as error:
+        raise StorageError.of(error, "writing the bundle") from None
+    return tuple(names)
+
+
+def _matching(names: list[str], patterns: list[str]) -> list[str]:
+    for pattern in patterns:
+        if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
+            raise InvalidInput(f"no enclave matches {printable(pattern)}; secure-keystore list shows all")
+    return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
+
+
+def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime) -> None:
+    """What ``verify`` calls an error of these enclaves or of the CAs would only fail on the host."""
+    from keystore.steps.revocation import revoked_serials
+    from keystore.verification.authorities import check_deployed
+    from keystore.verification.enclaves import check_enclave
+
+    _refuse("the keystore", check_deployed(view, now))
+    revoked = revoked_serials(view)
+    for name in names:
+        directory = layout.enclave_directory(name)
+        for file in layout.RUNTIME_FILES:
+            if safe_files.read_if_there(view.root, f"{directory}/{file}") is None:
+                raise DamagedKeystore(
+                    f"enclave {name} is incomplete ({file}); secure-keystore renew completes it"
+                )
+        _refuse(f"enclave {name}", check_enclave(view, name, frozenset(revoked), now))
+
+
+def _refuse(what: str, findings: Iterable[Finding]) -> None:
+    for finding in findings:
+        # Fast DDS alone cannot carry large permissions: the user's choice of DDS.
+        if finding.severity is Severity.ERROR and finding.code != "too-large":
+            raise DamagedKeystore(
+                f"{what} is not fit for a host: {finding.place}: {finding.message} [{finding.code}]; "
+                f"repair: {finding.repair}"
+            )
+
+
+def _files(view: KeystoreView, names: list[str], public: PublicFiles) -> Iterator[ExportedFile]:
+    if public is PublicFiles.LINK:
+        for name in (
+            *(layout.link_source(link) for link in _LINKED[:3]),
+            *([layout.CRL] if view.has_crl else []),
+        ):
+            yield ExportedFile(name, store.PUBLIC_MODE, safe_files.read(view.root, name))
+    for enclave in names:
+        yield from _enclave_files(view, enclave, public)
+
+
+def _enclave_files(view: KeystoreView, enclave: str, public: PublicFiles) -> Iterator[ExportedFile]:
+    directory = layout.enclave_directory(enclave)
+    for name in (layout.CERT, layout.PERMISSIONS):
+        yield ExportedFile(
+            f"{directory}/{name}", store.PUBLIC_MODE, safe_files.read(view.root, f"{directory}/{name}")
+        )
+    key = safe_files.read_private(view.root, f"{directory}/{layout.KEY}")
+    yield ExportedFile(f"{directory}/{layout.KEY}", store.PRIVATE_MODE, key)
+    links = layout.enclave_links(enclave, crl=view.has_crl)
+    if public is PublicFiles.COPY and enclave == "/":
+        links[layout.ENCLAVE_GOVERNANCE] = ""
+    for name, target in links.items():
+        if public is PublicFiles.LINK:
+            yield ExportedFile(f"{directory}/{name}", 0o777, link=target)
+        else:
+            content = safe_files.read(view.root, layout.link_source(name))
+            yield ExportedFile(f"{directory}/{name}", store.PUBLIC_MODE, content)
+
+
+def _write(target: Path, files: list[ExportedFile]) -> None:
+    """Written beside the target and renamed: a bundle is complete or absent."""
+    aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
+    try:
+        if target.name.endswith((".tar", ".tar.gz")):
+            _write_archive(aside, files, compressed=target.name.endswith(".gz"))
+        else:
+            _write_directory(aside, files)
+        os.rename(aside, target)
+    finally:
+        if aside.is_dir():
+            shutil.rmtree(aside)
+        elif aside.exists():
+            aside.unlink()
+
+
+def _write_directory(aside: Path, files: list[ExportedFile]) -> None:
+    os.mkdir(aside, 0o700)
+    os.chmod(aside, 0o755)
+    for file in files:
+        path = aside / file.path
+        _make_directories(aside, file.path)
+        if file.link is not None:
+            os.symlink(file.link, path)
+        else:
+            _create(path, file.data, file.mode)
+
+
+def _make_directories(aside: Path, relative: str) -> None:
+    """Modes are ours, whatever the umask: who can write in a directory can replace the key in it."""
+    for parent in reversed(list(_parents(relative))):
+        try:
+            os.mkdir(aside / parent, 0o755)
+            os.chmod(aside / parent, 0o755)
+        except FileExistsError:
+            continue
+
+
+def _create(path: Path, data: bytes, mode: int) -> None:
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, mode)
+    with os.fdopen(descriptor, "wb") as stream:
+        os.fchmod(descriptor, mode)
+        stream.write(data)
+        stream.flush()
+        os.fsync(descriptor)
+
+
+def _write_archive(aside: Path, files: list[ExportedFile], *, compressed: bool) -> None:
+    """Sorted, without times and owners; holds keys, so the archive itself is private."""
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.GNU_FORMAT) as archive:
+        for directory in sorted({parent for file in files for parent in _parents(file.path)}):
+            archive.addfile(_entry(directory, 0o755, tarfile.DIRTYPE))
+        for file in sorted(files, key=lambda file: file.path):
+            entry = _entry(
+                file.path, file.mode, tarfile.SYMTYPE if file.link is not None else tarfile.REGTYPE
+            )
+            entry.linkname = file.link or ""
+            entry.size = len(file.data)
+            archive.addfile(entry, io.BytesIO(file.data))
+    content = buffer.getvalue()
+    if compressed:
+        import gzip
+
+        content = gzip.compress(content, mtime=0)
+    _create(aside, content, store.PRIVATE_MODE)
+
+
+def _parents(path: str) -> Iterator[str]:
+    while path := os.path.dirname(path):
+        yield path
+
+
+def _entry(path: str, mode: int, kind: bytes) -> tarfile.TarInfo:
+    entry = tarfile.TarInfo(path)
+    entry.mode, entry.type = mode, kind
+    return entry

@@ -1,0 +1,380 @@
+"""A new keystore, or the missing parts of one: CAs, governance, settings. The same call completes what an
+interrupted run left; what is there is never made anew.
+
+A CA's certificate and key are published together: the pair is renamed into ``private/incoming`` as one
+directory and installed from there, so that no crash can leave a certificate beside another CA's key.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from keystore.disk import layout, lock, safe_files, store
+from keystore.disk.governance_file import covers, governance_stands
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.settings import Settings
+from keystore.disk.store import Content, Store
+from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printable
+from keystore.formats.certificate import read_certificate
+from keystore.formats.domains import Domains
+from keystore.formats.governance import Governance, governance_document, parse_governance
+from keystore.formats.role import Role
+from keystore.formats.subject import SubjectScheme
+from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
+from keystore.signing import authority, smime
+from keystore.signing.authority import Authority, Curve
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.signer import FileSigner, open_signer
+
+
+@dataclass(frozen=True, slots=True)
+class ImportedCa:
+    """An existing CA: its PEM certificate and its PEM key, or a file with the key's ``pkcs11:`` URI."""
+
+    certificate: Path
+    key: Path
+
+
+@dataclass(frozen=True, slots=True)
+class CreateOptions:
+    """``ca_lifetime``, ``lifetime`` (of enclaves) start at ``now``; ``names`` are the CAs' common names."""
+
+    domains: Domains = field(default_factory=lambda: Domains.single(0))
+    governance: Governance | None = None
+    subjects: SubjectScheme = SubjectScheme.EXACT
+    curve: Curve = Curve.P256
+    ca_lifetime: timedelta = DEFAULT_LIFETIME
+    lifetime: timedelta = DEFAULT_LIFETIME
+    backdate: timedelta = DEFAULT_BACKDATE
+    names: Mapping[Role, str] = field(default_factory=dict)
+    imported: Mapping[Role, ImportedCa] = field(default_factory=dict)
+    encrypt_ca_keys: bool = False
+    """Encrypt new CA keys with ``access.passphrase``."""
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+    now: datetime | None = None
+
+    @property
+    def settings(self) -> Settings:
+        return Settings(self.subjects, self.curve, self.lifetime)
+
+
+@dataclass(frozen=True, slots=True)
+class CreateReport:
+    """``actions`` in words, empty when the keystore was complete already."""
+
+    keystore: Path
+    actions: tuple[str, ...]
+    warnings: tuple[str, ...] = ()
+
+
+def create_keystore(keystore: Path | str, options: CreateOptions | None = None) -> CreateReport:
+    """Create the keystore or complete it; a complete one is left as it is.
+
+    Raises NotAKeystore for a directory with other things in it, InvalidInput for a CA that cannot serve.
+    """
+    chosen = options or CreateOptions()
+    root = resolve_root(keystore)
+    _refuse_foreign(root)
+    refuse_unusable(chosen)
+    store.create_root(root)
+    with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        return complete(opened, chosen)
+
+
+def refuse_unusable(options: CreateOptions) -> None:
+    """Before anything is written: options that no keystore can be made with. Raises InvalidInput."""
+    now = options.now or utc_now()
+    for lifetime in (options.ca_lifetime, options.lifetime):
+        Validity.starting(now, lifetime, backdate=options.backdate)
+    for name in options.names.values():
+        authority.refuse_ca_name(name)
+    passphrase = passphrase_for_new_keys(options.encrypt_ca_keys, options.access)
+    if passphrase is not None:
+        passphrase.value()
+    for role in options.imported:
+        _import_ca(role, options, [])
+
+
+def _refuse_foreign(root: Path) -> None:
+    view = KeystoreView(root)
+    if not view.is_complete and not view.can_be_completed:
+        raise NotAKeystore(f"{printable(root)} exists and is no keystore; choose an empty or new directory")
+
+
+def complete(opened: Store, options: CreateOptions) -> CreateReport:
+    """What ``create_keystore`` does once it holds the lock."""
+    _refuse_foreign(opened.root)
+    view = KeystoreView(opened.root)
+    actions: list[str] = []
+    warnings: list[str] = []
+    install_incoming(opened)
+    if not view.is_complete:
+        _write_settings(opened, options, actions)
+        for directory in (layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES):
+            opened.ensure_directory(directory)
+    for role in Role:
+        _complete_ca(opened, role, options, actions, warnings)
+    _complete_governance(opened, options, actions)
+    return CreateReport(opened.root, tuple(actions), tuple(warnings))
+
+
+def _write_settings(opened: Store, options: CreateOptions, actions: list[str]) -> None:
+    """Before anything else: it marks the directory as ours."""
+    if os.path.lexists(opened.root / layout.SETTINGS) or os.path.lexists(opened.root / layout.PUBLIC):
+        return
+    with opened.batch() as batch:
+        batch.file(layout.SETTINGS, options.settings.to_json())
+    actions.append("settings written")
+
+
+def _complete_ca(
+    opened: Store, role: Role, options: CreateOptions, actions: list[str], warnings: list[str]
+) -> None:
+    has_cert = os.path.exists(opened.root / layout.ca_cert(role))
+    view = KeystoreView(opened.root)
+    if has_cert:
+        if role in options.imported:
+            _refuse_other_ca(opened, role, options.imported[role])
+        return  # a missing key is no fault: the CA may be kept elsewhere
+    _refuse_foreign_enclaves(view, role)
+    if role in options.imported:
+        made, key_name, key_bytes = _import_ca(role, options, warnings)
+        verb = "imported"
+    else:
+        made, key_name, key_bytes = _make_ca(opened, view, role, options)
+        verb = "created"
+    put_incoming(opened, role, made.pem(), key_name, key_bytes)
+    install_incoming(opened)
+    actions.append(f"{role.value.replace('_ca', ' CA')} {verb}")
+    if authority_kind(made) not in ("P-256", "RSA-2048"):
+        warnings.append(
+            f"the {role.value.replace('_ca', ' CA')} key is {authority_kind(made)}: "
+            "Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
+        )
+
+
+def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
+    """A bundle of stand-alone enclaves, or a lost CA: another CA would replace what these enclaves trust."""
+    if view.key_file(role) is None and os.path.isdir(view.root / layout.ENCLAVES) and view.enclaves():
+        raise DamagedKeystore(
+            f"{printable(view.root)} holds enclaves, but not the {role.value.replace('_ca', ' CA')} they belong to: "
+            "a deployed copy, or a keystore to restore from a backup"
+        )
+
+
+def authority_kind(made: Authority) -> str:
+    from keystore.signing.public_key import key_kind
+
+    return key_kind(made.facts.public_key)
+
+
+def _refuse_other_ca(opened: Store, role: Role, imported: ImportedCa) -> None:
+    given = read_certificate(_read_given(imported.certificate), printable(imported.certificate))
+    if given.der != KeystoreView(opened.root).ca(role).der:
+        raise InvalidInput(
+            f"the keystore has another {role.value} already; a CA is replaced with: "
+            "secure-keystore renew KEYSTORE --ca start"
+        )
+
+
+def _make_ca(
+    opened: Store, view: KeystoreView, role: Role, options: CreateOptions
+) -> tuple[Authority, str, bytes]:
+    """A new key and certificate; a key that is there already (an interrupted SROS2 run) is kept."""
+    now = options.now or utc_now()
+    validity = Validity.starting(now, options.ca_lifetime, backdate=options.backdate)
+    name = options.names.get(role) or authority.default_ca_name(role)
+    present = view.key_file(role)
+    if present is not None:
+        reference = safe_files.read_private(opened.root, present)
+        signer = open_signer(reference, printable(opened.root / present), options.access)
+        return authority.self_signed_ca(role, name, signer, validity), present.rpartition("/")[2], reference
+    fresh = authority.new_key(options.curve)
+    made = authority.self_signed_ca(role, name, fresh, validity)
+    return (
+        made,
+        layout.KEY,
+        authority.key_pem(fresh, passphrase_for_new_keys(options.encrypt_ca_keys, options.access)),
+    )
+
+
+def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
+    if encrypt and access.passphrase is None:
+        raise InvalidInput("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
+    return access.passphrase if encrypt else None
+
+
+def _import_ca(role: Role, options: CreateOptions, warnings: list[str]) -> tuple[Authority, str, bytes]:
+    source = options.imported[role]
+    reference = _read_given(source.key)
+    signer = open_signer(reference, printable(source.key), options.access)
+    bound = authority.authority_of(_read_given(source.certificate), signer, printable(source.certificate))
+    check_can_serve(bound.facts.der, role, options.now or utc_now(), printable(source.certificate))
+    other = options.imported.get(Role.PERMISSIONS if role is Role.IDENTITY else Role.IDENTITY)
+    if role is Role.PERMISSIONS and other is not None and other.key == source.key:
+        warnings.append(
+            "one CA for identities and permissions: enclaves certified by it elsewhere can sign permissions "
+            "that Cyclone DDS before 11.0 and Fast DDS before 2.6.5 accept (CVE-2023-24010, CVE-2023-24011)"
+        )
+    return bound, (layout.KEY if isinstance(signer, FileSigner) else "key.p11"), reference
+
+
+def _read_given(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
+
+
+def check_can_serve(certificate_der: bytes, role: Role, now: datetime, place: str) -> None:
+    """Raises InvalidInput when DDS implementations would refuse what this CA signs."""
+    from cryptography import x509
+
+    try:
+        cert = x509.load_der_x509_certificate(certificate_der)
+        extensions = cert.extensions
+    except (ValueError, x509.UnsupportedGeneralNameType, x509.DuplicateExtension):
+        raise InvalidInput(f"{place} is no usable certificate") from None
+    facts = read_certificate(authority.pem_certificate(certificate_der), place)
+    if not facts.validity.covers(now):
+        raise InvalidInput(f"{place} is not valid now")
+    try:
+        if not extensions.get_extension_for_class(x509.BasicConstraints).value.ca:
+            raise InvalidInput(f"{place} is not a CA certificate (basicConstraints CA:FALSE)")
+        usage = extensions.get_extension_for_class(x509.KeyUsage).value
+    except x509.ExtensionNotFound as error:
+        if error.oid == x509.OID_BASIC_CONSTRAINTS:
+            raise InvalidInput(f"{place} is not a CA certificate (no basicConstraints)") from None
+        return
+    if role is Role.IDENTITY and not usage.key_cert_sign:
+        raise InvalidInput(f"{place} may not sign certificates (key usage lacks keyCertSign)")
+    if role is Role.PERMISSIONS and not usage.digital_signature:
+        raise InvalidInput(f"{place} may not sign documents (key usage lacks digitalSignature)")
+
+
+def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: bytes) -> None:
+    """Stage a CA pair durably; ``install_incoming`` publishes it, now or in the next run."""
+    opened.ensure_directory(layout.PRIVATE)
+    opened.ensure_directory(layout.INCOMING)
+    name = "key.p11" if key_name.endswith(".p11") else layout.KEY
+    with opened.batch() as batch:
+        batch.directory(
+            f"{layout.INCOMING}/{role.value}",
+            {name: Content(key, store.PRIVATE_MODE), layout.CERT: Content(cert)},
+        )
+
+
+def install_incoming(opened: Store) -> None:
+    """Publish every complete CA pair waiting in ``private/incoming``; repeats safely after a crash."""
+    for role in Role:
+        waiting = f"{layout.INCOMING}/{role.value}"
+        if not opened.is_directory(waiting):
+            continue
+        cert = safe_files.read_if_there(opened.root, f"{waiting}/{layout.CERT}")
+        if cert is not None:
+            _install(opened, role, waiting, cert)
+        for name in (
+            layout.CERT,
+            layout.KEY,
+            "key.p11",
+        ):  # the certificate first: without it nothing is installed
+            opened.remove(f"{waiting}/{name}")
+        opened.remove_empty_directory(waiting)
+    opened.remove_empty_directory(layout.INCOMING)
+
+
+def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
+    pem = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY}")
+    uri = safe_files.read_if_there(opened.root, f"{waiting}/key.p11")
+    if pem is None and uri is None:
+        raise DamagedKeystore(
+            f"{printable(opened.root / waiting)} holds a certificate without key; remove it"
+        )
+    name, stale = layout.ca_key(role), layout.ca_key_uri(role)
+    if pem is None:
+        name, stale = stale, name
+    opened.ensure_directory(layout.PUBLIC)
+    with opened.batch() as batch:
+        batch.file(name, pem or uri or b"", store.PRIVATE_MODE)
+        batch.file(layout.ca_cert(role), cert)
+    opened.remove(stale)
+
+
+def _complete_governance(opened: Store, options: CreateOptions, actions: list[str]) -> None:
+    if os.path.isfile(opened.root / layout.GOVERNANCE):
+        return
+    document = _unsigned_default(opened.root) or governance_document(
+        options.governance or Governance.for_domains(options.domains)
+    )
+    view = KeystoreView(opened.root)
+    signer = view.authority(Role.PERMISSIONS, options.access)
+    write_governance(opened, document, signer, options.now or utc_now())
+    actions.append("governance signed")
+
+
+def _unsigned_default(root: Path) -> bytes | None:
+    """What an interrupted run left beside a missing ``governance.p7s``, unless it is more lax than the default.
+
+    Raises DamagedKeystore for any other document: nobody signed it, so somebody must look at it first.
+    """
+    present = safe_files.read_if_there(root, layout.GOVERNANCE_XML)
+    if present is None:
+        return None
+    place = root / layout.GOVERNANCE_XML
+    try:
+        found = parse_governance(present, printable(place))
+        if found == Governance.for_domains(found.domains()):
+            return present
+    except InvalidInput:
+        pass
+    raise DamagedKeystore(
+        f"{printable(place)} is not the default governance, and its signature governance.p7s is missing; look at "
+        f"it and remove it: rm {shlex.quote(str(place))}"
+    )
+
+
+def mirror_governance(opened: Store) -> bool:
+    """``governance.xml`` again as what is signed, where somebody changed it; whether that was needed."""
+    present = safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML)
+    document = trusted_document(KeystoreView(opened.root), layout.GOVERNANCE)
+    if present is None or present.replace(b"\r\n", b"\n") == document:
+        return False
+    with opened.batch() as batch:
+        batch.file(layout.GOVERNANCE_XML, document)
+    return True
+
+
+def write_governance(opened: Store, document: bytes, permissions_ca: Authority, now: datetime) -> None:
+    signed = sign_document(document, permissions_ca, now)
+    with opened.batch() as batch:
+        batch.file(layout.GOVERNANCE_XML, document)
+        batch.file(layout.GOVERNANCE, signed)
+
+
+def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
+    return smime.sign(document, ca.facts, ca.signer, now)
+
+
+def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
+    """Sign the governance again if its domains or its signer no longer fit; whether that was needed.
+
+    Raises InvalidInput when it has several rules and none for a domain: then a person must decide.
+    """
+    view = KeystoreView(opened.root)
+    if governance_stands(view, domains):
+        return False
+    document = trusted_document(view, layout.GOVERNANCE)
+    governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
+    if not covers(governance.domains(), domains):
+        document = governance_document(governance.extended_to(domains))
+    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
+    return True

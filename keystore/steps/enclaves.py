@@ -1,0 +1,65 @@
+"""Creating enclaves by name and applying whole policies: thin callers of ``keystore.steps.provisioning``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore.formats.validity import Validity
+from keystore.steps.enclave_state import PermissionsSource
+from keystore.steps.provisioning import ProvisionOptions, ProvisionReport, provision
+from keystore.steps.provisioning_check import Wish, bring_about, policy_source, with_domains
+
+
+def create_enclaves(
+    keystore: Path | str,
+    names: Iterable[str],
+    *,
+    allow_all: bool = False,
+    options: ProvisionOptions | None = None,
+) -> ProvisionReport:
+    """Enclaves with a valid identity. New ones may do nothing, existing ones keep their permissions, unless
+    ``allow_all`` asks for every topic, service and action. The keystore must exist.
+    """
+    root = resolve_root(keystore)
+    chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
+    ordered = sorted({validate_enclave_name(name) for name in names})
+    wishes = {name: Wish(_allow_all(name, chosen) if allow_all else keep) for name in ordered}
+    return bring_about(root, wishes, chosen)
+
+
+def create_enclave(
+    keystore: Path | str, name: str, *, allow_all: bool = False, options: ProvisionOptions | None = None
+) -> ProvisionReport:
+    """``create_enclaves`` for one."""
+    return create_enclaves(keystore, [name], allow_all=allow_all, options=options)
+
+
+def keep(_subject: str, _validity: Validity) -> None:
+    """The permissions source of those who do not want to change permissions."""
+
+
+def _allow_all(name: str, options: ProvisionOptions) -> PermissionsSource:
+    """SROS2's default policy of create_enclave: everything on ``/*``, asked for by name here."""
+    everything = tuple(Rule(operation, Qualifier.ALLOW, "/*") for operation in Operation)
+    return policy_source(EnclavePolicy(name, (Profile("/", "all", everything),)), options)
+
+
+def apply_policy(
+    keystore: Path | str, policy: Policy, *, options: ProvisionOptions | None = None
+) -> ProvisionReport:
+    """Exactly the policy's permissions for the policy's enclaves, created where missing, in a keystore that
+    exists."""
+    chosen = (options or ProvisionOptions())._replace(create=False)
+    return provision(keystore, policy.enclaves, options=chosen)
+
+
+def list_enclaves(keystore: Path | str) -> list[str]:
+    """Names of all enclaves, sorted; the root is ``/``. Raises NotAKeystore."""
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    return view.enclaves()

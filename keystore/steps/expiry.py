@@ -1,0 +1,131 @@
+"""What of a keystore ends when. Reads only, without ``cryptography``: a launch asks this every time."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import NamedTuple
+
+from keystore.disk import layout, safe_files
+from keystore.disk.crl_file import crl_validity
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.formats import certificate, der
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.role import Role
+from keystore.formats.validity import Validity, later, parse_moment, utc_now
+from keystore.signing import smime
+
+_DATE = rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_"
+
+
+class Expiry(NamedTuple):
+    """``what``: ``identity CA``, ``permissions CA``, ``certificate``, ``permissions`` or ``CRL``; ``enclave``
+    for the two that belong to one."""
+
+    not_after: datetime
+    what: str
+    enclave: str | None
+    not_before: datetime
+
+    def is_valid(self, now: datetime) -> bool:
+        return self.not_before <= now <= self.not_after
+
+    def is_due(self, now: datetime, limit: datetime) -> bool:
+        """It has ended or has not begun at ``now``, or ends by ``limit``."""
+        return self.not_after <= limit or not self.is_valid(now)
+
+    @property
+    def subject(self) -> str:
+        return f"{self.what} of {self.enclave}" if self.enclave else self.what
+
+
+class StatusReport(NamedTuple):
+    """``expiries``: everything with an end, the earliest first."""
+
+    keystore: Path
+    now: datetime
+    enclaves: tuple[str, ...]
+    expiries: tuple[Expiry, ...]
+
+    def due(self, margin: timedelta) -> tuple[Expiry, ...]:
+        """What has ended, has not begun, or ends within ``margin``."""
+        limit = later(self.now, margin)
+        return tuple(one for one in self.expiries if one.is_due(self.now, limit))
+
+
+def status(keystore: Path | str, *, now: datetime | None = None) -> StatusReport:
+    """Raises NotAKeystore, DamagedKeystore for what cannot be read."""
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    names = view.enclaves()
+    ordered = sorted(_expiries(view, names, {}), key=_order)
+    return StatusReport(view.root, now or utc_now(), tuple(names), tuple(ordered))
+
+
+def expires_soon(
+    keystore: Path | str,
+    within: timedelta,
+    *,
+    enclaves: Iterable[str] | None = None,
+    known: Mapping[str, Validity] | None = None,
+    now: datetime | None = None,
+) -> tuple[Expiry, ...]:
+    """What ends within ``within`` (or has ended), for the CAs and these enclaves (None: all).
+
+    ``known``: enclaves that need not be read again, with the validity of their certificate and permissions, as
+    ``ProvisionReport.validities`` gives them.
+    """
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    names = view.enclaves() if enclaves is None else [validate_enclave_name(name) for name in enclaves]
+    moment = now or utc_now()
+    limit = later(moment, within)
+    due = [one for one in _expiries(view, names, known or {}) if one.is_due(moment, limit)]
+    return tuple(sorted(due, key=_order))
+
+
+def _order(one: Expiry) -> tuple[datetime, str, str]:
+    return one.not_after, one.what, one.enclave or ""
+
+
+def _expiries(view: KeystoreView, names: Iterable[str], known: Mapping[str, Validity]) -> Iterator[Expiry]:
+    for role in Role:
+        for ca in view.ca_bundle(role):
+            yield _expiry(role.value.replace("_ca", " CA"), None, ca.validity)
+    if view.has_crl:
+        yield _expiry("CRL", None, crl_validity(view))
+    for name in names:
+        if name in known:
+            yield from (_expiry(what, name, known[name]) for what in ("certificate", "permissions"))
+        else:
+            yield from _enclave_expiries(view, name)
+
+
+def _enclave_expiries(view: KeystoreView, name: str) -> Iterator[Expiry]:
+    directory = layout.enclave_directory(name)
+    cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
+    if cert is not None:
+        try:
+            yield _expiry("certificate", name, certificate.read_pem(cert).validity)
+        except der.DerError as error:
+            raise DamagedKeystore(f"{directory}/{layout.CERT}: {error}") from None
+    signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
+    if signed is not None:
+        yield _expiry("permissions", name, _permissions_validity(signed, f"{directory}/{layout.PERMISSIONS}"))
+
+
+def _expiry(what: str, enclave: str | None, validity: Validity) -> Expiry:
+    return Expiry(validity.not_after, what, enclave, validity.not_before)
+
+
+def _permissions_validity(signed: bytes, place: str) -> Validity:
+    """Of the first grant, the only one that implementations use."""
+    found = dict(reversed(re.findall(_DATE, smime.read(signed, place).document)))
+    try:
+        return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))
+    except (KeyError, UnicodeDecodeError, InvalidInput):
+        raise DamagedKeystore(f"{place} states no validity") from None

@@ -1,0 +1,113 @@
+"""The writing half of ``keystore.steps.provisioning``: under the lock, in batches."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from keystore.disk import store
+from keystore.disk.governance_file import governance_domains
+from keystore.disk.store import Store
+from keystore.disk.superseded import remember
+from keystore.disk.view import KeystoreView
+from keystore.formats.enclave_name import check_distinct
+from keystore.formats.role import Role
+from keystore.formats.validity import DEFAULT_LIFETIME, Validity
+from keystore.steps.creation import CreateOptions, complete, renew_governance
+from keystore.steps.enclave_state import EnclaveState
+from keystore.steps.enclave_writing import EnclaveWriter
+from keystore.steps.provisioning import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
+from keystore.steps.provisioning_check import Wish, as_found, inspect_wish
+from keystore.steps.revocation import renew_crl
+
+# Bounds what an interrupted run loses, and how often the disk is waited for.
+_BATCH = 250
+
+
+def write_wishes(
+    root: Path, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
+) -> ProvisionReport:
+    """Complete the keystore, then every enclave that is not as wished."""
+    # An impossible validity is refused before a keystore is made for it.
+    lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
+    Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
+    with _locked(root, options) as opened:
+        done, warnings = _complete_keystore(opened, options, now)
+        view = KeystoreView(root)
+        warnings += _exposures(view)
+        check_distinct(dict.fromkeys((*view.enclaves(), *wishes)))
+        writer = EnclaveWriter(opened, view, options, now)
+        states = [inspect_wish(view, name, wish, options, now) for name, wish in wishes.items()]
+        writer.check_subjects(states)
+        reports = _write_all(opened, writer, states, wishes, options.progress, now)
+    return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
+
+
+@contextmanager
+def _locked(root: Path, options: ProvisionOptions) -> Iterator[Store]:
+    if options.create:
+        store.create_root(root)
+    with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
+        yield opened
+
+
+def _complete_keystore(
+    opened: Store, options: ProvisionOptions, now: datetime
+) -> tuple[list[str], list[str]]:
+    """Missing parts of the keystore itself, and a governance that covers the domains."""
+    domains = options.domains or governance_domains(KeystoreView(opened.root))
+    creation = replace(
+        options.creation or CreateOptions(),
+        domains=domains,
+        access=options.access,
+        durable=options.durable,
+        now=now,
+    )
+    report = complete(opened, creation)
+    done = list(report.actions)
+    if renew_governance(opened, domains, options.access, now):
+        done.append(f"governance signed for domains {domains}")
+    if renew_crl(opened, options.access, now, options.renew_within):
+        done.append("CRL published again")
+    return done, list(report.warnings)
+
+
+def _exposures(view: KeystoreView) -> list[str]:
+    """What SROS2 leaves behind; it works, so it is said and not refused."""
+    said = []
+    if view.shares_one_ca:
+        said.append(
+            "this keystore has one CA for identities and permissions (CVE-2023-24010, CVE-2023-24011); "
+            "secure-keystore renew separates them"
+        )
+    files = [name for role in Role if (name := view.key_file(role)) is not None]
+    if any(os.stat(view.root / name).st_mode & 0o077 for name in files):
+        said.append("the CA keys can be read by others; secure-keystore renew closes them")
+    return said
+
+
+def _write_all(
+    opened: Store,
+    writer: EnclaveWriter,
+    states: list[EnclaveState],
+    wishes: Mapping[str, Wish],
+    progress: Progress | None,
+    now: datetime,
+) -> tuple[EnclaveReport, ...]:
+    """In batches: bounded loss when interrupted, few calls to make it durable."""
+    reports = {state.enclave: as_found(state) for state in states}
+    todo = [state for state in states if not state.is_good]
+    for start in range(0, len(todo), _BATCH):
+        part = todo[start : start + _BATCH]
+        with opened.batch() as batch:
+            remember(batch, KeystoreView(opened.root), writer.replaced(part), now)
+            for position, state in enumerate(part, start + 1):
+                actions = writer.write(batch, state, wishes[state.enclave].permissions)
+                reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)
+                if progress is not None:
+                    progress(position, len(todo))
+    return tuple(reports.values())

@@ -1,0 +1,142 @@
+"""Renewal of what ends soon, and repair of keystores that SROS2 or an accident left exposed.
+
+Certificate and permissions are always renewed together, so that they end together. Keys stay unless
+asked. Repair means: separate CAs where one was shared, certificates that cannot sign documents, subjects
+nobody else's permissions fit, private modes. A new permissions CA makes every document change: deploy all
+enclaves together.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from keystore.disk import layout, safe_files, store
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.store import Store
+from keystore.disk.view import KeystoreView
+from keystore.errors import InvalidInput, printable
+from keystore.formats import certificate
+from keystore.formats.certificate import CertificateFacts
+from keystore.formats.der import DerError
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.role import Role
+from keystore.formats.subject import SubjectScheme, scheme_of
+from keystore.formats.validity import utc_now
+from keystore.steps import rollover
+from keystore.steps.creation import install_incoming, mirror_governance
+from keystore.steps.enclave_state import Identity
+from keystore.steps.enclaves import keep
+from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
+from keystore.steps.provisioning_check import Wish, bring_about, with_domains
+from keystore.steps.revocation import renew_crl, revoke_replaced
+
+DEFAULT_WITHIN = timedelta(days=30)
+
+
+@dataclass(frozen=True, slots=True)
+class RenewOptions:
+    """``within``: what ends sooner is due. ``provisioning`` carries lifetime, subjects, access and more."""
+
+    within: timedelta = DEFAULT_WITHIN
+    everything: bool = False
+    new_keys: bool = False
+    revoke_old: bool = False
+    """Also revoke the certificates that these enclaves had before: for keys that somebody copied."""
+    encrypt_ca_keys: bool = False
+    provisioning: ProvisionOptions = field(default_factory=ProvisionOptions)
+
+
+def renew(
+    keystore: Path | str, enclaves: Iterable[str] | None = None, *, options: RenewOptions | None = None
+) -> ProvisionReport:
+    """Renew these enclaves; without a list all that is due or exposed. Repeating does nothing more.
+
+    Raises InvalidInput for an enclave that is not there, SigningUnavailable without the CA keys.
+    """
+    chosen = options or RenewOptions()
+    root = resolve_root(keystore)
+    KeystoreView(root).require_complete()
+    provisioning = chosen.provisioning._replace(create=False)
+    now = provisioning.now or utc_now()
+    named = None if enclaves is None else sorted({validate_enclave_name(name) for name in enclaves})
+    _refuse_unknown(root, named)
+    with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:
+        install_incoming(opened)
+        repaired = _repair_keystore(opened, chosen, now)
+        if renew_crl(opened, provisioning.access, now, chosen.within):
+            repaired.append("CRL published again")
+        if mirror_governance(opened):
+            repaired.append("governance.xml made equal to the signed governance.p7s")
+    view = KeystoreView(root)
+    wishes = {name: _wish(view, name, named, chosen) for name in view.enclaves()}
+    due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
+    report = bring_about(root, wishes, with_domains(root, due))
+    if chosen.revoke_old:
+        with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:
+            changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
+            count = revoke_replaced(opened, changed, provisioning.access, now)
+        repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
+    return report._replace(created=(*repaired, *report.created))
+
+
+def _refuse_unknown(root: Path, named: list[str] | None) -> None:
+    unknown = sorted(set(named or ()) - set(KeystoreView(root).enclaves()))
+    if unknown:
+        raise InvalidInput(
+            f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
+        )
+
+
+def _wish(view: KeystoreView, name: str, named: list[str] | None, options: RenewOptions) -> Wish:
+    """Enclaves not named are only completed, as any change of a CA demands it of all."""
+    asked = name in named if named is not None else options.everything or _is_exposed(view, name, options)
+    if not asked:
+        return Wish(keep)
+    return Wish(keep, Identity.PAIR if options.new_keys else Identity.CERTIFICATE)
+
+
+def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
+    """A certificate that could sign documents, or whose subject another enclave's permissions fit."""
+    facts = _facts(view, name)
+    if facts is None:
+        return False
+    scheme = options.provisioning.subjects or view.settings.subjects
+    borrows = (
+        scheme is SubjectScheme.EXACT and scheme_of(facts.common_name or "/") is SubjectScheme.COMPATIBLE
+    )
+    return facts.can_sign_mail or borrows
+
+
+def _facts(view: KeystoreView, name: str) -> CertificateFacts | None:
+    pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(name)}/{layout.CERT}")
+    try:
+        return certificate.read_pem(pem) if pem else None
+    except DerError:
+        return None
+
+
+def _repair_keystore(opened: Store, options: RenewOptions, now: datetime) -> list[str]:
+    done = [f"made {name} private" for name in _close_modes(opened)]
+    if KeystoreView(opened.root).shares_one_ca:
+        rollover.separate_permissions_ca(opened, options.provisioning, now, encrypt=options.encrypt_ca_keys)
+        done.append("permissions CA separated from the identity CA; deploy all enclaves together")
+    return done
+
+
+def _close_modes(opened: Store) -> list[str]:
+    """0700 for ``private/`` and 0600 for what is in it; enclave keys are closed with their enclave."""
+    candidates = {layout.PRIVATE: 0o700, layout.SHARED_CA_KEY: 0o600}
+    candidates |= {layout.ca_key(role): 0o600 for role in Role}
+    closed = []
+    for name, mode in candidates.items():
+        path = opened.root / name
+        if os.path.lexists(path) and not path.is_symlink() and stat.S_IMODE(os.lstat(path).st_mode) & 0o077:
+            safe_files.refuse_unsafe_private(opened.root, name)
+            opened.set_mode(name, mode)
+            closed.append(name)
+    return closed

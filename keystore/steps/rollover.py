@@ -1,0 +1,195 @@
+"""CAs replaced: with an overlap in which old and new are trusted, or at once.
+
+    start    a new CA is made and trusted besides the old one; everything stays signed by the old one
+    switch   everything is signed by the new CA; the old one is still trusted
+    finish   the old CA is trusted no more
+
+Deploy after each step. What the overlap gives, as measured: Fast DDS trusts every certificate in
+``identity_ca.cert.pem``, so after ``start`` is deployed everywhere, robots can take ``switch`` one by
+one, as far as the identity CA goes. Cyclone DDS reads only the first certificate of the file, and neither bridges
+a change of the permissions CA: there ``switch`` is a change of all participants together, the earlier and
+later steps are harmless. A CRL names one CA and both
+implementations read only one, so a keystore with revocations skips the overlap: the CRL goes with the old
+CA.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection
+from datetime import datetime
+from enum import Enum
+from pathlib import Path
+
+from keystore.disk import layout, safe_files, store
+from keystore.disk.copies import refresh_copies
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.store import Content, Store
+from keystore.disk.view import KeystoreView
+from keystore.errors import InvalidInput
+from keystore.formats.certificate import read_certificate
+from keystore.formats.role import Role
+from keystore.formats.validity import Validity, utc_now
+from keystore.signing import authority
+from keystore.signing.authority import Authority, pem_certificate
+from keystore.steps.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
+from keystore.steps.enclaves import keep
+from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
+from keystore.steps.provisioning_check import Wish, bring_about, with_domains
+from keystore.steps.revocation import drop_crl
+
+
+class Step(str, Enum):
+    START = "start"
+    SWITCH = "switch"
+    FINISH = "finish"
+
+
+def roll_over(
+    keystore: Path | str,
+    step: Step,
+    roles: Collection[Role] = tuple(Role),
+    *,
+    options: ProvisionOptions | None = None,
+    encrypt: bool = False,
+) -> ProvisionReport:
+    """One step of replacing CAs; repeating an interrupted step completes it.
+
+    ``options.creation`` gives curve, lifetime and names of the new CAs. Raises InvalidInput for a step out of
+    order.
+    """
+    chosen = (options or ProvisionOptions())._replace(create=False)
+    root = resolve_root(keystore)
+    KeystoreView(root).require_complete()
+    now = chosen.now or utc_now()
+    with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        install_incoming(opened)
+        for role in roles:
+            _forget_installed(opened, role)
+        done = [_STEPS[step](opened, role, chosen, now, encrypt) for role in roles]
+        refresh_copies(opened)
+    if step is not Step.SWITCH:
+        return ProvisionReport(root, tuple(text for text in done if text), ())
+    wishes = {name: Wish(keep) for name in KeystoreView(root).enclaves()}
+    report = bring_about(root, wishes, with_domains(root, chosen))
+    return report._replace(created=(*(text for text in done if text), *report.created))
+
+
+def _start(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
+    view = KeystoreView(opened.root)
+    if view.shares_one_ca:
+        raise InvalidInput("one CA for identities and permissions: first run secure-keystore renew KEYSTORE")
+    if not opened.is_directory(_waiting(role)):
+        _make_next(opened, role, options, now, encrypt)
+    new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
+    return _trust(opened, role, pem_certificate(view.ca(role).der) + new)
+
+
+def _make_next(
+    opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool
+) -> Authority:
+    made, key = new_ca(role, options, now, encrypt)
+    opened.ensure_directory(layout.PRIVATE)
+    opened.ensure_directory(layout.NEXT)
+    with opened.batch() as batch:
+        batch.directory(
+            _waiting(role), {layout.KEY: Content(key, store.PRIVATE_MODE), layout.CERT: Content(made.pem())}
+        )
+    return made
+
+
+def new_ca(role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> tuple[Authority, bytes]:
+    """A fresh CA and its key file."""
+    creation = options.creation or CreateOptions()
+    validity = Validity.starting(now, creation.ca_lifetime, backdate=options.backdate)
+    signer = authority.new_key(creation.curve)
+    name = creation.names.get(role) or authority.default_ca_name(role)
+    made = authority.self_signed_ca(role, name, signer, validity)
+    return made, authority.key_pem(signer, passphrase_for_new_keys(encrypt, options.access))
+
+
+def _trust(opened: Store, role: Role, bundle: bytes) -> str:
+    target = layout.ca_cert(role)
+    if safe_files.read_if_there(opened.root, target) == bundle:
+        return ""
+    with opened.batch() as batch:
+        batch.file(target, bundle)
+    return f"{_title(role)}: trust anchors written"
+
+
+def _switch(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
+    if not opened.is_directory(_waiting(role)):
+        if len(KeystoreView(opened.root).ca_bundle(role)) > 1 or _retired(opened, role):
+            return ""  # switched already
+        raise InvalidInput(f"there is no new {_title(role)} yet: first --ca start, and deploy")
+    view = KeystoreView(opened.root)
+    new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
+    key = safe_files.read_private(opened.root, f"{_waiting(role)}/{layout.KEY}")
+    bundle = new
+    if read_certificate(new, _waiting(role)).der != view.ca(role).der:
+        old = retire(opened, role)
+        bundle = new if role is Role.IDENTITY and view.has_crl else new + old
+        put_incoming(opened, role, bundle, layout.KEY, key)
+        install_incoming(opened)
+    if role is Role.IDENTITY and view.has_crl:
+        drop_crl(opened)
+    _forget_next(opened, role)
+    return f"{_title(role)} replaced"
+
+
+def retire(opened: Store, role: Role) -> bytes:
+    """Keep the certificate in use among the retired, whose documents may be signed again; as PEM."""
+    facts = KeystoreView(opened.root).ca(role)
+    pem = pem_certificate(facts.der)
+    opened.ensure_directory(layout.PRIVATE)
+    opened.ensure_directory(layout.RETIRED)
+    with opened.batch() as batch:
+        batch.file(f"{layout.RETIRED}/{role.value}-{facts.serial:040x}.cert.pem", pem)
+    return pem
+
+
+def _retired(opened: Store, role: Role) -> bool:
+    return any((opened.root / layout.RETIRED).glob(f"{role.value}-*.cert.pem"))
+
+
+def _forget_installed(opened: Store, role: Role) -> None:
+    """What a ``switch`` interrupted while it forgot: the key goes first, and only after it was installed."""
+    waiting = opened.root / _waiting(role)
+    if waiting.is_dir() and not os.path.lexists(waiting / layout.KEY):
+        _forget_next(opened, role)
+
+
+def _forget_next(opened: Store, role: Role) -> None:
+    for name in (layout.KEY, layout.CERT):
+        opened.remove(f"{_waiting(role)}/{name}")
+    opened.remove_empty_directory(_waiting(role))
+    opened.remove_empty_directory(layout.NEXT)
+
+
+def _finish(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
+    if opened.is_directory(_waiting(role)):
+        raise InvalidInput(
+            f"everything is still signed by the old {_title(role)}: first --ca switch, and deploy"
+        )
+    return _trust(opened, role, pem_certificate(KeystoreView(opened.root).ca(role).der))
+
+
+def separate_permissions_ca(
+    opened: Store, options: ProvisionOptions, now: datetime, *, encrypt: bool
+) -> None:
+    """Give a keystore with a single CA its own permissions CA; ``bring_about`` signs all again."""
+    retire(opened, Role.PERMISSIONS)
+    made, key = new_ca(Role.PERMISSIONS, options, now, encrypt)
+    put_incoming(opened, Role.PERMISSIONS, made.pem(), layout.KEY, key)
+    install_incoming(opened)
+
+
+def _waiting(role: Role) -> str:
+    return f"{layout.NEXT}/{role.value}"
+
+
+def _title(role: Role) -> str:
+    return role.value.replace("_ca", " CA")
+
+
+_STEPS = {Step.START: _start, Step.SWITCH: _switch, Step.FINISH: _finish}
