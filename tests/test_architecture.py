@@ -23,6 +23,9 @@ PURE = {
     "enclave_launch/report": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
 }
 
+# The rooms of the keystore, lowest first: each may import those below it (and ``errors``), none above.
+KEYSTORE_FLOORS = ("formats", "signing", "disk", "verification", "steps", "verb")
+
 
 def imports_of(path: Path) -> Iterator[str]:
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -57,6 +60,25 @@ def test_deciding_stages_do_not_import_what_acts(folder: str) -> None:
         if name.startswith(PURE[folder])
     ]
     assert wrong == []
+
+
+@pytest.mark.parametrize("floor", range(len(KEYSTORE_FLOORS)))
+def test_rooms_of_the_keystore_import_downwards_only(floor: int) -> None:
+    above = tuple(f"keystore.{room}" for room in KEYSTORE_FLOORS[floor + 1 :])
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in sources(f"keystore/{KEYSTORE_FLOORS[floor]}")
+        for name in imports_of(path)
+        if name.startswith(above) or name == "keystore"
+    ]
+    assert wrong == []
+
+
+def test_every_file_of_the_keystore_stands_in_a_room() -> None:
+    beside = {path.stem for path in (ROOT / "keystore").glob("*.py")}
+    rooms = {path.parent.name for path in (ROOT / "keystore").glob("*/__init__.py")}
+    assert beside == {"__init__", "errors"}
+    assert rooms == set(KEYSTORE_FLOORS)
 
 
 def modules_loaded_by(arguments: list[str]) -> set[str]:

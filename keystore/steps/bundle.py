@@ -85,7 +85,7 @@ def _matching(names: list[str], patterns: list[str]) -> list[str]:
 
 def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime) -> None:
     """What ``verify`` calls an error of these enclaves or of the CAs would only fail on the host."""
-    from keystore.steps.revocation import revoked_serials
+    from keystore.disk.crl_file import revoked_serials
     from keystore.verification.authorities import check_deployed
     from keystore.verification.enclaves import check_enclave
 

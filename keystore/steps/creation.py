@@ -29,7 +29,7 @@ from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
 from keystore.signing import authority, smime
-from keystore.signing.authority import Authority, Curve
+from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.signer import FileSigner, open_signer
 
@@ -233,32 +233,6 @@ def _read_given(path: Path) -> bytes:
         return path.read_bytes()
     except OSError as error:
         raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
-
-
-def check_can_serve(certificate_der: bytes, role: Role, now: datetime, place: str) -> None:
-    """Raises InvalidInput when DDS implementations would refuse what this CA signs."""
-    from cryptography import x509
-
-    try:
-        cert = x509.load_der_x509_certificate(certificate_der)
-        extensions = cert.extensions
-    except (ValueError, x509.UnsupportedGeneralNameType, x509.DuplicateExtension):
-        raise InvalidInput(f"{place} is no usable certificate") from None
-    facts = read_certificate(authority.pem_certificate(certificate_der), place)
-    if not facts.validity.covers(now):
-        raise InvalidInput(f"{place} is not valid now")
-    try:
-        if not extensions.get_extension_for_class(x509.BasicConstraints).value.ca:
-            raise InvalidInput(f"{place} is not a CA certificate (basicConstraints CA:FALSE)")
-        usage = extensions.get_extension_for_class(x509.KeyUsage).value
-    except x509.ExtensionNotFound as error:
-        if error.oid == x509.OID_BASIC_CONSTRAINTS:
-            raise InvalidInput(f"{place} is not a CA certificate (no basicConstraints)") from None
-        return
-    if role is Role.IDENTITY and not usage.key_cert_sign:
-        raise InvalidInput(f"{place} may not sign certificates (key usage lacks keyCertSign)")
-    if role is Role.PERMISSIONS and not usage.digital_signature:
-        raise InvalidInput(f"{place} may not sign documents (key usage lacks digitalSignature)")
 
 
 def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: bytes) -> None:

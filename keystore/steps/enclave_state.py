@@ -7,7 +7,6 @@ and ``keystore.verify`` on request.
 
 from __future__ import annotations
 
-import binascii
 import os
 import shlex
 import stat
@@ -26,6 +25,7 @@ from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, common_name, subject_name
 from keystore.formats.validity import Validity
 from keystore.signing import smime
+from keystore.signing.key_pair import key_matches
 
 PermissionsSource = Callable[[str, Validity], "bytes | None"]
 """(subject name, validity of the certificate) -> the document it should have; None: keep what it has."""
@@ -170,32 +170,6 @@ def _certificate_problem(
     if not key_matches(key, facts):
         return "the certificate belongs to another key"
     return None
-
-
-def key_matches(key_pem: bytes, facts: CertificateFacts) -> bool:
-    """Whether the key's file carries the certificate's public point (PKCS#8 and SEC1 files of OpenSSL do).
-
-    Only when it does not, or for RSA, ``cryptography`` has to load the key.
-    """
-    point = facts.public_key[-65:]
-    try:
-        body = key_pem.split(b"-----", 4)[2]
-        if point[0] == 4 and point in binascii.a2b_base64(body):
-            return True
-    except (IndexError, binascii.Error):
-        pass
-    return _key_matches_slowly(key_pem, facts)
-
-
-def _key_matches_slowly(key_pem: bytes, facts: CertificateFacts) -> bool:
-    from keystore.errors import SigningUnavailable
-    from keystore.signing.authority import spki
-    from keystore.signing.identity import public_half
-
-    try:
-        return spki(public_half(key_pem, "the enclave's key")) == facts.public_key
-    except SigningUnavailable:
-        return False
 
 
 def _permissions_stand(

@@ -19,12 +19,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keystore.disk import layout, lock, safe_files, store
-from keystore.disk.crl_file import crl_validity
+from keystore.disk.crl_file import crl_validity, load_crl, revoked_serials
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Link, Store
 from keystore.disk.superseded import serials_of
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput, printable
+from keystore.errors import InvalidInput, printable
 from keystore.formats import certificate
 from keystore.formats.der import DerError
 from keystore.formats.enclave_name import validate_enclave_name
@@ -34,7 +34,7 @@ from keystore.signing.authority import IdentityIssuer
 from keystore.signing.ca_access import CaAccess
 
 if TYPE_CHECKING:
-    from cryptography import x509
+    pass
 
 # Nobody fetches CRLs in a DDS system: a short life would buy nothing and risk an outage.
 CRL_LIFETIME = timedelta(days=365)
@@ -199,31 +199,6 @@ def drop_crl(opened: Store) -> None:
     for name in KeystoreView(opened.root).enclaves():
         opened.remove(f"{layout.enclave_directory(name)}/{layout.ENCLAVE_CRL}")
     opened.remove(layout.CRL)
-
-
-def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
-    """Serial -> date of revocation, from a CRL whose signature was checked; empty without one."""
-    if not view.has_crl:
-        return {}
-    crl = load_crl(view)
-    return {entry.serial_number: entry.revocation_date_utc for entry in crl}
-
-
-def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
-    """Raises DamagedKeystore when it is unreadable or not signed by the identity CA."""
-    from cryptography import x509
-    from cryptography.exceptions import UnsupportedAlgorithm
-
-    place = printable(view.root / layout.CRL)
-    try:
-        crl = x509.load_pem_x509_crl(safe_files.read(view.root, layout.CRL))
-        key = x509.load_der_x509_certificate(view.ca(Role.IDENTITY).der).public_key()
-        valid = crl.is_signature_valid(key)  # type: ignore[arg-type]
-    except (ValueError, TypeError, UnsupportedAlgorithm):
-        raise DamagedKeystore(f"{place} is no readable CRL; remove it and revoke again") from None
-    if not valid:
-        raise DamagedKeystore(f"{place} is not signed by the identity CA; remove it and revoke again")
-    return crl
 
 
 def _delete(opened: Store, name: str) -> None:

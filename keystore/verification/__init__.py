@@ -54,7 +54,7 @@ def verify(
 
 
 def _findings(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[Finding]:
-    from keystore.steps.revocation import revoked_serials
+    from keystore.disk.crl_file import revoked_serials
 
     yield from check_files(view.root)
     try:

@@ -16,9 +16,9 @@ from keystore.formats.governance import parse_governance
 from keystore.formats.role import Role
 from keystore.formats.validity import iso
 from keystore.signing import smime
+from keystore.signing.authority import check_can_serve
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import key_kind, signature_is_valid
-from keystore.steps.creation import check_can_serve
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
@@ -131,7 +131,7 @@ def check_governance(view: KeystoreView) -> Iterator[Finding]:
 
 
 def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:
-    from keystore.steps.revocation import load_crl
+    from keystore.disk.crl_file import load_crl
 
     try:
         load_crl(view)

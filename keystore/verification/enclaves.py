@@ -26,9 +26,9 @@ from keystore.formats.subject import (
 from keystore.formats.validity import LATEST, Validity, iso, parse_moment
 from keystore.signing import smime
 from keystore.signing.identity import public_half
+from keystore.signing.key_pair import key_matches
 from keystore.signing.public_key import key_kind
 from keystore.signing.signer import load_private_key
-from keystore.steps.enclave_state import key_matches
 from keystore.verification import repair
 from keystore.verification.authorities import CYCLONE_KINDS, issued_by
 from keystore.verification.finding import Finding, Severity
