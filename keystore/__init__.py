@@ -1,9 +1,13 @@
 """SROS2 keystores: certificates, governance, permissions, and the policy they follow.
 
-    policy.py ── permissions.py ─┐                            status, verify, export   look
-    governance.py ───────────────┼─ smime ── provisioning ──> store                    writes, alone
-    authority.py ── identity.py ─┘            ^ creation, renewal, rollover, revocation
+    verb/           the commands of secure-keystore
+    steps/          create, provision, renew, roll over, remove, export
+    verification/   what a reviewer would find
+    disk/           which file lies where, safe reading, and store.py: the only writer
+    signing/        CAs and their keys; certificates and signed documents
+    formats/        names, policy, permissions, governance, certificates as values. Pure
 
+Each room imports those below it, none above.
 The public functions below are loaded when first used, so that a launch imports only what its path needs:
 ``provision`` of a keystore in which nothing changed imports neither ``cryptography`` nor lxml, and where nothing was
 touched since it last looked (``standing``) it opens none of the keystore's files. The verbs of
