@@ -58,7 +58,7 @@ def evaluate_launch(
     Raises ``LaunchFileError`` as ``resolve``.
     """
     from enclave_launch.evaluation.evaluate import evaluate
-    from enclave_launch.evaluation.host import PlanHost
+    from enclave_launch.host.plan_host import PlanHost
 
     chosen = options or ResolveOptions()
     source = LaunchSource(
@@ -80,8 +80,8 @@ def evaluate_launch(
 
 def _missing_programs(evaluation: Evaluation) -> list[str]:
     """``run`` would refuse them. Placeholders of packages that are not installed have their own warning."""
-    from enclave_launch.evaluation.host import MISSING_PREFIX
     from enclave_launch.evaluation.programs import missing_programs
+    from enclave_launch.host.protocol import MISSING_PREFIX
 
     placeholders = f"{MISSING_PREFIX}/"
     real = [item for item in evaluation.processes if not "".join(item.cmd[:1]).startswith(placeholders)]

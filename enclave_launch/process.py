@@ -10,12 +10,12 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 
 UNSPECIFIED_NODE_NAME = "<node_name_unspecified>"
 UNSPECIFIED_NODE_NAMESPACE = "<node_namespace_unspecified>"
 
-ParameterValue = bool | int | float | str | bytes | tuple[bool | int | float | str | bytes, ...]
 ProcessKind = Literal["node", "lifecycle_node", "container", "executable"]
 
 

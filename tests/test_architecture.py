@@ -16,6 +16,33 @@ PACKAGES = ("enclave_launch", "nodl", "keystore")
 # Which of our packages a package may import; arrows point one way.
 ALLOWED = {"enclave_launch": {"nodl", "keystore"}, "nodl": set(), "keystore": set()}
 
+# The floors of enclave_launch, lowest first: a room imports its own modules and those of the floors below it.
+FLOORS = (
+    {"source_location"},
+    {"ros_rules"},
+    {"errors", "process"},
+    {"frontend", "host"},
+    {"description"},
+    {"evaluation"},
+    {"enclave", "policy"},
+    {"plan"},
+    {"interfaces", "options", "prefixes", "security_environment"},
+    {"report", "runtime"},
+    {"secured"},
+    {"running"},
+    {"flow"},
+    {"verb"},
+    {"ros2"},
+    {"__init__", "__main__"},
+)
+
+# Arrows that point up all the same: what a class of upstream's does only when it is used on its own, loaded then.
+UPWARD = {
+    ("description", "evaluation"),
+    ("description", "runtime"),
+    ("host", "description"),
+}
+
 # Stages of the flow that decide only: they may not import what acts.
 PURE = {
     "enclave_launch/enclave": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
@@ -48,6 +75,38 @@ def test_arrows_between_the_packages_point_one_way(package: str) -> None:
         for name in imports_of(path)
         if name.split(".")[0] in forbidden
     ]
+    assert wrong == []
+
+
+def room_of(module: str) -> str:
+    return module.split(".")[1]
+
+
+def runtime_imports_of(path: Path) -> Iterator[str]:
+    """As ``imports_of``, without what only the type checker reads."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+            node.body = []
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module == "enclave_launch":
+            yield from (f"enclave_launch.{alias.name}" for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+            yield node.module
+
+
+def test_each_room_of_enclave_launch_stands_on_the_rooms_below_it() -> None:
+    floor = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+    wrong = []
+    for path in sources("enclave_launch"):
+        room = path.relative_to(ROOT / "enclave_launch").with_suffix("").parts[0]
+        assert room in floor, f"{path} stands on no floor: name its room in FLOORS"
+        for name in runtime_imports_of(path):
+            if not name.startswith("enclave_launch.") or name == "enclave_launch.__version__":
+                continue
+            target = room_of(name)
+            if target != room and floor[target] >= floor[room] and (room, target) not in UPWARD:
+                wrong.append(f"{path.relative_to(ROOT)} imports {name}")
     assert wrong == []
 
 

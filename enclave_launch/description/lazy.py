@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from typing import Any
 
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 
 def lazy_names(
@@ -44,7 +44,7 @@ def lazy_names(
 def _available(gate: Feature | None) -> bool:
     if gate is None:
         return True
-    from enclave_launch.evaluation.host import current_release
+    from enclave_launch.host.current import current_release
 
     return current_release().has(gate)
 

@@ -1,7 +1,6 @@
-"""From launch files to processes: visiting a description, the seam to the world, events.
+"""From launch files to processes: visiting a description, the argument scan, events.
 
     frontend text / Python file -> description objects -> **evaluation** -> process.Evaluation
 
-``host`` is the only way out to the world, ``distro`` the table of what differs between ROS releases,
-``events`` the queue and handler rules that the dry run and the live runtime share.
+``events`` holds the queue and handler rules that the dry run and the live runtime share.
 """

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch.actions.declare_launch_argument import DeclareLaunchArgument
 from enclave_launch.description.launch.actions.include_launch_description import IncludeLaunchDescription
 from enclave_launch.description.launch.actions.reset_launch_configurations import ResetLaunchConfigurations
-from enclave_launch.evaluation.host import current_host
+from enclave_launch.host.current import current_host
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_description import LaunchDescription

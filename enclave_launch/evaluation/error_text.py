@@ -17,7 +17,7 @@ from enclave_launch.description.launch.conditions.invalid_condition_expression_e
 )
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.evaluation.arguments import MISSING_ARGUMENT, REQUIRED_ARGUMENT
-from enclave_launch.evaluation.host import MISSING_PREFIX
+from enclave_launch.host.protocol import MISSING_PREFIX
 from nodl.ament_index import PackageNotFoundError
 
 _OWN_PACKAGES = ("enclave_launch", "nodl", "keystore")

@@ -13,9 +13,11 @@ from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
-from enclave_launch.evaluation.environment import environment_untouched
-from enclave_launch.evaluation.host import Host, PlanHost, active_host
 from enclave_launch.evaluation.location import OUTSIDE, place_of
+from enclave_launch.host.current import active_host
+from enclave_launch.host.environment import environment_untouched
+from enclave_launch.host.plan_host import PlanHost
+from enclave_launch.host.protocol import Host
 from enclave_launch.process import Evaluation
 from enclave_launch.source_location import SourceLocation
 

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.event import Event
     from enclave_launch.description.launch.event_handler import BaseEventHandler
     from enclave_launch.description.launch.launch_context import LaunchContext
-    from enclave_launch.evaluation.host import PlanHost
+    from enclave_launch.host.plan_host import PlanHost
 
 
 class Explorer:

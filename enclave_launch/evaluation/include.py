@@ -6,7 +6,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.evaluation.loading import CyclicIncludeError
+from enclave_launch.host.loading import CyclicIncludeError
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.actions.include_launch_description import (

@@ -14,9 +14,10 @@ from collections.abc import Iterable, Mapping
 from typing import Literal, NamedTuple
 
 from enclave_launch.errors import LaunchFileError
-from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.policy.program_inputs import ProgramInputs, program_inputs
-from enclave_launch.process import ParameterValue, RemapRule, ResolvedComponent, ResolvedProcess
+from enclave_launch.process import RemapRule, ResolvedComponent, ResolvedProcess
+from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
 from nodl.node_interface import NodeInterface

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from enclave_launch.plan import LaunchPlan
-from enclave_launch.process import ParameterValue
+from enclave_launch.ros_rules.parameter_value import ParameterValue
 
 
 def params_yaml(plan: LaunchPlan) -> str:

@@ -7,7 +7,8 @@ from collections.abc import Iterable, Mapping
 
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
-from enclave_launch.process import ParameterValue, RemapRule
+from enclave_launch.process import RemapRule
+from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
 from keystore.formats.policy import EnclavePolicy, Qualifier
 

@@ -46,7 +46,7 @@ class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
         return cls, kwargs
 
     def execute(self, context: Any) -> None:
-        from enclave_launch.evaluation.namespaces import push_enclave_scope
+        from enclave_launch.ros_rules.namespaces import push_enclave_scope
 
         push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.enclave))
 
@@ -58,7 +58,7 @@ def enclave_attribute(action: Any, context: Any) -> str | None:
 
 
 def scope_in_force(context: Any) -> str | None:
-    from enclave_launch.evaluation.namespaces import enclave_scope
+    from enclave_launch.ros_rules.namespaces import enclave_scope
 
     return enclave_scope(context.launch_configurations)
 
@@ -157,7 +157,7 @@ def _pushing_enclave_scope(execute: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(execute)
     def wrapped(self: Any, context: Any) -> Any:
         if session_of(context) is not None:  # else nobody asks for the scope
-            from enclave_launch.evaluation.namespaces import push_enclave_scope
+            from enclave_launch.ros_rules.namespaces import push_enclave_scope
 
             enclave = enclave_attribute(self, context)
             namespace = perform_substitutions(context, self.namespace)

@@ -14,8 +14,6 @@ from launch.descriptions import executable as executable_description
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
 from enclave_launch.description.launch.actions.execute_local import first_word
-from enclave_launch.evaluation.rcl_parameters import resolve_parameters
-from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
     UNSPECIFIED_NODE_NAMESPACE,
@@ -26,6 +24,8 @@ from enclave_launch.process import (
     ResolvedProcess,
 )
 from enclave_launch.ros2.attributes import enclave_attribute, scope_in_force
+from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.source_location import SourceLocation
 
 

@@ -19,13 +19,13 @@ from launch.actions import OpaqueFunction, SetEnvironmentVariable, UnsetEnvironm
 
 from enclave_launch import flow
 from enclave_launch.errors import UsageError
-from enclave_launch.evaluation.distro import choose_release
 from enclave_launch.interfaces import InterfaceFinder
 from enclave_launch.options import ResolveOptions, SecurityOptions
 from enclave_launch.plan import LaunchSource, Planner
 from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
 from enclave_launch.ros2.session import EnclaveSession, OpenDoor
+from enclave_launch.ros_rules.distro import choose_release
 from enclave_launch.secured import ProvisionedLaunch
 from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY, SecuritySettings
 from nodl.ament_index import search_prefixes

@@ -12,8 +12,8 @@ from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from enclave_launch.errors import RuntimeFailure
-from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 
 
 class Grant(NamedTuple):

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.errors import EnclaveLaunchError
-from enclave_launch.evaluation.host import BaseHost
+from enclave_launch.host.base_host import BaseHost
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
 from enclave_launch.runtime.gate import EnclaveGate, Grant
 from enclave_launch.runtime.launch_log import LaunchLog

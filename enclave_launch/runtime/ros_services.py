@@ -18,7 +18,8 @@ from typing import Any
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.launcher import LAUNCHER_NODE
-from enclave_launch.process import ParameterValue, ResolvedComponent
+from enclave_launch.process import ResolvedComponent
+from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.runtime.gate import Grant
 from enclave_launch.runtime.launch_log import Level
 

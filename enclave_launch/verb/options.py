@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-from enclave_launch.evaluation.distro import Distro
+from enclave_launch.ros_rules.distro import Distro
 
 DESCRIPTION = """\
 Launch a ROS 2 launch file (XML, YAML or Python), with or without ROS installed.

@@ -123,7 +123,7 @@ def _check_pattern(pattern: str | None) -> None:
 
 def _show_file(target: Target, options: argparse.Namespace) -> int:
     from enclave_launch.evaluation.evaluate import read_description
-    from enclave_launch.evaluation.host import PlanHost
+    from enclave_launch.host.plan_host import PlanHost
     from enclave_launch.report.launch_file import arguments_text, description_text
 
     text = arguments_text if options.show_args else description_text

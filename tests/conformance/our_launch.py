@@ -9,8 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate, parse_arguments
-from enclave_launch.evaluation.host import PlanHost
 from enclave_launch.frontend.error_location import likeliest
+from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.process import Evaluation, RemapRule, ResolvedComponent, ResolvedProcess
 
 from . import case_files

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 
 from enclave_launch.description.launch.frontend.parse_substitution import parse_substitution
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate
-from enclave_launch.evaluation.host import PlanHost
 from enclave_launch.frontend.error_location import likeliest
+from enclave_launch.host.plan_host import PlanHost
 
 Action = tuple[str, Mapping[str, Any], list[Any]]  # tag, attributes, child actions
 

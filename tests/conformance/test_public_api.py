@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from enclave_launch.evaluation.evaluate import evaluation_surroundings
-from enclave_launch.evaluation.host import PlanHost
+from enclave_launch.host.plan_host import PlanHost
 
 from . import public_api
 from .case_files import DISTROS

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate
-from enclave_launch.evaluation.host import PlanHost, active_host
+from enclave_launch.host.current import active_host
+from enclave_launch.host.plan_host import PlanHost
 
 
 @pytest.mark.parametrize(

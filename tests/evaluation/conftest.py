@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from enclave_launch.evaluation.evaluate import evaluate, parse_arguments
-from enclave_launch.evaluation.host import PlanHost
+from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.process import Evaluation
 
 Launch = Callable[..., Evaluation]

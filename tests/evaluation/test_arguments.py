@@ -14,7 +14,7 @@ from enclave_launch.evaluation.evaluate import (
     evaluation_surroundings,
     top_description,
 )
-from enclave_launch.evaluation.host import PlanHost
+from enclave_launch.host.plan_host import PlanHost
 
 
 @pytest.fixture

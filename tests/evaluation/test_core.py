@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from enclave_launch.description.launch.event import Event
 from enclave_launch.description.launch.event_handler import EventHandler
-from enclave_launch.evaluation.distro import Distro, Feature, choose_release, release_of
-from enclave_launch.evaluation.environment import Environment, environment_untouched
 from enclave_launch.evaluation.events import HandlerTable, chain
-from enclave_launch.evaluation.virtual_loop import VirtualLoop
+from enclave_launch.host.environment import Environment, environment_untouched
+from enclave_launch.host.virtual_loop import VirtualLoop
+from enclave_launch.ros_rules.distro import Distro, Feature, choose_release, release_of
 
 NAMES = st.text("ABC", min_size=1, max_size=2).map(lambda name: f"ENCLAVE_LAUNCH_TEST_{name}")
 

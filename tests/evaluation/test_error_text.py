@@ -9,7 +9,7 @@ import pytest
 
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.evaluation.evaluate import evaluate
-from enclave_launch.evaluation.host import PlanHost
+from enclave_launch.host.plan_host import PlanHost
 
 XML = "<launch>\n{}\n</launch>\n"
 

@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate, parse_arguments
-from enclave_launch.evaluation.host import PlanHost
+from enclave_launch.host.plan_host import PlanHost
 
 
 def test_an_error_tells_file_line_element_and_the_include_chain(files: Callable[..., Path]) -> None:

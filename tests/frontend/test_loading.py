@@ -21,8 +21,9 @@ from enclave_launch.description.launch.launch_description_sources import (
 )
 from enclave_launch.description.launch_xml.launch_description_sources import XMLLaunchDescriptionSource
 from enclave_launch.description.launch_yaml.launch_description_sources import YAMLLaunchDescriptionSource
-from enclave_launch.evaluation.host import PlanHost, active_host
 from enclave_launch.frontend.error_location import likeliest, location_of
+from enclave_launch.host.current import active_host
+from enclave_launch.host.plan_host import PlanHost
 
 XML = '<launch>\n  <let name="a" value="b"/>\n</launch>'
 YAML = "launch:\n- let: {name: a, value: b}\n"

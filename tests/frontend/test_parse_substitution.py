@@ -21,8 +21,9 @@ from enclave_launch.description.launch.substitutions.launch_configuration import
 from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
 from enclave_launch.description.launch.substitutions.this_launch_file_dir import ThisLaunchFileDir
 from enclave_launch.description.launch.utilities import perform_substitutions
-from enclave_launch.evaluation.host import PlanHost, active_host
 from enclave_launch.frontend.substitution_grammar import UnexpectedCharacters, VisitError
+from enclave_launch.host.current import active_host
+from enclave_launch.host.plan_host import PlanHost
 
 
 class Shout(Substitution):

@@ -10,7 +10,8 @@ from enclave_launch.description.launch.launch_context import LaunchContext
 from enclave_launch.description.launch.substitutions.launch_configuration import LaunchConfiguration
 from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
 from enclave_launch.description.launch.utilities import type_utils as tu
-from enclave_launch.evaluation.host import PlanHost, active_host
+from enclave_launch.host.current import active_host
+from enclave_launch.host.plan_host import PlanHost
 
 COERCED: list[tuple[str, Any, Any]] = [
     ("text", str, "text"),

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.evaluation.evaluate import evaluate
-from enclave_launch.evaluation.host import PlanHost
+from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.process import Evaluation
 from nodl.ament_index import INDEX_FOLDER
 

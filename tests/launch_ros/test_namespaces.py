@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.evaluation.namespaces import (
+from enclave_launch.ros_rules.namespaces import (
     ENCLAVE_SCOPE,
     NAMESPACE,
     enclave_scope,

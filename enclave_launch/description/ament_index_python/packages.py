@@ -7,7 +7,7 @@ import pathlib
 import warnings
 
 from enclave_launch.description.ament_index_python.resources import get_resources
-from enclave_launch.evaluation.host import current_host
+from enclave_launch.host.current import current_host
 from nodl.ament_index import PackageNotFoundError as PackageNotFoundError
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enclave_launch.evaluation.host import current_host
+from enclave_launch.host.current import current_host
 from nodl.ament_index import PREFIX_VARIABLE
 
 

@@ -4,7 +4,7 @@ API of upstream's package of this name; see ``enclave_launch.description``.
 """
 
 from enclave_launch.description.lazy import lazy_names
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 __getattr__, __dir__ = lazy_names(
     __name__,

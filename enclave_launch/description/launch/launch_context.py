@@ -6,9 +6,10 @@ import os
 from collections.abc import Iterable, MutableMapping
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.evaluation.environment import Environment
 from enclave_launch.evaluation.events import EventQueue, HandlerTable
-from enclave_launch.evaluation.host import Host, current_host
+from enclave_launch.host.current import current_host
+from enclave_launch.host.environment import Environment
+from enclave_launch.host.protocol import Host
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.event import Event

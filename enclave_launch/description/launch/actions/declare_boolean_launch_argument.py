@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch.action import Action
 from enclave_launch.description.launch.actions.declare_launch_argument import DeclareLaunchArgument
 from enclave_launch.description.launch.frontend.expose import expose_action
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.frontend.entity import Entity

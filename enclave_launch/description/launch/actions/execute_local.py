@@ -16,10 +16,10 @@ from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.evaluation.environment import changed
 from enclave_launch.evaluation.location import location_of
-from enclave_launch.evaluation.namespaces import enclave_scope
+from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess
+from enclave_launch.ros_rules.namespaces import enclave_scope
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.descriptions.executable import Executable

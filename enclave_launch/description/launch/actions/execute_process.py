@@ -14,14 +14,14 @@ from enclave_launch.description.launch.descriptions.executable import Executable
 from enclave_launch.description.launch.frontend.entity import Entity
 from enclave_launch.description.launch.frontend.expose import expose_action
 from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.frontend.parser import Parser
     from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
     from enclave_launch.description.launch.substitution import Substitution
-    from enclave_launch.evaluation.distro import Release
+    from enclave_launch.ros_rules.distro import Release
 
 
 @expose_action("executable")

@@ -10,8 +10,8 @@ from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.frontend.entity import Entity

@@ -17,7 +17,7 @@ from enclave_launch.description.launch.utilities.type_utils import (
     normalize_typed_substitution,
     perform_typed_substitution,
 )
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.event import Event

@@ -12,9 +12,9 @@ import inspect
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
 from enclave_launch.frontend import error_location, extensions
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.action import Action

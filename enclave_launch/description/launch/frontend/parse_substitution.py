@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.launch.frontend import expose
 from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
-from enclave_launch.evaluation.host import current_release
 from enclave_launch.frontend.substitution_grammar import (
     Call,
     Template,
@@ -20,10 +19,11 @@ from enclave_launch.frontend.substitution_grammar import (
     parse_template,
     unescape,
 )
+from enclave_launch.host.current import current_release
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.substitution import Substitution
-    from enclave_launch.evaluation.distro import Release
+    from enclave_launch.ros_rules.distro import Release
 
 MAX_SHARED_LENGTH = 1024  # characters; longer texts are whole files, parsed once anyway
 _shared_for: Release | None = None  # the release whose registered names the kept results used

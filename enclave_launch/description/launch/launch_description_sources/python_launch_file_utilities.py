@@ -5,8 +5,8 @@ from __future__ import annotations
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from enclave_launch.evaluation.host import current_host
 from enclave_launch.frontend import error_location, python_file
+from enclave_launch.host.current import current_host
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_description import LaunchDescription

@@ -1,7 +1,7 @@
 """``launch.substitutions``. ``TAGS``: the module that registers each ``$(name ...)``."""
 
 from enclave_launch.description.lazy import lazy_names
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 __getattr__, __dir__ = lazy_names(
     __name__,

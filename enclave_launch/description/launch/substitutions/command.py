@@ -17,7 +17,7 @@ from enclave_launch.description.launch.utilities import (
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
     from enclave_launch.description.launch.some_substitutions_type import SomeSubstitutionsType
-    from enclave_launch.evaluation.host import CommandResult
+    from enclave_launch.host.protocol import CommandResult
 
 _MODES = ("fail", "ignore", "warn", "capture")
 

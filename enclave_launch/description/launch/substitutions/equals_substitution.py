@@ -13,7 +13,7 @@ from enclave_launch.description.launch.utilities import (
     perform_substitutions,
 )
 from enclave_launch.description.launch.utilities.type_utils import is_substitution
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext

@@ -12,7 +12,7 @@ from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.launch.frontend.expose import expose_substitution
 from enclave_launch.description.launch.substitution import Substitution
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch.frontend.expose import expose_substitution
 from enclave_launch.description.launch.substitution import Substitution
 from enclave_launch.description.launch.utilities import normalize_to_list_of_substitutions
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
 from enclave_launch.description.launch.substitution import Substitution
 from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     import pathlib

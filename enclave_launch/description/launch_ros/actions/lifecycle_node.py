@@ -10,10 +10,10 @@ from enclave_launch.description.launch.event_handler import EventHandler
 from enclave_launch.description.launch.frontend import Entity, Parser, expose_action
 from enclave_launch.description.launch_ros.actions.node import Node
 from enclave_launch.description.launch_ros.events.lifecycle.change_state import ChangeState
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
 from enclave_launch.evaluation.location import location_of
+from enclave_launch.host.current import current_release
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, LauncherCall, ProcessKind
+from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext

@@ -39,9 +39,10 @@ from enclave_launch.description.launch_ros.utilities.normalize_parameters import
 from enclave_launch.description.launch_ros.utilities.remap_rules import performed_remaps, placed
 from enclave_launch.description.launch_ros.utilities.to_parameters_list import to_parameters_list
 from enclave_launch.description.launch_ros.utilities.track_node_names import warn_about_repeats
-from enclave_launch.evaluation.distro import Feature
 from enclave_launch.evaluation.location import location_of
-from enclave_launch.process import LauncherCall, ParameterValue, RemapRule, ResolvedComponent
+from enclave_launch.process import LauncherCall, RemapRule, ResolvedComponent
+from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 
 _LOAD_NODE = "composition_interfaces/srv/LoadNode"

@@ -30,9 +30,9 @@ from enclave_launch.description.launch_ros.utilities.remap_rules import (
     placed,
 )
 from enclave_launch.description.launch_ros.utilities.track_node_names import warn_about_repeats
-from enclave_launch.evaluation.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
-from enclave_launch.evaluation.ros_arguments import parse_ros_arguments
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, ProcessKind
+from enclave_launch.ros_rules.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext

@@ -16,7 +16,7 @@ from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.evaluation.namespaces import push_enclave_scope
+from enclave_launch.ros_rules.namespaces import push_enclave_scope
 
 
 @expose_action("push_ros_enclave")

@@ -14,7 +14,7 @@ from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.evaluation.namespaces import (
+from enclave_launch.ros_rules.namespaces import (
     make_namespace_absolute,
     prefix_namespace,
     push_enclave_scope,

@@ -12,7 +12,7 @@ from enclave_launch.description.launch.utilities.type_utils import (
     normalize_typed_substitution,
     perform_typed_substitution,
 )
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 
 @expose_action("set_use_sim_time")

@@ -3,7 +3,7 @@
 from typing import Any
 
 from enclave_launch.description.lazy import lazy_names
-from enclave_launch.evaluation.distro import Feature
+from enclave_launch.ros_rules.distro import Feature
 
 from ..parameter_descriptions import Parameter as Parameter
 from ..parameter_descriptions import ParameterFile as ParameterFile

@@ -6,8 +6,8 @@ from typing import Any
 
 from enclave_launch.description.launch.frontend import Entity, Parser
 from enclave_launch.description.launch_ros.descriptions.composable_node import ComposableNode
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
 
 
 class ComposableLifecycleNode(ComposableNode):

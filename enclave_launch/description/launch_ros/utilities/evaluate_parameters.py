@@ -20,8 +20,8 @@ from enclave_launch.description.launch_ros.parameters_type import (
     ParametersDict,
 )
 from enclave_launch.description.launch_ros.utilities import yaml_text
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
 
 _SCALARS = (bool, int, float, str)
 

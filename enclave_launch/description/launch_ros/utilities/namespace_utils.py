@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from enclave_launch.evaluation.namespaces import make_namespace_absolute as make_namespace_absolute
-from enclave_launch.evaluation.namespaces import prefix_namespace as prefix_namespace
+from enclave_launch.ros_rules.namespaces import make_namespace_absolute as make_namespace_absolute
+from enclave_launch.ros_rules.namespaces import prefix_namespace as prefix_namespace
 
 
 def is_root_namespace(ns: str) -> bool:

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch_ros.parameter_descriptions import Parameter
 from enclave_launch.description.launch_ros.utilities import yaml_text
 from enclave_launch.description.launch_ros.utilities.evaluate_parameters import evaluate_parameters
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.rcl_parameters import Section, as_rcl_reads, resolve_parameters
-from enclave_launch.evaluation.ros_arguments import ParameterFile, ParameterRule
-from enclave_launch.process import ParameterValue
+from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.ros_rules.rcl_parameters import Section, as_rcl_reads, resolve_parameters
+from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext

@@ -18,9 +18,9 @@ from enclave_launch.description.launch_ros.parameters_type import EvaluatedParam
 from enclave_launch.description.launch_ros.utilities import yaml_text
 from enclave_launch.description.launch_ros.utilities.evaluate_parameters import evaluate_parameter_dict
 from enclave_launch.description.launch_ros.utilities.normalize_parameters import normalize_parameter_dict
-from enclave_launch.evaluation.distro import Feature
-from enclave_launch.evaluation.host import current_release
-from enclave_launch.evaluation.rcl_parameters import section_applies
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.rcl_parameters import section_applies
 
 _NO_NAME = "node name not provided to launch; parameter files will not apply"
 

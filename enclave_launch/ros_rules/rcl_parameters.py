@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from enclave_launch.evaluation.ros_arguments import ParameterFile, ParameterRule
-from enclave_launch.process import ParameterValue
+from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
 
 Section = Mapping[str, ParameterValue]
 Generated = Callable[[str], Mapping[str, Section] | None]

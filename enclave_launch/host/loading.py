@@ -10,7 +10,7 @@ import os
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from enclave_launch.evaluation.environment import environment_snapshot
+from enclave_launch.host.environment import environment_snapshot
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_description import LaunchDescription

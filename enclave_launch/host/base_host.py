@@ -1,0 +1,141 @@
+"""What a dry run and a live run have in common: reading the ament index, running commands, warnings."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult
+from enclave_launch.ros_rules.distro import choose_release
+from nodl import ament_index
+
+if TYPE_CHECKING:
+    from enclave_launch.host.loading import LoadCache
+
+
+class BaseHost:
+    """What a dry run and a live run have in common: reading the ament index, running commands, warnings."""
+
+    def __init__(
+        self,
+        *,
+        distro: str | None = None,
+        allow_missing_packages: bool = False,
+        no_python: bool = False,
+        anonymous_seed: int | None = None,
+    ) -> None:
+        self.release = choose_release(distro, os.environ.get("ROS_DISTRO"), ament_index.search_prefixes())
+        self.allow_missing_packages = allow_missing_packages
+        self.no_python = no_python
+        self.warnings: list[str] = []
+        self._warned: set[str] = set()
+        self._process_count = 0
+        self._anonymous_seed = anonymous_seed
+        self._anonymous_random: Any = None
+        self._loads: LoadCache | None = None
+        self._prefix_cache: dict[tuple[str, str], str] = {}
+        self._executable_cache: dict[tuple[str, str, str], str] = {}
+
+    @property
+    def loads(self) -> LoadCache:
+        if self._loads is None:
+            from enclave_launch.host.loading import LoadCache
+
+            self._loads = LoadCache()
+        return self._loads
+
+    def prefixes(self) -> tuple[str, ...]:
+        return ament_index.search_prefixes()
+
+    def find_package_prefix(self, package: str) -> str:
+        key = (package, os.environ.get("AMENT_PREFIX_PATH", ""))
+        known = self._prefix_cache.get(key)
+        if known is None:
+            known = self._prefix_cache[key] = self._find_package_prefix(package)
+        return known
+
+    def _find_package_prefix(self, package: str) -> str:
+        try:
+            return ament_index.package_prefix(package, self.prefixes())
+        except ament_index.PackageNotFoundError:
+            if not self.allow_missing_packages:
+                raise
+        self.warn(f"package '{package}' is not installed; using {MISSING_PREFIX}/{package} in its place")
+        return f"{MISSING_PREFIX}/{package}"
+
+    def find_executable(self, package: str, executable: str) -> str:
+        prefix = self.find_package_prefix(package)
+        key = (prefix, package, executable)
+        known = self._executable_cache.get(key)
+        if known is None:
+            known = self._executable_cache[key] = self._find_executable(prefix, package, executable)
+        return known
+
+    def _find_executable(self, prefix: str, package: str, executable: str) -> str:
+        if self.is_missing(prefix):
+            return os.path.join(prefix, "lib", package, executable)
+        return ament_index.executable_path(package, executable, [prefix])
+
+    def is_missing(self, path: str) -> bool:
+        return self.allow_missing_packages and path.startswith(f"{MISSING_PREFIX}/")
+
+    def find_program(self, name: str) -> str | None:
+        import shutil
+
+        found = shutil.which(name)
+        if found is None and self.allow_missing_packages:
+            return f"{MISSING_PREFIX}/bin/{name}"
+        return found
+
+    def run_command(self, command: Sequence[str], *, merge_stderr: bool = False) -> CommandResult:
+        """With ``--allow-missing-packages`` a program that is not there "writes" a marked placeholder."""
+        if self.allow_missing_packages and command:
+            import shutil
+
+            if shutil.which(command[0]) is None:
+                program = os.path.basename(command[0])
+                self.warn(
+                    f"program '{program}' is not installed; a placeholder stands for what it would write"
+                )
+                return CommandResult(0, f"<output of {program}, which is not installed>", "")
+        return self._run_command(command, merge_stderr)
+
+    def _run_command(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
+        import subprocess
+
+        result = subprocess.run(
+            list(command),
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT if merge_stderr else subprocess.PIPE,
+            text=True,
+            check=False,
+        )
+        return CommandResult(result.returncode, result.stdout, result.stderr or "")
+
+    def next_process_index(self) -> int:
+        self._process_count += 1
+        return self._process_count
+
+    def warn(self, text: str) -> None:
+        if text not in self._warned:
+            self._warned.add(text)
+            self.warnings.append(text)
+
+    def anonymous_name(self, name: str) -> str:
+        """``name_host_pid_random``. Two hosts with the same seed give the same names in the same order, so
+        that a live run has the names of the plan it follows."""
+        import random
+        import socket
+
+        if self._anonymous_random is None:
+            self._anonymous_random = random.Random(self._anonymous_seed)
+        number = self._anonymous_random.randint(0, sys.maxsize)
+        full = f"{name}_{socket.gethostname()}_{os.getpid()}_{number}"
+        return full.translate(str.maketrans("-.:", "___"))
+
+    def log_directory(self) -> str:
+        from enclave_launch.description.launch.logging import launch_config
+
+        return launch_config.log_dir

@@ -1,0 +1,40 @@
+"""The host of the evaluation in progress."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from enclave_launch.host.protocol import Host
+    from enclave_launch.ros_rules.distro import Release
+
+_current: ContextVar[Host | None] = ContextVar("enclave_launch_host", default=None)
+
+
+def current_host() -> Host:
+    """The host of the evaluation in progress; where none is, a fresh dry-run host (library use of the classes)."""
+    host = _current.get()
+    if host is None:
+        from enclave_launch.host.plan_host import PlanHost
+
+        host = PlanHost()
+        _current.set(host)
+    return host
+
+
+def current_release() -> Release:
+    """The release that parsing and construction follow; execution asks ``context.host.release``."""
+    return current_host().release
+
+
+@contextmanager
+def active_host(host: Host) -> Iterator[Host]:
+    """Make ``host`` the current one within the block; nests."""
+    token = _current.set(host)
+    try:
+        yield host
+    finally:
+        _current.reset(token)

@@ -1,0 +1,66 @@
+"""The dry run's world."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.host.base_host import BaseHost
+from enclave_launch.host.virtual_loop import VirtualLoop
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
+    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.launch_ros.actions.lifecycle_node import LifecycleNode
+    from enclave_launch.host.protocol import Completion
+    from enclave_launch.process import (
+        LauncherCall,
+        ResolvedComponent,
+        ResolvedProcess,
+        Unforeseeable,
+    )
+
+
+class PlanHost(BaseHost):
+    """The dry run's world: everything is recorded, nothing is started or written."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self.processes: list[ResolvedProcess] = []
+        self.started: list[ExecuteLocal] = []  # action of each process, same order
+        self.components: list[ResolvedComponent] = []
+        self.calls: list[LauncherCall] = []
+        self.unforeseen: list[Unforeseeable] = []
+        self.parameter_files: dict[str, str] = {}
+        self._loop = VirtualLoop()
+
+    @property
+    def loop(self) -> VirtualLoop:
+        return self._loop
+
+    def write_parameter_file(self, text: str) -> str:
+        path = f"<params:{len(self.parameter_files) + 1}>"
+        self.parameter_files[path] = text
+        return path
+
+    def parameter_file(self, path: str) -> str | None:
+        return self.parameter_files.get(path)
+
+    def start_process(
+        self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext
+    ) -> Completion | None:
+        self.processes.append(process)
+        self.started.append(action)
+        return self._loop.create_future()
+
+    def load_components(self, components: Sequence[ResolvedComponent], context: LaunchContext) -> None:
+        self.components.extend(components)
+
+    def launcher_call(self, call: LauncherCall) -> None:
+        self.calls.append(call)
+
+    def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
+        """Nothing is started in a dry run, so nothing changes its state."""
+
+    def unforeseeable(self, item: Unforeseeable) -> None:
+        self.unforeseen.append(item)
