@@ -20,6 +20,7 @@ PACKAGE_DATA = {
     "enclave_launch": ["py.typed"],
     "nodl": ["py.typed", "schemas/*"],
     "keystore": ["py.typed", "schemas/*"],
+    "boundary": ["py.typed"],
 }
 ENTRY_POINTS = {
     "console_scripts": [
@@ -43,7 +44,7 @@ else:
     setuptools.setup(
         name=NAME,
         version=VERSION,
-        packages=setuptools.find_packages(include=["enclave_launch*", "nodl*", "keystore*"]),
+        packages=setuptools.find_packages(include=["enclave_launch*", "nodl*", "keystore*", "boundary*"]),
         package_data=PACKAGE_DATA,
         data_files=DATA_FILES,
         python_requires=">=3.10",

@@ -20,7 +20,7 @@ from enclave_launch.evaluation.arguments import MISSING_ARGUMENT, REQUIRED_ARGUM
 from enclave_launch.host.protocol import MISSING_PREFIX
 from nodl.ament_index import PackageNotFoundError
 
-_OWN_PACKAGES = ("enclave_launch", "nodl", "keystore")
+_OWN_PACKAGES = ("enclave_launch", "nodl", "keystore", "boundary")
 
 _TYPE = re.compile(r"'<class '(\w+)'>'")  # upstream's "of type '<class 'str'>'"
 

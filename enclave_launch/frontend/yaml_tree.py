@@ -7,7 +7,6 @@ whose aliases stand for an excessive number of values, or that nests excessively
 
 from __future__ import annotations
 
-import contextlib
 import re
 from collections.abc import Generator
 from dataclasses import dataclass, field
@@ -15,19 +14,15 @@ from typing import Any
 
 import yaml
 
-MAX_NESTING = 250  # upstream's recursion ends at about this depth
-MAX_EXPANDED_NODES = 4_000_000  # values in a document once each alias is written out
+from boundary.yaml_nodes import RefusedYaml, SafeLoader, refuse_deep_nesting, refuse_many_aliases
 
-_SafeLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_CParser: Any = getattr(yaml, "CLoader", yaml.Loader)
+MAX_CHARACTERS = 8_000_000  # libyaml and PyYAML together take some ten seconds for each million
+MAX_SLOW_CHARACTERS = 500_000  # of a text that only PyYAML's own scanner can read, at a third of that speed
+
 # Where libyaml reads otherwise, found by fuzzing: trailing tab, lone tag, "?" in flow context, mark inside.
 _LIBYAML_DIFFERS = re.compile(r"[\t!?\ufeff]")
 # Surely no part of a text whose quotes end in the same line.
 _COMMENT = re.compile(r"(?:^|\s)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
-
-
-class RefusedYaml(ValueError):
-    """Well-formed, but made to exhaust memory or the stack."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,10 +35,21 @@ class YamlDocument:
 
 def parse_yaml(text: str) -> YamlDocument:
     """Text -> its one document (``None`` when empty). Raises ``yaml.YAMLError`` or ``RefusedYaml``."""
-    _refuse_deep_nesting(text)
+    if len(text) > MAX_CHARACTERS:
+        raise RefusedYaml(f"the text has more than {MAX_CHARACTERS} characters")
+    refuse_deep_nesting(text)
     if not (_LIBYAML_DIFFERS.search(text) and _LIBYAML_DIFFERS.search(_COMMENT.sub("", text))):
-        with contextlib.suppress(yaml.YAMLError):
-            return _load(text, _SafeLoader)
+        try:
+            return _load(text, SafeLoader)
+        except RefusedYaml:
+            raise
+        except yaml.YAMLError:
+            if len(text) > MAX_SLOW_CHARACTERS:
+                raise
+    if len(text) > MAX_SLOW_CHARACTERS:
+        raise RefusedYaml(
+            f"a text with tabs, '!' or '?' outside of comments has more than {MAX_SLOW_CHARACTERS} characters"
+        )
     return _load(text, yaml.SafeLoader)
 
 
@@ -54,7 +60,7 @@ def _load(text: str, base: Any) -> YamlDocument:
         if node is None:
             return YamlDocument(None, {})
         if "*" in text and "&" in text:
-            _refuse_many_aliases(node)
+            refuse_many_aliases(node)
         return YamlDocument(loader.construct_document(node), loader.lines)
     finally:
         loader.dispose()
@@ -88,56 +94,3 @@ def _with_lines(base: Any) -> Any:
 
 
 _loaders: dict[Any, Any] = {}
-
-
-def _refuse_many_aliases(root: Any) -> None:
-    """Count the nodes of the document with every alias written out; each distinct node is visited once."""
-    sizes: dict[int, int] = {}
-    pending = [root]
-    while pending:
-        node = pending[-1]
-        parts = _parts(node)
-        if id(node) not in sizes:
-            sizes[id(node)] = _UNFINISHED
-            pending += [part for part in parts if _is_unsized(part, sizes)]
-            continue
-        pending.pop()
-        if sizes[id(node)] == _UNFINISHED:
-            sizes[id(node)] = 1 + sum(sizes[id(part)] for part in parts)
-    if sizes[id(root)] > MAX_EXPANDED_NODES:
-        raise RefusedYaml(f"aliases stand for more than {MAX_EXPANDED_NODES} values")
-
-
-_UNFINISHED = 0  # size of a node whose parts are being counted
-
-
-def _is_unsized(node: Any, sizes: dict[int, int]) -> bool:
-    size = sizes.get(id(node))
-    if size == _UNFINISHED:
-        raise RefusedYaml(f"a value contains itself: line {node.start_mark.line + 1}")
-    return size is None
-
-
-def _parts(node: Any) -> list[Any]:
-    if isinstance(node, yaml.MappingNode):
-        return [part for pair in node.value for part in pair]
-    return node.value if isinstance(node, yaml.SequenceNode) else []
-
-
-def _refuse_deep_nesting(text: str) -> None:
-    """Libyaml's loader would overflow the C stack; events are read without recursion."""
-    # A block inside a block begins further to the right, a flow inside a flow after one more bracket.
-    longest_line = max(map(len, text.splitlines()), default=0)
-    if longest_line <= MAX_NESTING and text.count("[") + text.count("{") <= MAX_NESTING:
-        return
-    depth = 0
-    try:
-        for event in yaml.parse(text, Loader=_CParser):
-            if isinstance(event, yaml.CollectionStartEvent):
-                depth += 1
-                if depth > MAX_NESTING:
-                    raise RefusedYaml(f"values are nested more than {MAX_NESTING} deep")
-            elif isinstance(event, yaml.CollectionEndEvent):
-                depth -= 1
-    except yaml.YAMLError:
-        pass  # the loader meets the same error and reports it

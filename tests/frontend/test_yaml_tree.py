@@ -9,7 +9,8 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.frontend.yaml_tree import MAX_NESTING, RefusedYaml, parse_yaml
+from boundary.yaml_nodes import MAX_NESTING, RefusedYaml
+from enclave_launch.frontend.yaml_tree import parse_yaml
 
 
 def test_mappings_and_lists_know_their_lines() -> None:

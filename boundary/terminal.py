@@ -1,0 +1,89 @@
+"""Text that others chose (names, arguments, file names, foreign sources) -> text that is safe on a terminal.
+
+Control characters move the cursor, set the title or answer on the person's behalf; bidirectional marks show a name in
+another order than it is compared in. Both are written as escapes. What Unicode does not count as printable is such a
+character (``str.isprintable``); a blank is printable, other spaces are not.
+
+Machine formats use escapes of their own: ``json_text`` here, quoted scalars in YAML.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from os import PathLike
+from typing import Any, TextIO, cast
+
+_PERHAPS_UNSAFE = re.compile(r"[^ -~\n\t]")
+
+
+def printable(text: str) -> str:
+    """``text`` for use within a line: everything that is not printable escaped, line ends too."""
+    return text if text.isprintable() else "".join(map(_escaped, text))
+
+
+def printable_lines(text: str) -> str:
+    """``text`` of several lines: line ends and tabs stay, everything else that is not printable is escaped."""
+    return _PERHAPS_UNSAFE.sub(lambda match: _escaped(match[0]), text)
+
+
+def quoted(text: str | PathLike[str]) -> str:
+    """``text`` in quotes, as it is or as a Python literal where it holds a quote or is not printable."""
+    plain = str(text)
+    return f"'{plain}'" if plain.isprintable() and "'" not in plain else repr(plain)
+
+
+def json_text(content: object, **options: Any) -> str:
+    """``json.dumps``; readable characters as they are, all others (DEL and C1 too) as JSON's escapes."""
+    import json
+
+    return _PERHAPS_UNSAFE.sub(_escaped_in_json, json.dumps(content, ensure_ascii=False, **options))
+
+
+@contextmanager
+def safe_output() -> Iterator[None]:
+    """Within the block, text that Python code writes to standard output and standard error is made safe as by
+    ``printable_lines``: what argparse and warnings write, too. What goes to the file descriptors is not touched."""
+    with ExitStack() as stack:
+        if sys.stdout is not None:
+            stack.enter_context(redirect_stdout(_safe(sys.stdout)))
+        if sys.stderr is not None:
+            stack.enter_context(redirect_stderr(_safe(sys.stderr)))
+        yield
+
+
+class _SafeText:
+    """A text stream that escapes what it is given; otherwise the stream itself."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        encoding = getattr(self._stream, "encoding", None) or "utf-8"
+        self._stream.write(printable_lines(text).encode(encoding, "backslashreplace").decode(encoding))
+        return len(text)
+
+    def writelines(self, lines: Iterator[str]) -> None:
+        for line in lines:
+            self.write(line)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+def _safe(stream: TextIO) -> TextIO:
+    return stream if isinstance(stream, _SafeText) else cast("TextIO", _SafeText(stream))
+
+
+def _escaped(character: str) -> str:
+    return character if character.isprintable() else repr(character)[1:-1]
+
+
+def _escaped_in_json(match: re.Match[str]) -> str:
+    character = match[0]
+    if character.isprintable():
+        return character
+    units = character.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2))
