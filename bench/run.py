@@ -114,7 +114,6 @@ class Workspace:
             **inherited,
             "PYTHONPYCACHEPREFIX": str(self.directory / "bytecode"),
             "BENCH_STAMPS": str(self.stamps),
-            "XDG_CACHE_HOME": str(self.directory / "cache"),
             "AMENT_PREFIX_PATH": os.pathsep.join(filter(None, prefixes)),
             "PYTHONPATH": os.pathsep.join(filter(None, [*path, os.environ.get("PYTHONPATH", "")])),
             "ROS_LOG_DIR": str(self.directory / "log"),

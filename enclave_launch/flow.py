@@ -97,7 +97,7 @@ def provision(
     """
     from enclave_launch.secured import ProvisionedLaunch, provision_policies
     from enclave_launch.security_environment import SecuritySettings, environment_domains
-    from keystore.steps.provisioning import ProvisionOptions
+    from keystore.steps.options import ProvisionOptions
 
     if plan.problems:
         raise ManifestError("\n".join((*plan.problems, "nothing was started or written")))

@@ -16,7 +16,7 @@ from enclave_launch.policy import PolicyOptions
 
 if TYPE_CHECKING:
     from keystore.formats.policy_xml import PolicyDocument
-    from keystore.steps.provisioning import ProvisionOptions
+    from keystore.steps.options import ProvisionOptions
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,10 +21,11 @@ from enclave_launch.security_environment import (
     launcher_environment,
     secured_environment,
 )
-from keystore.disk.stamps import enclave_stamp
 from keystore.errors import KeystoreError
 from keystore.formats.policy import EnclavePolicy
-from keystore.steps.provisioning import ProvisionOptions, ProvisionReport, provision
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.provisioning import provision
+from keystore.steps.report import ProvisionReport
 
 
 class ProvisionedLaunch(NamedTuple):
@@ -58,11 +59,6 @@ class PlanProvider:
     def __init__(self, launch: ProvisionedLaunch):
         self._launch = launch
         self._follow(launch.plan)
-        self._seen = {
-            path: (policy, launch.report.stamps[path])
-            for path, policy in self._policies.items()
-            if path in launch.report.stamps
-        }
 
     @property
     def plan(self) -> LaunchPlan:
@@ -77,14 +73,13 @@ class PlanProvider:
         self._policies = {enclave.path: enclave for enclave in plan.derived.policy.enclaves}
 
     def granted(self, process: ResolvedProcess) -> Grant | None:
-        """The grant, if a look at the files' inodes and times is enough to know that the enclave is the one
-        provisioned."""
-        planned = self._find(process)
-        if planned is None:
+        """The grant, if the plan has the process and its enclave is the one provisioned (a few file reads)."""
+        if self._find(process) is None:
             return None
-        if planned.enclave is not None and not self._is_untouched(self._policies[planned.enclave.path]):
-            return None
-        return self._grant(planned, process.environment)
+        try:
+            return self.ensure(process)
+        except ProvisionError:
+            return None  # ``ensure`` says why, where it may take its time
 
     def ensure(self, process: ResolvedProcess) -> Grant:
         """Raises ``ProvisionError`` when its enclave is no longer what was provisioned."""
@@ -129,17 +124,12 @@ class PlanProvider:
         return Grant(("--enclave", launcher.enclave), launcher_environment(self._launch.settings))
 
     def _check(self, policy: EnclavePolicy) -> None:
-        """Nothing is repaired here: what changed since it was signed was changed by somebody else.
-
-        Nodes that share an enclave, and restarts, pay for a look at its files only while nobody touches those.
-        """
-        if self._is_untouched(policy):
-            return
-        from keystore.steps.provisioning_check import what_is_wrong
+        """Nothing is repaired here: what changed since it was signed was changed by somebody else."""
+        from keystore.steps.comparison import differences
 
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
-            wrong = what_is_wrong(keystore, policy, options=self._launch.options)
+            wrong = differences(keystore, policy, options=self._launch.options)
         except KeystoreError as error:
             raise ProvisionError(
                 f"enclave {enclave} cannot be looked at any more, though it was provisioned for this launch: {error}"
@@ -149,11 +139,6 @@ class PlanProvider:
                 f"enclave {enclave} in {keystore} is no longer what was provisioned for this launch: "
                 f"{'; '.join(wrong)}. {_who_changed_it(wrong)}"
             )
-        self._seen[enclave] = (policy, enclave_stamp(keystore, enclave))
-
-    def _is_untouched(self, policy: EnclavePolicy) -> bool:
-        stamp = enclave_stamp(self._launch.settings.keystore, policy.path)
-        return self._seen.get(policy.path) == (policy, stamp)
 
     def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
         variables = dict(secured_environment(planned, self._launch.settings))

@@ -9,8 +9,7 @@
 
 Each room imports those below it, none above.
 The public functions below are loaded when first used, so that a launch imports only what its path needs:
-``provision`` of a keystore in which nothing changed imports neither ``cryptography`` nor lxml, and where nothing was
-touched since it last looked (``standing``) it opens none of the keystore's files. The verbs of
+``provision`` of a keystore in which nothing changed imports neither ``cryptography`` nor lxml. The verbs of
 ``secure-keystore`` call the same functions.
 """
 
@@ -40,12 +39,12 @@ if TYPE_CHECKING:
     from keystore.steps.expiry import status as status
     from keystore.steps.governance_setting import GovernanceOptions as GovernanceOptions
     from keystore.steps.governance_setting import set_governance as set_governance
-    from keystore.steps.provisioning import EnclaveReport as EnclaveReport
-    from keystore.steps.provisioning import ProvisionOptions as ProvisionOptions
-    from keystore.steps.provisioning import ProvisionReport as ProvisionReport
+    from keystore.steps.options import ProvisionOptions as ProvisionOptions
     from keystore.steps.provisioning import provision as provision
     from keystore.steps.renewal import RenewOptions as RenewOptions
     from keystore.steps.renewal import renew as renew
+    from keystore.steps.report import EnclaveReport as EnclaveReport
+    from keystore.steps.report import ProvisionReport as ProvisionReport
     from keystore.steps.revocation import RemoveOptions as RemoveOptions
     from keystore.steps.revocation import RemoveReport as RemoveReport
     from keystore.steps.revocation import remove as remove
@@ -70,9 +69,9 @@ _HOMES = {
     "export": "steps.bundle",
     "GovernanceOptions": "steps.governance_setting",
     "set_governance": "steps.governance_setting",
-    "EnclaveReport": "steps.provisioning",
-    "ProvisionOptions": "steps.provisioning",
-    "ProvisionReport": "steps.provisioning",
+    "EnclaveReport": "steps.report",
+    "ProvisionOptions": "steps.options",
+    "ProvisionReport": "steps.report",
     "provision": "steps.provisioning",
     "RenewOptions": "steps.renewal",
     "renew": "steps.renewal",

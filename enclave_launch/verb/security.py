@@ -14,7 +14,7 @@ from keystore.errors import InvalidInput, KeystoreError
 from keystore.formats.domains import Domains
 from keystore.formats.validity import later, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.steps.provisioning import ProvisionOptions
+from keystore.steps.options import ProvisionOptions
 
 
 def security_options(options: argparse.Namespace) -> SecurityOptions:

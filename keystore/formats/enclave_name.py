@@ -30,14 +30,14 @@ def validate_enclave_name(name: str) -> str:
     if len(name) > MAX_LENGTH:
         raise InvalidEnclaveName(name, f"it has {len(name)} characters, at most {MAX_LENGTH} are allowed")
     if not _ENCLAVE.match(name):
-        raise InvalidEnclaveName(name, _what_is_wrong(name))
+        raise InvalidEnclaveName(name, _differences(name))
     if name.count("/") > MAX_SEGMENTS:
         count = name.count("/")
         raise InvalidEnclaveName(name, f"it has {count} segments, Cyclone DDS carries at most {MAX_SEGMENTS}")
     return name
 
 
-def _what_is_wrong(name: str) -> str:
+def _differences(name: str) -> str:
     if not name:
         return "it is empty"
     if not name.startswith("/"):

@@ -1,8 +1,7 @@
 """One enclave on disk against what it should be: what is missing, stale or wrong, by cheap means. Reads only.
 
-A launch asks this unless ``standing`` knows the answer: no ``cryptography``, no XML parser, some twenty system calls an
-enclave. It compares bytes, dates, modes and links; it does not check signatures, which DDS does at start
-and ``keystore.verify`` on request.
+Every launch asks this of every enclave: no ``cryptography``, no XML parser, some twenty system calls. It compares
+bytes, dates, modes and links; it does not check signatures, which DDS does at start and ``keystore.verify`` on request.
 """
 
 from __future__ import annotations
@@ -35,22 +34,22 @@ NEW = "new enclave"
 OTHER_PERMISSIONS = "other permissions"
 
 
-class Identity(Enum):
-    """What the enclave's key pair needs."""
+class Reissue(Enum):
+    """What of an enclave's identity must be issued anew."""
 
-    GOOD = "good"
-    CERTIFICATE = "certificate"  # a new certificate for the key that is there
-    PAIR = "pair"  # no key: both anew
+    NOTHING = "nothing"
+    CERTIFICATE = "certificate"  # for the key that is there
+    KEY_PAIR = "key pair"
 
 
 class EnclaveState(NamedTuple):
-    """``reasons`` are for reports; all empty and GOOD means nothing to do.
+    """``reasons`` are for reports; without them nothing is to be done.
 
     ``validity``: from when until when certificate and permissions hold, where they were seen to say the same.
     """
 
     enclave: str
-    identity: Identity
+    reissue: Reissue
     facts: CertificateFacts | None
     permissions: bool
     links: tuple[str, ...]
@@ -60,11 +59,11 @@ class EnclaveState(NamedTuple):
 
     @property
     def is_good(self) -> bool:
-        return self.identity is Identity.GOOD and not (self.permissions or self.links or self.lax_key)
+        return self.reissue is Reissue.NOTHING and not (self.permissions or self.links or self.lax_key)
 
     @property
     def exists(self) -> bool:
-        return self.identity is not Identity.PAIR or self.facts is not None
+        return self.reissue is not Reissue.KEY_PAIR or self.facts is not None
 
 
 def inspect(
@@ -77,15 +76,15 @@ def inspect(
     directory = layout.enclave_directory(enclave)
     wanted_links = layout.enclave_links(enclave, crl=view.has_crl)
     if not _is_there(view, directory):
-        return EnclaveState(enclave, Identity.PAIR, None, True, tuple(wanted_links), False, (NEW,))
+        return EnclaveState(enclave, Reissue.KEY_PAIR, None, True, tuple(wanted_links), False, (NEW,))
     reasons: list[str] = []
     lax = _key_mode(view, directory)
-    identity, facts = _identity(view, enclave, directory, now, due, reasons)
+    reissue, facts = _identity(view, enclave, directory, now, due, reasons)
     if lax:
         reasons.append("the private key was readable by others")
     validity = None
-    permissions = identity is not Identity.GOOD or facts is None
-    if identity is Identity.GOOD and facts is not None and facts.common_name is not None:
+    permissions = reissue is not Reissue.NOTHING or facts is None
+    if reissue is Reissue.NOTHING and facts is not None and facts.common_name is not None:
         expected = wanted(subject_name(facts.common_name), facts.validity)
         permissions = not _permissions_stand(view, directory, expected, reasons)
         validity = facts.validity if expected is not None and not permissions else None
@@ -94,7 +93,7 @@ def inspect(
     )
     if links and reasons != [NEW]:
         reasons.append(f"{', '.join(links)} missing or out of step")
-    return EnclaveState(enclave, identity, facts, permissions, links, lax is True, tuple(reasons), validity)
+    return EnclaveState(enclave, reissue, facts, permissions, links, lax is True, tuple(reasons), validity)
 
 
 def _is_there(view: KeystoreView, directory: str) -> bool:
@@ -129,20 +128,20 @@ def _key_mode(view: KeystoreView, directory: str) -> bool | None:
 
 def _identity(
     view: KeystoreView, enclave: str, directory: str, now: datetime, due: datetime, reasons: list[str]
-) -> tuple[Identity, CertificateFacts | None]:
+) -> tuple[Reissue, CertificateFacts | None]:
     key = safe_files.read_if_there(view.root, f"{directory}/{layout.KEY}")
     cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
     facts = _facts(cert)
     if key is None:
         reasons.append("no private key" if cert is not None else NEW)
-        return Identity.PAIR, facts
+        return Reissue.KEY_PAIR, facts
     problem = (
         _certificate_problem(view, enclave, key, facts, now, due) if cert is not None else "no certificate"
     )
     if problem is None:
-        return Identity.GOOD, facts
+        return Reissue.NOTHING, facts
     reasons.append(problem)
-    return Identity.CERTIFICATE, facts
+    return Reissue.CERTIFICATE, facts
 
 
 def _facts(cert: bytes | None) -> CertificateFacts | None:

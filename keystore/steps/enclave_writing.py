@@ -29,10 +29,10 @@ from keystore.formats.validity import Validity
 from keystore.signing.authority import Authority, IdentityIssuer
 from keystore.signing.identity import certify, new_identity, public_half
 from keystore.steps.creation import sign_document
-from keystore.steps.enclave_state import EnclaveState, Identity, PermissionsSource
+from keystore.steps.enclave_state import EnclaveState, PermissionsSource, Reissue
 
 if TYPE_CHECKING:
-    from keystore.steps.provisioning import ProvisionOptions
+    from keystore.steps.options import ProvisionOptions
 
 
 class EnclaveWriter:
@@ -78,7 +78,7 @@ class EnclaveWriter:
 
     def check_subjects(self, states: list[EnclaveState]) -> None:
         """With compatible subjects: refuse new enclaves that Cyclone DDS could confuse with others."""
-        fresh = {state.enclave for state in states if state.identity is not Identity.GOOD}
+        fresh = {state.enclave for state in states if state.reissue is not Reissue.NOTHING}
         if self._scheme is SubjectScheme.EXACT or not fresh or self._options.allow_subject_overlap:
             return
         names = {enclave: self._present_name(enclave) for enclave in self._view.enclaves()}
@@ -104,7 +104,7 @@ class EnclaveWriter:
         return [
             Superseded(state.enclave, state.facts.serial, state.facts.validity.not_after)
             for state in states
-            if state.identity is not Identity.GOOD
+            if state.reissue is not Reissue.NOTHING
             and state.facts is not None
             and state.facts.names_issuer(ca)
         ]
@@ -143,10 +143,10 @@ class EnclaveWriter:
         self, state: EnclaveState, entries: dict[str, Content | Link], actions: list[str]
     ) -> tuple[str, Validity]:
         """Subject and validity of the certificate the enclave will have."""
-        if state.identity is Identity.GOOD and state.facts is not None:
+        if state.reissue is Reissue.NOTHING and state.facts is not None:
             return subject_name(state.facts.common_name or ""), state.facts.validity
         cn = common_name(state.enclave, self._scheme)
-        if state.identity is Identity.PAIR:
+        if state.reissue is Reissue.KEY_PAIR:
             made = new_identity(self._issuer, cn, self._validity, self._view.settings.curve)
             actions.append("key and certificate" if state.facts is not None else "created")
         else:

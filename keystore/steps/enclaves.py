@@ -10,9 +10,11 @@ from keystore.disk.view import KeystoreView
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.validity import Validity
+from keystore.steps.comparison import WantedEnclave, permissions_source, with_domains
 from keystore.steps.enclave_state import PermissionsSource
-from keystore.steps.provisioning import ProvisionOptions, ProvisionReport, provision
-from keystore.steps.provisioning_check import Wish, bring_about, policy_source, with_domains
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.provisioning import bring_about, provision
+from keystore.steps.report import ProvisionReport
 
 
 def create_enclaves(
@@ -28,8 +30,8 @@ def create_enclaves(
     root = resolve_root(keystore)
     chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
     ordered = sorted({validate_enclave_name(name) for name in names})
-    wishes = {name: Wish(_allow_all(name, chosen) if allow_all else keep) for name in ordered}
-    return bring_about(root, wishes, chosen)
+    wanted = {name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep) for name in ordered}
+    return bring_about(root, wanted, chosen)
 
 
 def create_enclave(
@@ -46,7 +48,7 @@ def keep(_subject: str, _validity: Validity) -> None:
 def _allow_all(name: str, options: ProvisionOptions) -> PermissionsSource:
     """SROS2's default policy of create_enclave: everything on ``/*``, asked for by name here."""
     everything = tuple(Rule(operation, Qualifier.ALLOW, "/*") for operation in Operation)
-    return policy_source(EnclavePolicy(name, (Profile("/", "all", everything),)), options)
+    return permissions_source(EnclavePolicy(name, (Profile("/", "all", everything),)), options)
 
 
 def apply_policy(

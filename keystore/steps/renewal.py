@@ -28,11 +28,13 @@ from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, scheme_of
 from keystore.formats.validity import utc_now
 from keystore.steps import rollover
+from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import install_incoming, mirror_governance
-from keystore.steps.enclave_state import Identity
+from keystore.steps.enclave_state import Reissue
 from keystore.steps.enclaves import keep
-from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning_check import Wish, bring_about, with_domains
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.provisioning import bring_about
+from keystore.steps.report import ProvisionReport
 from keystore.steps.revocation import renew_crl, revoke_replaced
 
 DEFAULT_WITHIN = timedelta(days=30)
@@ -73,9 +75,9 @@ def renew(
         if mirror_governance(opened):
             repaired.append("governance.xml made equal to the signed governance.p7s")
     view = KeystoreView(root)
-    wishes = {name: _wish(view, name, named, chosen) for name in view.enclaves()}
+    wanted = {name: _wanted(view, name, named, chosen) for name in view.enclaves()}
     due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
-    report = bring_about(root, wishes, with_domains(root, due))
+    report = bring_about(root, wanted, with_domains(root, due))
     if chosen.revoke_old:
         with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
@@ -92,12 +94,12 @@ def _refuse_unknown(root: Path, named: list[str] | None) -> None:
         )
 
 
-def _wish(view: KeystoreView, name: str, named: list[str] | None, options: RenewOptions) -> Wish:
+def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: RenewOptions) -> WantedEnclave:
     """Enclaves not named are only completed, as any change of a CA demands it of all."""
     asked = name in named if named is not None else options.everything or _is_exposed(view, name, options)
     if not asked:
-        return Wish(keep)
-    return Wish(keep, Identity.PAIR if options.new_keys else Identity.CERTIFICATE)
+        return WantedEnclave(keep)
+    return WantedEnclave(keep, Reissue.KEY_PAIR if options.new_keys else Reissue.CERTIFICATE)
 
 
 def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:

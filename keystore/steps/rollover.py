@@ -32,10 +32,12 @@ from keystore.formats.role import Role
 from keystore.formats.validity import Validity, utc_now
 from keystore.signing import authority
 from keystore.signing.authority import Authority, pem_certificate
+from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
 from keystore.steps.enclaves import keep
-from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning_check import Wish, bring_about, with_domains
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.provisioning import bring_about
+from keystore.steps.report import ProvisionReport
 from keystore.steps.revocation import drop_crl
 
 
@@ -70,8 +72,8 @@ def roll_over(
         refresh_copies(opened)
     if step is not Step.SWITCH:
         return ProvisionReport(root, tuple(text for text in done if text), ())
-    wishes = {name: Wish(keep) for name in KeystoreView(root).enclaves()}
-    report = bring_about(root, wishes, with_domains(root, chosen))
+    wanted = {name: WantedEnclave(keep) for name in KeystoreView(root).enclaves()}
+    report = bring_about(root, wanted, with_domains(root, chosen))
     return report._replace(created=(*(text for text in done if text), *report.created))
 
 

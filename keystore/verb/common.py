@@ -18,7 +18,8 @@ from keystore.formats.validity import parse_duration, parse_end, utc_now
 
 if TYPE_CHECKING:
     from keystore.signing.ca_access import CaAccess
-    from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
+    from keystore.steps.options import ProvisionOptions
+    from keystore.steps.report import ProvisionReport
 
 DEFAULT_LOCK_TIMEOUT = 30.0
 _BAR_WIDTH = 30
@@ -119,7 +120,7 @@ def span(arguments: argparse.Namespace) -> Span:
 def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
     """From the arguments of ``add_signing``, ``add_lock``, ``add_validity`` and ``add_subjects``."""
     from keystore.formats.subject import SubjectScheme
-    from keystore.steps.provisioning import ProvisionOptions
+    from keystore.steps.options import ProvisionOptions
 
     validity = span(arguments)
     return ProvisionOptions(

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING
 from keystore.verb import common
 
 if TYPE_CHECKING:
-    from keystore.steps.provisioning import ProvisionOptions, ProvisionReport
+    from keystore.steps.options import ProvisionOptions
+    from keystore.steps.report import ProvisionReport
 
 _ROLES = ("identity", "permissions", "both")
 

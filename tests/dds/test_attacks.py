@@ -15,7 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore.steps.provisioning import ProvisionOptions
+from keystore.steps.options import ProvisionOptions
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.revocation import remove
 from tests.dds import attacks, our_keystore, sros2_style

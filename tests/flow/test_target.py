@@ -51,7 +51,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("case", REFUSED)
-def test_bad_words_are_refused_with_what_is_wrong(case: str, prefix: Path) -> None:
+def test_bad_words_are_refused_with_differences(case: str, prefix: Path) -> None:
     words, message = REFUSED[case]
     with pytest.raises(UsageError) as refused:
         find_target(words, [str(prefix)])

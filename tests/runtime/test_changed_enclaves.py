@@ -11,13 +11,11 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from enclave_launch import (
     LaunchPlan,
-    ProvisionedLaunch,
     ProvisionError,
     ResolveOptions,
     SecurityOptions,
@@ -28,8 +26,7 @@ from enclave_launch import (
 from enclave_launch.process import RemapRule, ResolvedProcess
 from enclave_launch.secured import PlanProvider
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.steps.provisioning import ProvisionOptions
-from keystore.steps.provisioning_check import what_is_wrong
+from keystore.steps.options import ProvisionOptions
 
 DEMO = Path(__file__).parents[2] / "fixtures/demo_ws"
 TALKER = '<node pkg="demo_nodes" exec="talker" name="talker"/>'
@@ -172,25 +169,6 @@ class TestLate:
             running.ensure_late(self.late(running))
         with pytest.raises(ProvisionError, match="is no longer what was provisioned"):
             respawn(running)
-
-
-def test_the_cheap_look_is_repeated_only_for_files_that_were_touched(
-    tmp_path: Path, keystore: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    launch: ProvisionedLaunch = provision(plan_of(tmp_path, TALKER), keystore)
-    provider, looks = PlanProvider(launch), list[str]()
-
-    def counted(*words: Any, **options: Any) -> tuple[str, ...]:
-        looks.append("looked")
-        return what_is_wrong(*words, **options)
-
-    monkeypatch.setattr("keystore.steps.provisioning_check.what_is_wrong", counted)
-    respawn(provider)
-    respawn(provider)
-    assert len(looks) == 1
-    (keystore / "enclaves/key.pem").touch()
-    respawn(provider)
-    assert len(looks) == 2
 
 
 def test_no_process_sees_the_passphrase_that_the_keystore_was_opened_with(

@@ -1,4 +1,4 @@
-"""The writing half of ``keystore.steps.provisioning``: under the lock, in batches."""
+"""A keystore made what is wanted of it: under the lock, in batches."""
 
 from __future__ import annotations
 
@@ -17,21 +17,22 @@ from keystore.disk.view import KeystoreView
 from keystore.formats.enclave_name import check_distinct
 from keystore.formats.role import Role
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity
+from keystore.steps.comparison import WantedEnclave, as_found, inspect_wanted
 from keystore.steps.creation import CreateOptions, complete, renew_governance
 from keystore.steps.enclave_state import EnclaveState
 from keystore.steps.enclave_writing import EnclaveWriter
-from keystore.steps.provisioning import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning_check import Wish, as_found, inspect_wish
+from keystore.steps.options import Progress, ProvisionOptions
+from keystore.steps.report import EnclaveReport, ProvisionReport
 from keystore.steps.revocation import renew_crl
 
 # Bounds what an interrupted run loses, and how often the disk is waited for.
 _BATCH = 250
 
 
-def write_wishes(
-    root: Path, wishes: Mapping[str, Wish], options: ProvisionOptions, now: datetime
+def reconcile(
+    root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions, now: datetime
 ) -> ProvisionReport:
-    """Complete the keystore, then every enclave that is not as wished."""
+    """Complete the keystore, then every enclave that is not as wanted."""
     # An impossible validity is refused before a keystore is made for it.
     lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
     Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
@@ -39,11 +40,11 @@ def write_wishes(
         done, warnings = _complete_keystore(opened, options, now)
         view = KeystoreView(root)
         warnings += _exposures(view)
-        check_distinct(dict.fromkeys((*view.enclaves(), *wishes)))
+        check_distinct(dict.fromkeys((*view.enclaves(), *wanted)))
         writer = EnclaveWriter(opened, view, options, now)
-        states = [inspect_wish(view, name, wish, options, now) for name, wish in wishes.items()]
+        states = [inspect_wanted(view, name, one, options, now) for name, one in wanted.items()]
         writer.check_subjects(states)
-        reports = _write_all(opened, writer, states, wishes, options.progress, now)
+        reports = _write_all(opened, writer, states, wanted, options.progress, now)
     return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
 
 
@@ -94,7 +95,7 @@ def _write_all(
     opened: Store,
     writer: EnclaveWriter,
     states: list[EnclaveState],
-    wishes: Mapping[str, Wish],
+    wanted: Mapping[str, WantedEnclave],
     progress: Progress | None,
     now: datetime,
 ) -> tuple[EnclaveReport, ...]:
@@ -106,7 +107,7 @@ def _write_all(
         with opened.batch() as batch:
             remember(batch, KeystoreView(opened.root), writer.replaced(part), now)
             for position, state in enumerate(part, start + 1):
-                actions = writer.write(batch, state, wishes[state.enclave].permissions)
+                actions = writer.write(batch, state, wanted[state.enclave].permissions)
                 reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)
                 if progress is not None:
                     progress(position, len(todo))

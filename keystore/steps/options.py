@@ -1,0 +1,41 @@
+"""What a caller can choose when enclaves are provisioned. One type for launch, verbs and library users."""
+
+from collections.abc import Callable
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, NamedTuple
+
+from keystore.formats.domains import Domains
+from keystore.formats.validity import DEFAULT_BACKDATE
+from keystore.signing.ca_access import CaAccess
+
+if TYPE_CHECKING:
+    from keystore.formats.subject import SubjectScheme
+    from keystore.steps.creation import CreateOptions
+
+Progress = Callable[[int, int], None]
+"""Called with (enclaves done, enclaves to do)."""
+
+DEFAULT_LOCK_TIMEOUT = 30.0
+
+
+class ProvisionOptions(NamedTuple):
+    """``domains`` None: those of the keystore's governance, 0 for a new one. ``lifetime``, ``subjects`` None:
+    what the keystore was created with. ``renew_within``: certificates that end sooner are re-issued, by
+    default only the expired. ``creation``: for a new keystore; its domains, access, clock and durability are
+    taken from here."""
+
+    domains: Domains | None = None
+    create: bool = True
+    creation: "CreateOptions | None" = None
+    lifetime: timedelta | None = None
+    valid_until: datetime | None = None
+    backdate: timedelta = DEFAULT_BACKDATE
+    renew_within: timedelta = timedelta(0)
+    subjects: "SubjectScheme | None" = None
+    rmw: str | None = None
+    allow_subject_overlap: bool = False
+    access: CaAccess = CaAccess()
+    lock_timeout: float = DEFAULT_LOCK_TIMEOUT
+    durable: bool = True
+    progress: Progress | None = None
+    now: datetime | None = None
