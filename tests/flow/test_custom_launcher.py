@@ -97,7 +97,7 @@ def test_a_plan_with_problems_is_not_provisioned(tmp_path: Path) -> None:
 def test_errors_of_the_keystore_are_errors_of_the_flow(tmp_path: Path) -> None:
     (tmp_path / "ks").mkdir()
     (tmp_path / "ks" / "file").touch()
-    with pytest.raises(ProvisionError, match="no keystore"):
+    with pytest.raises(ProvisionError, match="not a keystore"):
         provision(resolve(TALKER_LISTENER, options=OPTIONS), tmp_path / "ks")
 
 

@@ -164,7 +164,7 @@ BAD_WORDS = {
     "a keystore that must exist": (
         ["--secure", "--keystore", "{tmp}/ks", "--no-create-keystore"], 1, "secure-keystore create"
     ),
-    "a directory that is no keystore": (["--secure", "--keystore", "{tmp}/other"], 1, "is no keystore"),
+    "a directory that is no keystore": (["--secure", "--keystore", "{tmp}/other"], 1, "is not a keystore"),
     "a keystore below a file": (["--secure", "--keystore", "{tmp}/other/file/ks"], 1, "ks"),
     "a bad domain": (["--secure", "--keystore", "{tmp}/ks", "--domain-id", "7;8"], 2, "domain ids"),
     "a bad duration": (["--secure", "--keystore", "{tmp}/ks", "--valid-for", "soon"], 2, "soon"),
