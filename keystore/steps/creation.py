@@ -107,7 +107,9 @@ def refuse_unusable(options: CreateOptions) -> None:
 def _refuse_foreign(root: Path) -> None:
     view = KeystoreView(root)
     if not view.is_complete and not view.can_be_completed:
-        raise NotAKeystore(f"{printable(root)} exists and is not a keystore; choose an empty or new directory")
+        raise NotAKeystore(
+            f"{printable(root)} exists and is not a keystore; choose an empty or new directory"
+        )
 
 
 def complete(opened: Store, options: CreateOptions) -> CreateReport:
