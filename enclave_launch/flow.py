@@ -15,6 +15,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from enclave_launch.diagnostics import Diagnostic, program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner
@@ -78,14 +79,17 @@ def evaluate_launch(
     return EvaluatedLaunch(source, evaluation)
 
 
-def _missing_programs(evaluation: Evaluation) -> list[str]:
+def _missing_programs(evaluation: Evaluation) -> list[Diagnostic]:
     """``run`` would refuse them. Placeholders of packages that are not installed have their own warning."""
     from enclave_launch.evaluation.programs import missing_programs
     from enclave_launch.host.protocol import MISSING_PREFIX
 
     placeholders = f"{MISSING_PREFIX}/"
     real = [item for item in evaluation.processes if not "".join(item.cmd[:1]).startswith(placeholders)]
-    return [str(error) for error in missing_programs(real)]
+    return [
+        program_not_executable(process.cmd[0], error.message, error.location)
+        for process, error in missing_programs(real)
+    ]
 
 
 def provision(
@@ -100,7 +104,7 @@ def provision(
     from keystore.steps.options import ProvisionOptions
 
     if plan.problems:
-        raise ManifestError("\n".join((*plan.problems, "nothing was started or written")))
+        raise ManifestError("\n".join((*map(str, plan.problems), "nothing was started or written")))
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
     wanted = chosen.keystore or ProvisionOptions(domains=environment_domains(os.environ))

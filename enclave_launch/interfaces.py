@@ -72,21 +72,15 @@ class InterfaceFinder:
     def _infer(self, subject: _Subject, manifest: Lookup) -> Found | Missing:
         searched = "looked at " + ", ".join(manifest.searched)
         if not self._may_infer or subject.package is None:
-            return Missing(str(subject), f"{searched}; {_NEXT_STEP}")
+            return Missing(str(subject), searched)
         from nodl.infer.executable import infer_executable
 
         inferred = infer_executable(
             subject.package, executable=subject.executable, plugin=subject.plugin, prefixes=self._prefixes
         )
         if not inferred.interfaces:
-            return Missing(str(subject), f"{searched}; {inferred.why}; {_NEXT_STEP}")
+            return Missing(str(subject), f"{searched}; {inferred.why}")
         return Found(inferred.interfaces, inferred=True)
-
-
-_NEXT_STEP = (
-    "describe it in a manifest (secure-nodl infer makes a first one from the source), installed with the package or "
-    "named with --nodl"
-)
 
 
 def _executable_name(process: ResolvedProcess) -> str:

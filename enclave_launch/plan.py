@@ -8,10 +8,19 @@ What could not be found out is a value with a reason: a ``problem`` stops ``--se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
+from enclave_launch.diagnostics import (
+    Diagnostic,
+    container_elsewhere,
+    enclave_attribute_unused,
+    enclave_shared_with_launcher,
+    executable_without_enclave,
+    no_manifest,
+    not_foreseeable,
+)
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope, assign_enclave
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
 from enclave_launch.policy.launcher import launcher_node
@@ -21,9 +30,7 @@ from enclave_launch.process import (
     Evaluation,
     ResolvedComponent,
     ResolvedProcess,
-    Unforeseeable,
 )
-from enclave_launch.source_location import SourceLocation
 from nodl.node_interface import NodeInterface
 
 
@@ -102,8 +109,8 @@ class LaunchPlan(NamedTuple):
     components: tuple[PlannedComponent, ...]
     launcher: RunningNode | None
     derived: DerivedPolicy
-    problems: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    problems: tuple[Diagnostic, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
 
     @property
     def evaluated(self) -> EvaluatedLaunch:
@@ -181,7 +188,7 @@ class Planner(NamedTuple):
             problems=(*_problems(processes, components), *derived.problems),
             warnings=(
                 *evaluation.warnings,
-                *_unforeseen(evaluation.unforeseeable),
+                *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
                 *_notes(processes, components, launcher),
                 *derived.warnings,
             ),
@@ -249,52 +256,40 @@ def _bare_enclaves(processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
     return tuple(p.enclave.path for p in processes if p.enclave and not p.nodes and not p.missing)
 
 
-def _problems(processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]) -> list[str]:
-    problems = [_told(item.process.location, item.missing) for item in processes if item.missing]
-    problems += [_told(item.component.location, item.missing) for item in components if item.missing]
-    return problems
-
-
-def _told(location: SourceLocation, missing: Missing) -> str:
-    return f"{location}: no NoDL manifest for {missing.subject}: {missing.why}"
-
-
-def _unforeseen(actions: Iterable[Unforeseeable]) -> list[str]:
-    return [f"{action.location}: not foreseeable: {action.what}" for action in actions]
-
-
-def _alike(container: str, processes: Iterable[PlannedProcess]) -> str:
-    """A target is taken as it is written, without pushed namespaces (launch_ros load_composable_nodes.py)."""
-    last = "/" + container.rpartition("/")[2]
-    names = dict.fromkeys(
-        node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last)
-    )
-    return f" (this launch file starts {' '.join(names)}: a target needs its full name)" if names else ""
+def _problems(
+    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
+) -> Iterator[Diagnostic]:
+    for process in processes:
+        if process.missing:
+            yield no_manifest(*process.missing, process.process.location)
+    for component in components:
+        if component.missing:
+            yield no_manifest(*component.missing, component.component.location)
 
 
 def _notes(
     processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent], launcher: RunningNode | None
-) -> list[str]:
-    notes = [
-        f"{item.process.location}: {item.process.process_name} runs without an enclave: an executable gets one only "
-        "through its enclave attribute"
-        for item in processes
-        if item.enclave is None and item.process.kind == "executable"
-    ]
-    notes += [
-        f"{item.component.location}: container {item.component.container!r} of component {item.fqn} is not started by "
-        f"this launch file; its permissions are not part of this plan{_alike(item.component.container, processes)}"
-        for item in components
-        if item.container is None
-    ]
-    notes += [
-        f"{item.process.location}: {item.process.process_name} has --enclave {item.enclave.path} in its own ROS "
-        f"arguments; its enclave attribute {item.process.enclave.attribute!r} is not used"
-        for item in processes
-        if item.enclave
-        and item.process.enclave.argument is not None
-        and item.process.enclave.attribute is not None
-    ]
+) -> Iterator[Diagnostic]:
+    for item in processes:
+        if item.enclave is None and item.process.kind == "executable":
+            yield executable_without_enclave(item.process.process_name, item.process.location)
+    for component in components:
+        if component.container is None:
+            target, place = component.component.container, component.component.location
+            yield container_elsewhere(component.fqn, target, _alike(target, processes), place)
+    for item in processes:
+        process, attribute = item.process, item.process.enclave.attribute
+        if item.enclave and process.enclave.argument is not None and attribute is not None:
+            yield enclave_attribute_unused(
+                process.process_name, item.enclave.path, attribute, process.location
+            )
     if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
-        notes.append(f"enclave {launcher.enclave} is shared with the launcher itself")
-    return notes
+        yield enclave_shared_with_launcher(launcher.enclave)
+
+
+def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
+    """Nodes of this launch whose last name is that of ``container``."""
+    last = "/" + container.rpartition("/")[2]
+    return tuple(
+        dict.fromkeys(node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last))
+    )

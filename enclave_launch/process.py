@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Literal, NamedTuple
 
+from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 
@@ -105,5 +106,5 @@ class Evaluation(NamedTuple):
     components: tuple[ResolvedComponent, ...]
     launcher_calls: tuple[LauncherCall, ...] = ()
     unforeseeable: tuple[Unforeseeable, ...] = ()
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
     distro: str = "rolling"  # whose rules were followed

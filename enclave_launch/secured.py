@@ -105,7 +105,7 @@ class PlanProvider:
         extended = self._plan.planner.plan(evaluation._replace(processes=(*evaluation.processes, process)))
         new = [problem for problem in extended.problems if problem not in self._plan.problems]
         if new:
-            raise ProvisionError("\n".join(new))
+            raise ProvisionError("\n".join(map(str, new)))
         before = self._policies
         self._follow(extended)
         planned = self._find(process)

@@ -13,5 +13,11 @@ class SourceLocation(NamedTuple):
     element: str = ""
     includes: tuple[str, ...] = ()  # "file:line" of each include on the way, outermost first
 
+    @classmethod
+    def read(cls, text: str) -> SourceLocation:
+        """From ``file:line`` or ``file``, as ``str`` writes it."""
+        file, colon, line = text.rpartition(":")
+        return cls(file, int(line)) if colon and line.isdecimal() else cls(text)
+
     def __str__(self) -> str:
         return f"{self.file}:{self.line}" if self.line else self.file

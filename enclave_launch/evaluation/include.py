@@ -6,6 +6,7 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.diagnostics import include_left_out
 from enclave_launch.host.loading import CyclicIncludeError
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ def left_out(include: IncludeLaunchDescription, context: LaunchContext) -> bool:
     location = include.launch_description_source.expand(context)
     if not context.host.is_missing(location) or os.path.exists(location):
         return False
-    context.host.warn(f"not included, because its package is not installed: {location}")
+    context.host.warn(include_left_out(location))
     return True
 
 

@@ -13,8 +13,8 @@ from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import ResolvedProcess
 
 
-def missing_programs(processes: Iterable[ResolvedProcess]) -> list[LaunchFileError]:
-    """One error, not raised, for each process whose program cannot be executed.
+def missing_programs(processes: Iterable[ResolvedProcess]) -> list[tuple[ResolvedProcess, LaunchFileError]]:
+    """Each process whose program cannot be executed, with the error, not raised.
 
     The program is the first word of the command, a prefix such as ``gdb`` included. What a shell would run
     is the shell's business.
@@ -27,7 +27,7 @@ def missing_programs(processes: Iterable[ResolvedProcess]) -> list[LaunchFileErr
             if key not in known:
                 known[key] = shutil.which(key[0], path=key[1]) is not None
             if not known[key]:
-                errors.append(LaunchFileError(_message(process), process.location))
+                errors.append((process, LaunchFileError(_message(process), process.location)))
     return errors
 
 
@@ -38,7 +38,7 @@ def check_programs(processes: Iterable[ResolvedProcess]) -> None:
     """
     missing = missing_programs(process for process in processes if process.on_event is None)
     if missing:
-        raise LaunchFileError("\n".join((*map(str, missing), "nothing was started")))
+        raise LaunchFileError("\n".join((*(str(error) for _, error in missing), "nothing was started")))
 
 
 def _program(process: ResolvedProcess) -> str:

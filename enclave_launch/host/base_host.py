@@ -7,6 +7,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.diagnostics import Diagnostic, package_not_installed, program_not_installed
 from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult
 from enclave_launch.ros_rules.distro import choose_release
 from nodl import ament_index
@@ -29,8 +30,8 @@ class BaseHost:
         self.release = choose_release(distro, os.environ.get("ROS_DISTRO"), ament_index.search_prefixes())
         self.allow_missing_packages = allow_missing_packages
         self.no_python = no_python
-        self.warnings: list[str] = []
-        self._warned: set[str] = set()
+        self.warnings: list[Diagnostic] = []
+        self._warned: set[Diagnostic] = set()
         self._process_count = 0
         self._anonymous_seed = anonymous_seed
         self._anonymous_random: Any = None
@@ -62,8 +63,9 @@ class BaseHost:
         except ament_index.PackageNotFoundError:
             if not self.allow_missing_packages:
                 raise
-        self.warn(f"package '{package}' is not installed; using {MISSING_PREFIX}/{package} in its place")
-        return f"{MISSING_PREFIX}/{package}"
+        placeholder = f"{MISSING_PREFIX}/{package}"
+        self.warn(package_not_installed(package, placeholder))
+        return placeholder
 
     def find_executable(self, package: str, executable: str) -> str:
         prefix = self.find_package_prefix(package)
@@ -96,9 +98,7 @@ class BaseHost:
 
             if shutil.which(command[0]) is None:
                 program = os.path.basename(command[0])
-                self.warn(
-                    f"program '{program}' is not installed; a placeholder stands for what it would write"
-                )
+                self.warn(program_not_installed(program))
                 return CommandResult(0, f"<output of {program}, which is not installed>", "")
         return self._run_command(command, merge_stderr)
 
@@ -118,10 +118,10 @@ class BaseHost:
         self._process_count += 1
         return self._process_count
 
-    def warn(self, text: str) -> None:
-        if text not in self._warned:
-            self._warned.add(text)
-            self.warnings.append(text)
+    def warn(self, warning: Diagnostic) -> None:
+        if warning not in self._warned:
+            self._warned.add(warning)
+            self.warnings.append(warning)
 
     def anonymous_name(self, name: str) -> str:
         """``name_host_pid_random``. Two hosts with the same seed give the same names in the same order, so

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
     from enclave_launch.description.launch.launch_context import LaunchContext
     from enclave_launch.description.launch_ros.actions.lifecycle_node import LifecycleNode
+    from enclave_launch.diagnostics import Diagnostic
     from enclave_launch.host.loading import LoadCache
     from enclave_launch.process import (
         LauncherCall,
@@ -100,8 +101,8 @@ class Host(Protocol):
     def unforeseeable(self, item: Unforeseeable) -> None:
         """Note something only known at run time."""
 
-    def warn(self, text: str) -> None:
-        """Tell the person. The same text once."""
+    def warn(self, warning: Diagnostic) -> None:
+        """Tell the person; the same once."""
 
     def anonymous_name(self, name: str) -> str:
         """A name nobody else has, made from ``name``."""

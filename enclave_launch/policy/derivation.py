@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from enclave_launch.diagnostics import Diagnostic, permissions_large, policy_answers
 from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
@@ -36,7 +37,6 @@ LIST_NAMES: dict[Operation, str] = {
 _MANY_RULES = 20
 
 Reasons = dict[Rule, list[Reason]]
-_OTHER_NAME = "it could not start: give it another name or namespace"
 
 ProfileKey = tuple[str, str]  # namespace and node name
 
@@ -62,8 +62,8 @@ class DerivedPolicy(NamedTuple):
     policy: Policy
     reasons: Mapping[str, Mapping[Rule, tuple[Reason, ...]]]
     nodes: Mapping[str, tuple[RunningNode, ...]]  # by enclave path
-    problems: tuple[str, ...] = ()
-    warnings: tuple[str, ...] = ()
+    problems: tuple[Diagnostic, ...] = ()
+    warnings: tuple[Diagnostic, ...] = ()
 
     def built_in_names(self, enclave: str) -> frozenset[tuple[str, str]]:
         """What every node has: pairs (list name, name) that no manifest or policy file asks for."""
@@ -122,8 +122,8 @@ class _Collection:
 
     profiles: dict[str, dict[ProfileKey, Reasons]]
     nodes: dict[str, list[RunningNode]] = field(default_factory=dict)
-    problems: list[str] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    problems: list[Diagnostic] = field(default_factory=list)
+    warnings: list[Diagnostic] = field(default_factory=list)
 
     def add(self, found: NodePermissions, policy_file: PolicyDocument | None) -> None:
         node = found.node
@@ -134,10 +134,9 @@ class _Collection:
         self.warnings.extend(found.warnings)
         for unresolved in found.unresolved:
             if unresolved.operation and _answered(policy_file, node, unresolved.operation):
-                self.warnings.append(f"{unresolved.text}; the policy file says what it may do")
+                self.warnings.append(policy_answers(unresolved.diagnostic))
             else:
-                remedy = _OTHER_NAME if unresolved.impossible_name else _remedy(node)
-                self.problems.append(f"{unresolved.text}; {remedy}")
+                self.problems.append(unresolved.diagnostic)
 
     def result(self) -> DerivedPolicy:
         enclaves = tuple(
@@ -154,7 +153,7 @@ class _Collection:
         return DerivedPolicy(Policy(enclaves), reasons, nodes, _unique(self.problems), _unique(self.warnings))
 
 
-def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[str]:
+def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
     """Enclaves whose permissions come near what DDS can carry, told before anything is signed.
 
     Only those with many rules are looked at: the others need not load the code that knows DDS.
@@ -164,8 +163,8 @@ def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[str]:
         return []
     from keystore.formats.permissions_size import expected_concern
 
-    concerns = (expected_concern(enclave) for enclave in large)
-    return [concern.text for concern in concerns if concern]
+    concerns = ((enclave.path, expected_concern(enclave)) for enclave in large)
+    return [permissions_large(path, concern.text) for path, concern in concerns if concern]
 
 
 def _merged_reasons(
@@ -201,11 +200,5 @@ def _answered(document: PolicyDocument | None, node: RunningNode, operation: Ope
     )
 
 
-def _remedy(node: RunningNode) -> str:
-    interface = node.interface
-    program = f"{interface.package}/{interface.executable or interface.plugin}"
-    return f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
-
-
-def _unique(texts: Iterable[str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(texts))
+def _unique(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
+    return tuple(dict.fromkeys(diagnostics))

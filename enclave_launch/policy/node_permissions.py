@@ -12,8 +12,17 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, NamedTuple
 
+from enclave_launch.diagnostics import (
+    Diagnostic,
+    action_remap_idle,
+    interface_unknown,
+    name_unremappable,
+    node_name_impossible,
+    pattern_accepted,
+)
 from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
+from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from nodl.builtin_interfaces import Condition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
@@ -62,14 +71,10 @@ class Permission(NamedTuple):
 
 
 class Unresolved(NamedTuple):
-    """An interface whose name is not (wholly) known: no permission follows from it. ``text`` for a person.
-
-    ``impossible_name``: nothing is unknown, but no node can run under the name it is given.
-    """
+    """An interface whose name is not (wholly) known: no permission follows from it."""
 
     operation: Operation | None
-    text: str
-    impossible_name: bool = False
+    diagnostic: Diagnostic
 
 
 @dataclass(slots=True)
@@ -79,7 +84,7 @@ class NodePermissions:
     node: RunningNode
     permissions: list[Permission] = field(default_factory=list)
     unresolved: list[Unresolved] = field(default_factory=list)
-    warnings: list[str] = field(default_factory=list)
+    warnings: list[Diagnostic] = field(default_factory=list)
 
 
 def node_permissions(
@@ -133,9 +138,8 @@ class _Collector:
         operation, place = _OPERATIONS[endpoint.kind], str(endpoint.source)
         written = endpoint.written or str(endpoint.name)
         if "__" in template.text:
-            self._result.warnings.append(
-                f"{place}: node {self._fqn}: '{template.text}' contains '__', which no remap rule can name"
-            )
+            where = SourceLocation.read(place)
+            self._result.warnings.append(name_unremappable(self._fqn, template.text, where))
         try:
             for final_operation, resolved in self._resolve(operation, template.text, place):
                 reason = Reason(self._fqn, "declared", place, written, resolved.rules, note)
@@ -186,10 +190,8 @@ class _Collector:
     def _warn_of_idle_rule(self, action: str, place: str) -> None:
         rule = self._names.rule_matching(action)
         if rule is not None:
-            self._result.warnings.append(
-                f"{rule.origin or place}: remap rule {rule.text} has no effect on action {action} of node "
-                f"{self._fqn}: {self._distro} remaps only the five names below {action}/_action/, one by one"
-            )
+            where = SourceLocation.read(rule.origin or place)
+            self._result.warnings.append(action_remap_idle(self._fqn, rule.text, action, self._distro, where))
 
     def _pattern(self, endpoint: Endpoint, template: NameTemplate) -> None:
         """Only a part of the name is known: unresolved, unless patterns are accepted and it has text."""
@@ -213,15 +215,19 @@ class _Collector:
         )
         reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note)
         self._result.permissions.append(Permission(operation, name, reason))
-        self._result.warnings.append(f"{place}: node {self._fqn} may {operation.value} {name}: {note}")
+        self._result.warnings.append(
+            pattern_accepted(self._fqn, operation.value, name, note, SourceLocation.read(place))
+        )
 
     def _impossible(self, error: InvalidNameError) -> None:
-        text = f"{self._node.location}: node {self._fqn}: {error}"
-        self._result.unresolved.append(Unresolved(None, text, impossible_name=True))
+        impossible = node_name_impossible(self._fqn, str(error), self._node.location)
+        self._result.unresolved.append(Unresolved(None, impossible))
 
     def _unresolved(self, operation: Operation | None, place: str, why: str) -> None:
-        text = f"{place}: node {self._fqn}: {why}"
-        self._result.unresolved.append(Unresolved(operation, text))
+        interface = self._node.interface
+        program = f"{interface.package}/{interface.executable or interface.plugin}"
+        unknown = interface_unknown(self._fqn, why, program, SourceLocation.read(place))
+        self._result.unresolved.append(Unresolved(operation, unknown))
 
 
 @lru_cache(maxsize=256)

@@ -9,7 +9,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from enclave_launch.diagnostics import Diagnostic, policy_denies_need, policy_enclave_unused, policy_file
 from enclave_launch.policy.node_permissions import Reason
+from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules
 from keystore.formats.permissions_names import full_name
 from keystore.formats.permissions_patterns import can_meet
@@ -24,19 +26,15 @@ ReasonsByEnclave = Mapping[str, Mapping[Rule, tuple[Reason, ...]]]
 class MergedPolicy:
     policy: Policy
     reasons: ReasonsByEnclave
-    warnings: tuple[str, ...]
+    warnings: tuple[Diagnostic, ...]
 
 
 def merge_policy_file(derived: Policy, reasons: ReasonsByEnclave, document: PolicyDocument) -> MergedPolicy:
     """Union by enclave and profile. Warnings: the document's own, unused enclaves, denials of needs."""
     theirs = {enclave.path: enclave for enclave in document.policy.enclaves}
     ours = {enclave.path for enclave in derived.enclaves}
-    warnings = [*document.warnings, *document.notes]
-    warnings += [
-        f"enclave {path} of the policy file is not used by this launch and was left out"
-        for path in theirs
-        if path not in ours
-    ]
+    warnings = [policy_file("policy file", text) for text in (*document.warnings, *document.notes)]
+    warnings += [policy_enclave_unused(path) for path in theirs if path not in ours]
     enclaves: list[EnclavePolicy] = []
     merged_reasons = {path: dict(by_rule) for path, by_rule in reasons.items()}
     for enclave in derived.enclaves:
@@ -52,7 +50,8 @@ def merge_policy_file(derived: Policy, reasons: ReasonsByEnclave, document: Poli
             for rule, reason in rules.items():
                 known[rule] = (*known.get(rule, ()), reason)
         warnings.extend(_denials(enclave.path, known))
-        warnings.extend(f"enclave {enclave.path}: {hazard}" for hazard in dds_rules(merged).hazards)
+        hazards = dds_rules(merged).hazards
+        warnings.extend(policy_file(enclave.path, f"enclave {enclave.path}: {hazard}") for hazard in hazards)
     return MergedPolicy(Policy(tuple(enclaves)), merged_reasons, tuple(warnings))
 
 
@@ -78,12 +77,18 @@ def _union(enclave: EnclavePolicy, added: Added) -> tuple[Profile, ...]:
     return tuple(Profile(ns, node, tuple(sorted(rules))) for (ns, node), rules in sorted(profiles.items()))
 
 
-def _denials(path: str, reasons: Mapping[Rule, tuple[Reason, ...]]) -> list[str]:
+def _denials(path: str, reasons: Mapping[Rule, tuple[Reason, ...]]) -> list[Diagnostic]:
     """A warning for each derived permission that a denial takes away: the node will miss it."""
     denials = [(rule, why) for rule, why in reasons.items() if rule.qualifier is Qualifier.DENY]
     return [
-        f"{why[0].place}: {denial.operation.value} {denial.expression} is denied in enclave {path}, "
-        f"but node {need.node} needs {rule.operation.value} {rule.expression} ({need.place})"
+        policy_denies_need(
+            f"{denial.operation.value} {denial.expression}",
+            path,
+            need.node,
+            f"{rule.operation.value} {rule.expression}",
+            need.place,
+            SourceLocation.read(why[0].place),
+        )
         for denial, why in denials
         for rule, needs in reasons.items()
         if rule.qualifier is Qualifier.ALLOW and rule.operation is denial.operation

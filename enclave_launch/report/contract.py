@@ -74,6 +74,18 @@ class Enclave(_Strict):
     serve_actions: list[str]
 
 
+class Diagnostic(_Strict):
+    """One thing a person should know; ``code`` is stable (``enclave_launch.diagnostics.Code``)."""
+
+    severity: Literal["error", "warning"] = Field(description="error: --secure refuses to start")
+    code: str
+    subject: str
+    file: str | None
+    line: int
+    text: str
+    remedy: str = Field(description="what to do next, empty when nothing needs doing")
+
+
 class DryRun(_Strict):
     """The whole document."""
 
@@ -81,4 +93,5 @@ class DryRun(_Strict):
     processes: list[Process]
     components: list[Component]
     enclaves: dict[str, Enclave]
-    warnings: list[str]
+    warnings: list[str] = Field(description="every diagnostic as one message for a person, errors first")
+    diagnostics: list[Diagnostic]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 
+from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.process import RemapRule
@@ -22,7 +23,11 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
         "processes": [_process(item, security) for item in plan.processes],
         "components": [_component(item) for item in plan.components],
         "enclaves": _enclaves(plan),
-        "warnings": [*plan.problems, *plan.warnings],
+        "warnings": [str(told) for told in (*plan.problems, *plan.warnings)],
+        "diagnostics": [
+            *(_diagnostic(problem, "error") for problem in plan.problems),
+            *(_diagnostic(warning, "warning") for warning in plan.warnings),
+        ],
     }
 
 
@@ -62,6 +67,19 @@ def _component(item: PlannedComponent) -> dict[str, object]:
         "launch_file": component.location.file,
         "line": component.location.line,
         "on_event": component.on_event,
+    }
+
+
+def _diagnostic(told: Diagnostic, severity: str) -> dict[str, object]:
+    place = told.location
+    return {
+        "severity": severity,
+        "code": told.code.value,
+        "subject": told.subject,
+        "file": place.file if place else None,
+        "line": place.line if place else 0,
+        "text": told.text,
+        "remedy": told.remedy,
     }
 
 

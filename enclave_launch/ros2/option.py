@@ -93,6 +93,6 @@ def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...
     return path, tuple(parse_launch_arguments(words))
 
 
-def _say(*texts: str) -> None:
+def _say(*texts: object) -> None:
     for text in texts:
         print(f"ros2 launch: warning: {text}", file=sys.stderr)

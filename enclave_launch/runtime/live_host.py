@@ -14,6 +14,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.host.base_host import BaseHost
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
@@ -122,10 +123,10 @@ class LiveHost(BaseHost):
     def unforeseeable(self, item: Unforeseeable) -> None:
         """Only a plan has to say so; here it simply happens."""
 
-    def warn(self, text: str) -> None:
-        if text not in self.warnings:
-            super().warn(text)
-            self._log.log("WARNING", "launch", text)
+    def warn(self, warning: Diagnostic) -> None:
+        if warning not in self.warnings:
+            super().warn(warning)
+            self._log.log("WARNING", "launch", str(warning))
 
     def log_directory(self) -> str:
         return str(self._log.directory)

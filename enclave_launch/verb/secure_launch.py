@@ -177,7 +177,7 @@ def _policy_text(plan: LaunchPlan) -> str:
 
     if not plan.derived.policy.enclaves:
         nothing = "no enclave with known permissions: there is no policy to print"
-        raise ManifestError("\n".join((*plan.problems, nothing)))
+        raise ManifestError("\n".join((*map(str, plan.problems), nothing)))
     return policy_xml(plan.derived.policy).decode()
 
 
@@ -240,6 +240,6 @@ def _run_settings(options: argparse.Namespace) -> RunSettings:
     )
 
 
-def _warn(texts: Iterable[str]) -> None:
+def _warn(texts: Iterable[object]) -> None:
     for text in texts:
         print(f"secure-launch: warning: {text}", file=sys.stderr)

@@ -35,7 +35,7 @@ def run(case: Case, distro: str, folder: Path, prefix: Path, *, with_supposition
             evaluation = failure.partial
             shown = likeliest(failure.cause) if failure.cause is not None else failure
             error = (type(shown).__name__, str(shown))
-    logs += [("WARNING", text) for text in evaluation.warnings]
+    logs += [("WARNING", warning.text) for warning in evaluation.warnings]
     folders = {str(folder): "DIR", str(prefix): "PREFIX"}
     return render(_outcome(evaluation, host, logs, error, folders, with_suppositions))
 

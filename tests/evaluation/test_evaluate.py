@@ -118,8 +118,8 @@ def test_missing_packages_go_on_with_a_placeholder_and_one_warning(launch_xml: A
         "/missing/nowhere/lib/nowhere/b",
         "after",
     ]
-    assert sum("package 'nowhere'" in warning for warning in found.warnings) == 1
-    assert any("not included" in warning for warning in found.warnings)
+    assert sum("package 'nowhere'" in warning.text for warning in found.warnings) == 1
+    assert any("not included" in warning.text for warning in found.warnings)
 
 
 def test_without_the_option_a_missing_package_is_an_error(launch_xml: Any) -> None:

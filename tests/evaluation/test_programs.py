@@ -23,7 +23,7 @@ def test_missing_programs_are_named_with_their_place(launch_xml: Any, tmp_path: 
         <executable cmd="tool"><env name="PATH" value="{tmp_path}"/></executable>
         <executable cmd="true" launch-prefix="no_such_prefix"/>
     """)
-    messages = [str(error) for error in missing_programs(found.processes)]
+    messages = [str(error) for _, error in missing_programs(found.processes)]
     assert [message.split("'")[1] for message in messages] == [
         "no_such_program",
         "/nowhere/tool",

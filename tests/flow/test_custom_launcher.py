@@ -88,7 +88,7 @@ def test_a_plan_with_problems_is_not_provisioned(tmp_path: Path) -> None:
     file = tmp_path / "unnamed.launch.xml"
     file.write_text('<launch><node exec="/bin/true" name="mystery"/></launch>')
     plan = resolve(file, options=OPTIONS)
-    assert "no NoDL manifest" in plan.problems[0]
+    assert "no NoDL manifest" in plan.problems[0].text
     with pytest.raises(ManifestError, match="nothing was started or written"):
         provision(plan, tmp_path / "ks")
     assert not (tmp_path / "ks").exists()

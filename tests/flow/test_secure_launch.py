@@ -57,7 +57,7 @@ def test_the_json_is_what_the_contract_says(secure_launch: SecureLaunch) -> None
     assert enclave.nodes == ["/robot1/listener", "/robot1/talker"]
     assert "/robot1/chatter" in enclave.publish and "/robot1/chatter" in enclave.subscribe
     assert "/rosout" in enclave.publish and "/robot1/talker/get_parameters" in enclave.serve_services
-    assert document.warnings == []
+    assert document.warnings == [] and document.diagnostics == []
 
 
 def test_under_secure_the_json_shows_the_enclave_and_its_variables(
@@ -220,7 +220,7 @@ def test_secure_refuses_to_start_anything_when_one_node_has_no_manifest(
     assert looked.returncode == 0 and "no NoDL manifest for bare/compiled" in looked.stdout
     refused = secure_launch("--secure", "--keystore", tmp_path / "ks", *words)
     assert refused.returncode == 1
-    assert f"{file}:3: no NoDL manifest for bare/compiled: looked at " in refused.stderr
+    assert f"{file}:3: <node> no NoDL manifest for bare/compiled: looked at " in refused.stderr
     assert "process started" not in refused.stdout and not (tmp_path / "ks").exists()
 
 

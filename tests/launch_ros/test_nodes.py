@@ -103,7 +103,7 @@ def test_missing_packages_can_be_allowed(launched: Evaluate) -> None:
         "/missing/gone_pkg/lib/gone_pkg/f",
         "/missing/other_gone_pkg/share/other_gone_pkg/x",
     ]
-    assert [warning for warning in result.warnings if "gone_pkg" in warning] == [
+    assert [warning.text for warning in result.warnings if "gone_pkg" in warning.subject] == [
         "package 'gone_pkg' is not installed; using /missing/gone_pkg in its place",
         "package 'other_gone_pkg' is not installed; using /missing/other_gone_pkg in its place",
     ]
@@ -115,7 +115,8 @@ def test_an_installed_package_still_needs_its_program(launched: Evaluate) -> Non
 
 
 def test_ten_nodes_of_one_name_are_warned_about(launched: Evaluate) -> None:
-    warnings = launched('<node pkg="pk" exec="e" name="n" namespace="/"/>' * 3).warnings
+    found = launched('<node pkg="pk" exec="e" name="n" namespace="/"/>' * 3)
+    warnings = [str(warning) for warning in found.warnings]
     assert [warning.split(":")[0] for warning in warnings] == ["e-2", "e-3"]
     assert "at least 3 nodes with the name /n" in warnings[1]
 

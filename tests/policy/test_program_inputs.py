@@ -91,7 +91,7 @@ def test_a_default_is_not_believed_where_launch_may_pass_something_else(case: st
     name, started = DOUBTFUL[case]
     derived = derive(name, started)
     assert topics(derived) == []
-    assert f"the command line may set {name}" in derived.problems[0]
+    assert f"the command line may set {name}" in derived.problems[0].text
 
 
 def test_ros_arguments_and_the_prefix_are_no_inputs() -> None:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from enclave_launch.description.launch.launch_description_entity import LaunchDescriptionEntity
+from enclave_launch.diagnostics import launch_file_deprecated
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.action import Action
@@ -52,10 +53,7 @@ class LaunchDescription(LaunchDescriptionEntity):
     def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         if self.__deprecated_reason is not None:
             file = context.get_locals_as_dict().get("current_launch_file_path")
-            subject = (
-                "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
-            )
-            context.host.warn(f"{subject}: {self.__deprecated_reason}")
+            context.host.warn(launch_file_deprecated(file, self.__deprecated_reason))
         return self.__entities
 
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:

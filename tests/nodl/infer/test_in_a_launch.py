@@ -153,7 +153,7 @@ def test_without_inference_a_secure_start_is_refused(launch: Launch, prefix: Pat
     as_console_script(prefix, tmp_path / "build")
     plan = launch(infer=False)
     (problem,) = plan.problems
-    assert "demo/repeater" in problem
+    assert problem.subject == "demo/repeater"
     with pytest.raises(ManifestError, match="nothing was started or written"):
         provision(plan, tmp_path / "keystore")
     assert not (tmp_path / "keystore").exists()
@@ -162,9 +162,9 @@ def test_without_inference_a_secure_start_is_refused(launch: Launch, prefix: Pat
 def test_a_compiled_node_without_a_manifest_says_how_to_write_one(launch: Launch, prefix: Path) -> None:
     install_program(prefix, b"\x7fELF\x02\x01\x01", "compiled")
     (problem,) = launch('<launch><node pkg="demo" exec="compiled"/></launch>').problems
-    assert "compiled program" in problem
-    assert f"{prefix}/share/demo/*.nodl.xml" in problem
-    assert "describe it in a manifest" in problem
+    assert "compiled program" in problem.text
+    assert f"{prefix}/share/demo/*.nodl.xml" in problem.text
+    assert "describe it in a manifest" in problem.remedy
 
 
 COMPUTED = """
@@ -182,11 +182,11 @@ def test_a_name_known_in_part_is_an_error_unless_accepted(launch: Launch, prefix
     install_program(prefix, PYTHON + COMPUTED, "computed")
     text = '<launch><node pkg="demo" exec="computed" namespace="robot1"/></launch>'
     (problem,) = launch(text).problems
-    assert f"{prefix}/lib/demo/computed:8" in problem
+    assert f"{prefix}/lib/demo/computed:8" in str(problem)
     accepted = launch(text, accept_patterns=True)
     assert not accepted.problems
     assert ("publish", "/robot1/sensors/*") in permissions(accepted)
-    assert any("sensors/*" in warning for warning in accepted.warnings)
+    assert any("sensors/*" in warning.text for warning in accepted.warnings)
 
 
 def test_a_name_not_known_at_all_is_an_error_always(launch: Launch, prefix: Path) -> None:

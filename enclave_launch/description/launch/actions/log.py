@@ -11,6 +11,7 @@ from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.diagnostics import log_level_missing
 from enclave_launch.host.current import current_host
 from enclave_launch.ros_rules.distro import Feature
 
@@ -37,7 +38,7 @@ class Log(LogInfo):
         level = entity.get_attr("level", optional=True)
         host = current_host()
         if level is None and host.release.has(Feature.LOG_NEEDS_LEVEL):
-            host.warn("the action log now expects a level; log_info is the one without")
+            host.warn(log_level_missing())
         kwargs["level"] = parser.parse_substitution("INFO" if level is None else level)
         return cls, kwargs
 

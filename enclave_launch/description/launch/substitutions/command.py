@@ -13,6 +13,7 @@ from enclave_launch.description.launch.utilities import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.diagnostics import command_stderr
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.launch_context import LaunchContext
@@ -78,4 +79,4 @@ def _check(context: LaunchContext, text: str, mode: str, result: CommandResult) 
     if mode == "fail":
         raise SubstitutionFailure(message)
     if mode == "warn":
-        context.host.warn(message)
+        context.host.warn(command_stderr(message, text))

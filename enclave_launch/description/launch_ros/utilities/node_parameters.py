@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.launch_ros.parameter_descriptions import Parameter
 from enclave_launch.description.launch_ros.utilities import yaml_text
 from enclave_launch.description.launch_ros.utilities.evaluate_parameters import evaluate_parameters
+from enclave_launch.diagnostics import parameter_file_missing
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import Section, as_rcl_reads, resolve_parameters
@@ -41,7 +42,7 @@ class NodeParameters:
         if isinstance(item, pathlib.Path):
             path = str(item)
             if context.host.parameter_file(path) is None and not os.path.isfile(path):
-                context.host.warn(f"Parameter file path is not a file: {path}")
+                context.host.warn(parameter_file_missing(path))
                 return ()
             return ("--params-file", path)
         return ("--params-file", self.__write_file(context, section, item))

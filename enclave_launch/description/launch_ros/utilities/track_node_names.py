@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from enclave_launch.description.launch.launch_context import LaunchContext
+from enclave_launch.diagnostics import node_name_repeated
 
 _GLOBAL = "unique_ros_node_names"
 
@@ -25,10 +26,7 @@ def warn_about_repeats(context: LaunchContext, node_name: str, started_by: str) 
     add_node_name(context, node_name)
     count = get_node_name_count(context, node_name)
     if count > 1:
-        context.host.warn(
-            f"{started_by}: there are now at least {count} nodes with the name {node_name} "
-            "created within this launch context"
-        )
+        context.host.warn(node_name_repeated(node_name, count, started_by))
 
 
 def _counts(context: LaunchContext) -> Counter[str]:

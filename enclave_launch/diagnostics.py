@@ -1,0 +1,232 @@
+"""What a person is told about a launch: typed values, each worded here and nowhere else.
+
+A ``Diagnostic`` is a value like any other: reports print it, programs ask for its ``code`` and ``location`` (JSON,
+SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it stands in (``LaunchPlan.problems`` or
+``warnings``). Pure.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from enclave_launch.source_location import SourceLocation
+
+
+class Code(str, Enum):
+    """Stable names, for programs; ``meaning`` says what all diagnostics of a code have in common."""
+
+    meaning: str
+
+    # of the evaluation
+    COMMAND_STDERR = "command-stderr", "A command of the launch file wrote to stderr"
+    INCLUDE_LEFT_OUT = "include-left-out", "An included file belongs to a package that is not installed"
+    LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description calls itself deprecated"
+    LOG_LEVEL_MISSING = "log-level-missing", "The action log needs a level since this distribution"
+    NODE_NAME_REPEATED = "node-name-repeated", "Several nodes have the same fully qualified name"
+    NOT_FORESEEABLE = "not-foreseeable", "An action only exists once a callback has run"
+    PACKAGE_NOT_INSTALLED = "package-not-installed", "A placeholder stands for a package"
+    PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file is not there"
+    PROGRAM_NOT_INSTALLED = "program-not-installed", "A placeholder stands for what a program would write"
+    PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start is not there"
+    # of interfaces and permissions
+    ACTION_REMAP_IDLE = "action-remap-idle", "A remap rule for an action has no effect in this distribution"
+    INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not (wholly) known"
+    NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"
+    NO_MANIFEST = "no-manifest", "Nothing says what a node or component does"
+    NODE_NAME_IMPOSSIBLE = "node-name-impossible", "No node can run under the name it is given"
+    PATTERN_ACCEPTED = "pattern-accepted", "A partly known name became a wildcard"
+    PERMISSIONS_LARGE = "permissions-large", "The permissions of an enclave come near what DDS can carry"
+    POLICY_ANSWERS = "policy-answers", "The policy file says what the manifest leaves open"
+    POLICY_DENIES_NEED = "policy-denies-need", "The policy file takes away what a node needs"
+    POLICY_ENCLAVE_UNUSED = "policy-enclave-unused", "The policy file has an enclave that this launch has not"
+    POLICY_FILE = "policy-file", "A remark about the policy file itself"
+    # of processes and enclaves
+    CONTAINER_ELSEWHERE = (
+        "container-elsewhere",
+        "A component goes into a container that is not of this launch",
+    )
+    ENCLAVE_ATTRIBUTE_UNUSED = "enclave-attribute-unused", "The process names another enclave itself"
+    ENCLAVE_SHARED_WITH_LAUNCHER = "enclave-shared-with-launcher", "A process has the launcher's enclave"
+    EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
+
+    def __new__(cls, value: str, meaning: str = "") -> Code:
+        code = str.__new__(cls, value)
+        code._value_ = value
+        code.meaning = meaning
+        return code
+
+    def __str__(self) -> str:
+        return str.__str__(self)
+
+
+class Diagnostic(NamedTuple):
+    """``subject``: the node, program, enclave or file it is about; ``remedy``: what to do next, empty when nothing
+    is wrong. ``str`` is the whole as one message for a person."""
+
+    code: Code
+    subject: str
+    text: str
+    location: SourceLocation | None = None
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.location}: " if self.location else ""
+        if self.location and self.location.element:
+            place += f"<{self.location.element}> "
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{place}{self.text}{remedy}"
+
+
+# -- of the evaluation ------------------------------------------------------------------------------------------------
+
+
+def command_stderr(message: str, command: str) -> Diagnostic:
+    return Diagnostic(Code.COMMAND_STDERR, command, message)
+
+
+def include_left_out(path: str) -> Diagnostic:
+    return Diagnostic(
+        Code.INCLUDE_LEFT_OUT, path, f"not included, because its package is not installed: {path}"
+    )
+
+
+def launch_file_deprecated(file: str | None, reason: str) -> Diagnostic:
+    what = "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
+    return Diagnostic(Code.LAUNCH_FILE_DEPRECATED, file or "", f"{what}: {reason}")
+
+
+def log_level_missing() -> Diagnostic:
+    return Diagnostic(
+        Code.LOG_LEVEL_MISSING, "log", "the action log now expects a level; log_info is the one without"
+    )
+
+
+def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
+    text = (
+        f"{started_by}: there are now at least {count} nodes with the name {node} "
+        "created within this launch context"
+    )
+    return Diagnostic(Code.NODE_NAME_REPEATED, node, text)
+
+
+def not_foreseeable(what: str, location: SourceLocation) -> Diagnostic:
+    return Diagnostic(Code.NOT_FORESEEABLE, what, f"not foreseeable: {what}", location)
+
+
+def package_not_installed(package: str, placeholder: str) -> Diagnostic:
+    text = f"package '{package}' is not installed; using {placeholder} in its place"
+    return Diagnostic(Code.PACKAGE_NOT_INSTALLED, package, text)
+
+
+def parameter_file_missing(path: str) -> Diagnostic:
+    return Diagnostic(Code.PARAMETER_FILE_MISSING, path, f"Parameter file path is not a file: {path}")
+
+
+def program_not_installed(program: str) -> Diagnostic:
+    text = f"program '{program}' is not installed; a placeholder stands for what it would write"
+    return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
+
+
+def program_not_executable(program: str, text: str, location: SourceLocation | None) -> Diagnostic:
+    return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)
+
+
+# -- of interfaces and permissions ------------------------------------------------------------------------------------
+
+_OTHER_NAME = "it could not start: give it another name or namespace"
+IN_MANIFEST = (
+    "describe it in a manifest (secure-nodl infer makes a first one from the source), installed with the package or "
+    "named with --nodl"
+)
+
+
+def action_remap_idle(node: str, rule: str, action: str, distro: str, place: SourceLocation) -> Diagnostic:
+    text = (
+        f"remap rule {rule} has no effect on action {action} of node {node}: {distro} remaps only the five names "
+        f"below {action}/_action/, one by one"
+    )
+    return Diagnostic(Code.ACTION_REMAP_IDLE, node, text, place)
+
+
+def interface_unknown(node: str, why: str, program: str, place: SourceLocation) -> Diagnostic:
+    remedy = f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
+    return Diagnostic(Code.INTERFACE_UNKNOWN, node, f"node {node}: {why}", place, remedy)
+
+
+def policy_answers(unknown: Diagnostic) -> Diagnostic:
+    text = f"{unknown.text}; the policy file says what it may do"
+    return Diagnostic(Code.POLICY_ANSWERS, unknown.subject, text, unknown.location)
+
+
+def name_unremappable(node: str, name: str, place: SourceLocation) -> Diagnostic:
+    text = f"node {node}: '{name}' contains '__', which no remap rule can name"
+    return Diagnostic(Code.NAME_UNREMAPPABLE, node, text, place)
+
+
+def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
+    return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, IN_MANIFEST)
+
+
+def node_name_impossible(node: str, why: str, place: SourceLocation) -> Diagnostic:
+    return Diagnostic(Code.NODE_NAME_IMPOSSIBLE, node, f"node {node}: {why}", place, _OTHER_NAME)
+
+
+def pattern_accepted(node: str, operation: str, name: str, note: str, place: SourceLocation) -> Diagnostic:
+    return Diagnostic(Code.PATTERN_ACCEPTED, node, f"node {node} may {operation} {name}: {note}", place)
+
+
+def permissions_large(enclave: str, text: str) -> Diagnostic:
+    return Diagnostic(Code.PERMISSIONS_LARGE, enclave, text)
+
+
+def policy_enclave_unused(path: str) -> Diagnostic:
+    text = f"enclave {path} of the policy file is not used by this launch and was left out"
+    return Diagnostic(Code.POLICY_ENCLAVE_UNUSED, path, text)
+
+
+def policy_denies_need(
+    denied: str, enclave: str, node: str, need: str, why: str, place: SourceLocation
+) -> Diagnostic:
+    text = f"{denied} is denied in enclave {enclave}, but node {node} needs {need} ({why})"
+    return Diagnostic(Code.POLICY_DENIES_NEED, node, text, place)
+
+
+def policy_file(subject: str, text: str) -> Diagnostic:
+    """In the words of the keystore's own reader, which knows the place."""
+    return Diagnostic(Code.POLICY_FILE, subject, text)
+
+
+# -- of processes and enclaves ----------------------------------------------------------------------------------------
+
+
+def container_elsewhere(
+    component: str, container: str, alike: tuple[str, ...], place: SourceLocation
+) -> Diagnostic:
+    """``alike``: containers of this launch whose last name is the same."""
+    text = (
+        f"container {container!r} of component {component} is not started by this launch file; its permissions are "
+        "not part of this plan"
+    )
+    if (
+        alike
+    ):  # a target is taken as it is written, without pushed namespaces (launch_ros load_composable_nodes.py)
+        text += f" (this launch file starts {' '.join(alike)}: a target needs its full name)"
+    return Diagnostic(Code.CONTAINER_ELSEWHERE, component, text, place)
+
+
+def enclave_attribute_unused(process: str, enclave: str, attribute: str, place: SourceLocation) -> Diagnostic:
+    own = f"{process} has --enclave {enclave} in its own ROS arguments"
+    text = f"{own}; its enclave attribute {attribute!r} is not used"
+    return Diagnostic(Code.ENCLAVE_ATTRIBUTE_UNUSED, process, text, place)
+
+
+def enclave_shared_with_launcher(enclave: str) -> Diagnostic:
+    return Diagnostic(
+        Code.ENCLAVE_SHARED_WITH_LAUNCHER, enclave, f"enclave {enclave} is shared with the launcher itself"
+    )
+
+
+def executable_without_enclave(process: str, place: SourceLocation) -> Diagnostic:
+    text = f"{process} runs without an enclave: an executable gets one only through its enclave attribute"
+    return Diagnostic(Code.EXECUTABLE_WITHOUT_ENCLAVE, process, text, place)
