@@ -24,6 +24,7 @@ ALLOWED = {
 # The floors of enclave_launch, lowest first: a room imports its own modules and those of the floors below it.
 FLOORS = (
     {"source_location"},
+    {"diagnostics"},
     {"ros_rules"},
     {"errors", "process"},
     {"frontend", "host"},
