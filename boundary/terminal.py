@@ -54,6 +54,11 @@ def safe_output() -> Iterator[None]:
         yield
 
 
+def raw(stream: TextIO) -> TextIO:
+    """The stream behind one of ``safe_output``: for control characters of our own, such as a progress bar's."""
+    return stream._stream if isinstance(stream, _SafeText) else stream
+
+
 class _SafeText:
     """A text stream that escapes what it is given; otherwise the stream itself."""
 

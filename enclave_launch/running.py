@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Union
 
+from boundary.terminal import printable_lines
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
@@ -61,7 +62,7 @@ def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
         evaluation.components,
         PlanProvider(launch),
         allow_late=settings.allow_late,
-        say_late=lambda text: print(f"secure-launch: warning: {text}", file=sys.stderr),
+        say_late=lambda text: print(f"secure-launch: warning: {printable_lines(text)}", file=sys.stderr),
     )
 
 

@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from os import PathLike
 
+from boundary.terminal import quoted
+
 
 class KeystoreError(Exception):
     """Root of the tree. ``exit_status`` is what the command line returns."""
@@ -71,5 +73,4 @@ class StorageError(KeystoreError):
 
 def printable(text: str | PathLike[str]) -> str:
     """``text`` quoted for a terminal: names from outside may hold escape sequences."""
-    shown = str(text)
-    return f"'{shown}'" if shown.isprintable() and "'" not in shown else ascii(shown)
+    return quoted(text)

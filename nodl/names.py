@@ -12,6 +12,8 @@ from __future__ import annotations
 
 import re
 
+from boundary.terminal import quoted
+
 MAX_NODE_NAME_LENGTH = 255
 MAX_NAMESPACE_LENGTH = 245
 MAX_NAME_LENGTH = 247
@@ -38,7 +40,7 @@ class InvalidNameError(ValueError):
 
 def shown(name: str) -> str:
     """``name`` in quotes, control characters escaped, so that it cannot play tricks in a terminal."""
-    return ascii(name) if not name.isprintable() else f"'{name}'"
+    return quoted(name)
 
 
 def validate_node_name(name: str) -> None:

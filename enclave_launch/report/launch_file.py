@@ -8,6 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
+from boundary.terminal import printable
+
 if TYPE_CHECKING:
     from enclave_launch.description.launch.actions.declare_launch_argument import DeclareLaunchArgument
     from enclave_launch.description.launch.launch_description import LaunchDescription
@@ -24,12 +26,13 @@ def arguments_text(description: LaunchDescription) -> str:
 
 
 def _argument(argument: DeclareLaunchArgument) -> Iterator[str]:
-    yield f"    '{argument.name}':{'*' if argument._conditionally_included else ''}"
+    yield f"    '{printable(argument.name)}':{'*' if argument._conditionally_included else ''}"
     yield f"        {argument.description}"
     if argument.choices:
         yield f"        one of: {', '.join(repr(choice) for choice in argument.choices)}"
     if argument.default_value is not None:
-        yield f"        (default: {' + '.join(part.describe() for part in argument.default_value)})"
+        default = " + ".join(part.describe() for part in argument.default_value)
+        yield f"        (default: {printable(default)})"
 
 
 def description_text(description: LaunchDescription) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+from boundary.terminal import printable_lines
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 
@@ -17,7 +18,11 @@ def params_yaml(plan: LaunchPlan) -> str:
         if parameters:
             section = sections.setdefault(name, {"ros__parameters": {}})
             section["ros__parameters"].update({key: _plain(value) for key, value in parameters.items()})
-    return yaml.safe_dump(sections, sort_keys=True, allow_unicode=True) if sections else ""
+    if not sections:
+        return ""
+    text = yaml.safe_dump(sections, sort_keys=True, allow_unicode=True)
+    readable = printable_lines(text) == text
+    return text if readable else yaml.safe_dump(sections, sort_keys=True)  # with YAML's own escapes
 
 
 def _named(plan: LaunchPlan) -> Iterator[tuple[str, Mapping[str, ParameterValue]]]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 
+from boundary.terminal import json_text
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
@@ -32,7 +32,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
 
 
 def plan_json(plan: LaunchPlan, security: SecuritySettings | None = None) -> str:
-    return json.dumps(plan_document(plan, security), indent=2, ensure_ascii=False)
+    return json_text(plan_document(plan, security), indent=2)
 
 
 def _process(item: PlannedProcess, security: SecuritySettings | None) -> dict[str, object]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan, PlannedProcess
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.plan_json import allowed_names
@@ -23,7 +24,7 @@ Branch = tuple[str, Sequence["Branch"]]
 
 def plan_tree(plan: LaunchPlan) -> str:
     """Text that ends with a newline. Interfaces that every node has are counted, not listed."""
-    lines = [f"{plan.launch_file} (as {plan.distro})"]
+    lines = [printable(f"{plan.launch_file} (as {plan.distro})")]
     gains = gains_by_sharing(plan.derived, composed_only=True)
     lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves])
     outside = _outside(plan)
@@ -95,6 +96,6 @@ def _draw(branches: Sequence[Branch], indent: str = "") -> list[str]:
     lines: list[str] = []
     for index, (text, below) in enumerate(branches):
         last = index == len(branches) - 1
-        lines.append(f"{indent}{'└── ' if last else '├── '}{text}")
+        lines.append(f"{indent}{'└── ' if last else '├── '}{printable(text)}")
         lines += _draw(below, indent + ("    " if last else "│   "))
     return lines

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
+from boundary.terminal import printable, printable_lines
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
@@ -44,7 +45,8 @@ class LaunchLog:
         if LEVELS[level] < LEVELS["INFO"] and not self.debug:
             return
         for sink, render in ((self.screen, self._on_screen), (self.launch_file, self._in_file)):
-            self.writer.write(sink, (render(level, name, message) + "\n").encode(errors="replace"))
+            line = render(level, printable(name), printable_lines(message))
+            self.writer.write(sink, (line + "\n").encode(errors="replace"))
 
     def file(self, name: str) -> FileSink:
         """The one sink for ``name`` in the log directory."""

@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
+from boundary.terminal import printable
 from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.process_tree import Stream
 from enclave_launch.runtime.sinks import Sink
@@ -90,7 +91,7 @@ class OutputRouter:
         self, log: LaunchLog, name: str, routes: Routes, render_line: Callable[[str], str] | None = None
     ) -> None:
         self._log = log
-        self._prefix = f"[{name}] ".encode()
+        self._prefix = f"[{printable(name)}] ".encode()
         self._render_line = render_line
         self._buffers: dict[Stream, LineBuffer] = {"stdout": LineBuffer(), "stderr": LineBuffer()}
         self._sinks = {stream: tuple(_sinks_of(log, name, stream, routes)) for stream in self._buffers}

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from boundary.terminal import printable, safe_output
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 
@@ -27,6 +28,11 @@ _ALLOCATIONS = 100_000
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv`` (default: the program's own). Gives the exit status, never a traceback
     for what a user can cause."""
+    with safe_output():
+        return _guarded_main(argv)
+
+
+def _guarded_main(argv: Sequence[str] | None) -> int:
     options = build_parser().parse_intermixed_args(argv)
     before = gc.get_threshold()
     gc.set_threshold(_ALLOCATIONS)
@@ -190,7 +196,7 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
         raise UsageError(
             f"{subject!r} is no enclave, node, topic, service or action of this launch; enclaves: {known}"
         )
-    return "\n".join(lines) + "\n"
+    return "\n".join(map(printable, lines)) + "\n"
 
 
 def _launch_plainly(target: Target, options: argparse.Namespace) -> int:

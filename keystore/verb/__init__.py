@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from boundary.terminal import safe_output
 from keystore.errors import KeystoreError
 from keystore.formats.policy import PolicyError
 
@@ -23,8 +24,12 @@ VERBS = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Errors become one line on stderr and an exit status; nothing is printed twice."""
-    parser = _parser()
-    arguments = parser.parse_args(argv)
+    with safe_output():
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
+    arguments = _parser().parse_args(argv)
     try:
         status: int = arguments.run(arguments)
         sys.stdout.flush()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import json
 import math
 import sys
 import time
@@ -13,6 +12,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from boundary.terminal import json_text, raw
 from keystore.errors import InvalidInput
 from keystore.formats.validity import parse_duration, parse_end, utc_now
 
@@ -148,11 +148,11 @@ class ProgressBar:
         filled = _BAR_WIDTH * done // max(total, 1)
         bar = f"\r[{'#' * filled}{'.' * (_BAR_WIDTH - filled)}] {done}/{total} enclaves"
         end = "\r\033[K" if done == total else ""
-        print(bar + end, end="", file=sys.stderr, flush=True)
+        print(bar + end, end="", file=raw(sys.stderr), flush=True)
 
 
 def print_json(content: Any) -> None:
-    print(json.dumps(content, indent=2, sort_keys=True, default=str))
+    print(json_text(content, indent=2, sort_keys=True, default=str))
 
 
 def print_lines(lines: Iterable[str]) -> None:

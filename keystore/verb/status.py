@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
+from boundary.terminal import printable
 from keystore.verb import common
 
 if TYPE_CHECKING:
@@ -68,9 +69,9 @@ def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
 def _print(report: StatusReport, shown: tuple[Expiry, ...]) -> None:
     from keystore.formats.validity import iso
 
-    print(f"{len(report.enclaves)} enclaves in {report.keystore}")
+    print(f"{len(report.enclaves)} enclaves in {printable(str(report.keystore))}")
     for one in shown:
-        print(f"{iso(one.not_after)}  {_left(one, report.now):>14}  {one.subject}")
+        print(f"{iso(one.not_after)}  {_left(one, report.now):>14}  {printable(one.subject)}")
     if not shown and report.expiries:
         first = report.expiries[0]
         print(f"nothing is due; the first to end is the {first.subject}, {iso(first.not_after)}")

@@ -10,11 +10,18 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from boundary.terminal import safe_output
+
 VERBS = ("convert", "infer", "show", "validate")
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """The command line; returns the exit status."""
+    with safe_output():
+        return _main(argv)
+
+
+def _main(argv: Sequence[str] | None) -> int:
     from nodl.errors import NoDLError
 
     arguments = build_parser().parse_args(argv)

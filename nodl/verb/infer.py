@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from boundary.terminal import printable
 from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):
         print(f"{len(expanded.unresolved)} unresolved:", file=sys.stderr)
         for question in expanded.unresolved:
-            print(f"  {question.source}: {question.why}", file=sys.stderr)
+            print(printable(f"  {question.source}: {question.why}"), file=sys.stderr)
     return 0 if system.nodes else 1
 
 
@@ -93,7 +94,7 @@ def _write(folder: Path, documents: dict[str, str]) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in documents.items():
         (folder / name).write_text(_encodable(text), encoding="utf-8")
-        print(folder / name)
+        print(printable(str(folder / name)))
 
 
 def _encodable(text: str) -> str:

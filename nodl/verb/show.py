@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 from collections.abc import Iterable, Iterator
 
+from boundary.terminal import json_text, printable
 from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.lookup import ManifestLookup
@@ -44,9 +44,9 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         nodes, missing = _of_package(ManifestLookup(prefixes), arguments.subject, arguments.names)
     if arguments.format == "json":
-        print(json.dumps([_plain(node) for node in nodes], indent=2))
+        print(json_text([_plain(node) for node in nodes], indent=2))
     elif nodes:
-        print("\n".join(line for node in nodes for line in _lines(node)))
+        print("\n".join(printable(line) for node in nodes for line in _lines(node)))
     for text in missing:
         print(text, file=sys.stderr)
     return 1 if missing or not nodes else 0

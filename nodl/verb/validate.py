@@ -6,6 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from boundary.terminal import printable
 from nodl.ament_index import search_prefixes
 from nodl.document import V1_SUFFIX, read_document
 from nodl.errors import NoDLError
@@ -39,5 +40,5 @@ def run(arguments: argparse.Namespace) -> int:
             print(error, file=sys.stderr)
         else:
             names = ", ".join(node.interface.name or "(name not given)" for node in nodes)
-            print(f"{file}: valid NoDL v{nodes[0].version}: {names}")
+            print(printable(f"{file}: valid NoDL v{nodes[0].version}: {names}"))
     return 1 if wrong else 0

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-
+from boundary.terminal import json_text
 from nodl.infer.report.expanded import ExpandedSystem, Interface, Node
 
 
@@ -16,7 +15,7 @@ def to_json(system: ExpandedSystem, *, built_in: bool = False) -> str:
             for question in system.unresolved
         ],
     }
-    return json.dumps(document, indent=2, ensure_ascii=False) + "\n"
+    return json_text(document, indent=2) + "\n"
 
 
 def _node(node: Node, built_in: bool) -> dict[str, object]:

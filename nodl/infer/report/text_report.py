@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from boundary.terminal import printable
 from nodl.infer.report.expanded import ExpandedSystem
 
 
@@ -18,4 +19,4 @@ def to_text(system: ExpandedSystem, *, built_in: bool = False) -> str:
     if system.unresolved:
         lines.append(f"{len(system.unresolved)} unresolved:")
         lines.extend(f"  {question.source}: {question.why}" for question in system.unresolved)
-    return "".join(f"{line}\n" for line in lines)
+    return "".join(f"{printable(line)}\n" for line in lines)
