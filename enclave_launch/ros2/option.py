@@ -96,4 +96,4 @@ def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...
 
 def _say(*texts: object) -> None:
     for text in texts:
-        print(f"ros2 launch: warning: {printable_lines(text)}", file=sys.stderr)
+        print(f"ros2 launch: warning: {printable_lines(str(text))}", file=sys.stderr)
