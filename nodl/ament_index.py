@@ -17,6 +17,8 @@ import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from boundary.files import read_text
+
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
 _PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
@@ -163,8 +165,7 @@ def read_resource(resource_type: str, name: str, prefixes: Sequence[str]) -> Res
         )
     path = os.path.join(prefix, INDEX_FOLDER, resource_type, name)
     try:
-        with open(path, encoding="utf-8") as file:
-            return Resource(file.read(), prefix)
+        return Resource(read_text(path), prefix)
     except OSError as error:
         raise OSError(f"Could not open the resource '{name}' of type '{resource_type}':\n{error}") from error
 

@@ -10,6 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
+from boundary.files import read_bytes
 from nodl.ament_index import package_share_directory, search_prefixes
 from nodl.document import V1_SUFFIX
 from nodl.document.manifest_node import ManifestNode
@@ -37,7 +38,7 @@ def parse(path: str | Path | IO[bytes] | IO[str]) -> list[Node]:
     if isinstance(path, (str, Path)):
         file = str(Path(path).resolve())
         try:
-            content: bytes | str = Path(file).read_bytes()
+            content: bytes | str = read_bytes(file)
         except OSError as error:
             raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None
     else:

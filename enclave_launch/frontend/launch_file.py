@@ -6,13 +6,13 @@ repeated includes then read and parse once. Only text and immutable trees are ke
 
 from __future__ import annotations
 
-import errno
 import io
 import os
-import stat
 from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any, TextIO, TypeVar
+
+from boundary.files import check_regular, read_text
 
 MAX_CHARACTERS = 64 * 2**20  # of one launch file; a generated file with 100,000 nodes has about a third
 _MAX_KEPT_CHARACTERS = 32 * 2**20  # text of all kept files; their trees take about ten times that
@@ -67,9 +67,7 @@ def read(file: str | bytes | os.PathLike[str] | TextIO) -> LaunchFile:
     if not isinstance(file, str | bytes | os.PathLike):
         return LaunchFile(str(getattr(file, "name", "")), _limited(file.read()))
     path = os.fsdecode(file)
-    status = os.stat(path)
-    if stat.S_ISFIFO(status.st_mode):
-        raise OSError(errno.EINVAL, "A pipe, not a file", path)  # reading could wait for ever
+    status = check_regular(path)
     stamp = (path, status.st_ino, status.st_mtime_ns, status.st_size)
     kept = _kept.get(stamp)
     if kept is not None:
@@ -86,8 +84,7 @@ def forget() -> None:
 
 
 def _read_text(path: str) -> str:
-    with open(path, encoding="utf-8") as file:
-        return _limited(file.read(MAX_CHARACTERS + 1))
+    return _limited(read_text(path, limit=4 * MAX_CHARACTERS))
 
 
 def _limited(text: str) -> str:

@@ -6,15 +6,14 @@ would run it. Nothing is written: no ``__pycache__`` beside the launch file.
 
 from __future__ import annotations
 
-import errno
 import os
-import stat
 import traceback
 from functools import lru_cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from types import CodeType, ModuleType
 
+from boundary.files import check_regular, read_bytes
 from enclave_launch.source_location import SourceLocation
 
 MODULE_NAME = "python_launch_file"
@@ -29,9 +28,7 @@ def run(path: str, *, allowed: bool) -> ModuleType:
 
     Raises ``PythonRefused`` unless ``allowed``, ``OSError``, ``SyntaxError``, and whatever the file raises.
     """
-    status = os.stat(path)  # a missing file is reported as such even where Python is refused
-    if stat.S_ISFIFO(status.st_mode):
-        raise OSError(errno.EINVAL, "A pipe, not a file", path)
+    check_regular(path)  # a missing file is reported as such even where Python is refused
     if not allowed:
         raise PythonRefused(f"'{path}' would have to be run as Python, which --no-python refuses")
     loader = _Loader(MODULE_NAME, path)
@@ -62,7 +59,5 @@ class _Loader(SourceFileLoader):
 
 @lru_cache(maxsize=512)
 def _compile(path: str, *_version: int) -> CodeType:
-    with open(path, "rb") as file:
-        source = file.read()
-    code: CodeType = compile(source, path, "exec", dont_inherit=True)
+    code: CodeType = compile(read_bytes(path), path, "exec", dont_inherit=True)
     return code

@@ -18,6 +18,8 @@ from enum import Enum
 from functools import lru_cache
 from typing import NamedTuple
 
+from boundary.files import read_text
+
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)
 
@@ -202,10 +204,10 @@ def _installed_version(package: str, prefixes: Sequence[str]) -> Version | None:
     for prefix in prefixes:
         manifest = os.path.join(prefix, "share", package, "package.xml")
         try:
-            with open(manifest, encoding="utf-8") as file:
-                found = re.search(r"<version[^>]*>\s*([0-9.]+)\s*</version>", file.read(4096))
+            text = read_text(manifest, errors="replace")
         except OSError:
             continue
+        found = re.search(r"<version[^>]*>\s*([0-9.]+)\s*</version>", text[:4096])
         if found:
             return tuple(int(part) for part in found.group(1).split(".") if part)
     return None

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
+from boundary.files import read_text
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
 
@@ -85,13 +86,16 @@ def section_applies(section: str, fqn_tokens: Sequence[str | None]) -> bool:
 
 
 def _matches(pattern: Sequence[str], tokens: Sequence[str | None]) -> bool:
-    if not pattern:
-        return not tokens
-    if pattern[0] == "**":
-        return any(_matches(pattern[1:], tokens[skip:]) for skip in range(len(tokens) + 1))
-    if not tokens or pattern[0] not in ("*", tokens[0]):
-        return False
-    return _matches(pattern[1:], tokens[1:])
+    """Keeps the set of token counts that the pattern read so far can stand for: no pattern takes long."""
+    reached = {0}
+    for part in pattern:
+        if part == "**":
+            reached = set(range(min(reached), len(tokens) + 1))
+        else:
+            reached = {at + 1 for at in reached if at < len(tokens) and part in ("*", tokens[at])}
+        if not reached:
+            return False
+    return len(tokens) in reached
 
 
 def as_rcl_reads(value: Any) -> ParameterValue:
@@ -117,8 +121,10 @@ def _parse_value(text: str) -> ParameterValue | None:
         return _scalar(text)
     import yaml
 
+    from boundary.yaml_nodes import compose
+
     try:
-        node = yaml.compose(text, Loader=_loader())
+        node = compose(text)
     except yaml.YAMLError:
         return None
     return _value(node)
@@ -128,9 +134,10 @@ def _parse_value(text: str) -> ParameterValue | None:
 def _read_cached(path: str, _modified: int, _size: int) -> Mapping[str, Section]:
     import yaml
 
+    from boundary.yaml_nodes import compose
+
     try:
-        with open(path, encoding="utf-8") as file:
-            document = yaml.compose(file, Loader=_loader())
+        document = compose(read_text(path))
     except (OSError, UnicodeDecodeError, yaml.YAMLError):
         return {}
     sections: dict[str, dict[str, ParameterValue]] = {}
@@ -145,12 +152,6 @@ def _read_file(path: str) -> Mapping[str, Section]:
     except OSError:
         return {}
     return _read_cached(os.path.abspath(path), status.st_mtime_ns, status.st_size)
-
-
-def _loader() -> Any:
-    import yaml
-
-    return getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def _collect_sections(

@@ -29,6 +29,7 @@ from typing import Any
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, StrictStr, ValidationError
 
+from boundary.files import read_bytes
 from keystore.errors import InvalidInput, printable
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule
@@ -68,7 +69,7 @@ class _Document(_Strict):
 def load_governance_yaml(path: Path) -> Governance:
     """Raises InvalidInput naming the file and the line or the entry."""
     try:
-        text = path.read_bytes()
+        text = read_bytes(path, _MAX_BYTES)
     except OSError as error:
         raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
     return parse_governance_yaml(text, str(path))

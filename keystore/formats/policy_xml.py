@@ -14,6 +14,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from boundary.files import read_bytes
 from keystore.errors import InvalidEnclaveName, InvalidInput, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.permissions_names import full_name, has_wildcard
@@ -57,10 +58,8 @@ def read_policy(path: str | Path) -> PolicyDocument:
     Raises ``PolicyError`` (an ``InvalidInput``) with file:line.
     """
     file = Path(path)
-    if file.is_fifo():
-        raise PolicyError(f"cannot read policy {printable(file)}: it is a pipe, not a file")
     try:
-        document = file.read_bytes()
+        document = read_bytes(file)
     except OSError as error:
         raise PolicyError(f"cannot read policy {printable(file)}: {error.strerror}") from None
     return parse_policy(document, str(file), folder=file.parent)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from boundary.files import read_bytes
 from keystore.errors import printable
 from keystore.formats.policy import PolicyError
 from keystore.formats.safe_xml import parse_xml
@@ -100,7 +101,7 @@ class IncludingReader:
     def _root(self, path: Path, where: str) -> etree._Element:
         if path not in self._roots:
             try:
-                document = path.read_bytes()
+                document = read_bytes(path, MAX_TOTAL_BYTES)
             except OSError as error:
                 raise PolicyError(f"{where}: cannot include {printable(path)}: {error.strerror}") from None
             self._bytes += len(document)

@@ -45,7 +45,8 @@ class Secret:
     def _fetch(self) -> bytes:
         try:
             if self.file is not None:
-                content = self.file.read_bytes()[: _MAX_SECRET + 3]
+                with open(self.file, "rb") as stream:  # a pipe, too: that is how a shell hands secrets over
+                    content = stream.read(_MAX_SECRET + 3)
             elif self.descriptor is not None:
                 content = _read_all(self.descriptor)
             else:

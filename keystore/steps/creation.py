@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
+from boundary.files import read_bytes
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.governance_file import covers, governance_stands
 from keystore.disk.safe_files import resolve_root
@@ -232,7 +233,7 @@ def _import_ca(role: Role, options: CreateOptions, warnings: list[str]) -> tuple
 
 def _read_given(path: Path) -> bytes:
     try:
-        return path.read_bytes()
+        return read_bytes(path)
     except OSError as error:
         raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import stat
 from collections.abc import Sequence
 from pathlib import Path
 
+from boundary.files import read_bytes
 from nodl.document.manifest_node import ManifestNode
 from nodl.errors import InvalidNoDLError
 from nodl.source_ref import SourceRef
@@ -45,13 +45,7 @@ def resource_key(package: str, name: str) -> str:
 
 def _read(file: str) -> bytes:
     try:
-        status = os.stat(file)
-        if stat.S_ISFIFO(status.st_mode):
-            raise InvalidNoDLError.at(SourceRef(file), "is a pipe, not a file")  # reading could wait for ever
-        if status.st_size > _MAX_BYTES:
-            raise InvalidNoDLError.at(SourceRef(file), f"larger than the allowed {_MAX_BYTES} bytes")
-        with open(file, "rb") as stream:
-            return stream.read()
+        return read_bytes(file, _MAX_BYTES)
     except OSError as error:
         raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None
 

@@ -7,12 +7,12 @@ including one, inside the same package. Files are compared by their resolved pat
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from boundary.files import read_bytes
 from nodl.ament_index import INDEX_FOLDER, find_resource
 from nodl.document import RESOURCE_TYPE, resource_key
 from nodl.document.v2_schema import check_document
@@ -115,10 +115,6 @@ def package_root(document: Path) -> Path:
 
 def _read(path: Path, source: SourceRef) -> bytes:
     try:
-        if not path.is_file() and path.exists() and not path.is_dir():
-            raise IncludeError.at(source, f"cannot read {path}: not a regular file")
-        if os.path.getsize(path) > MAX_BYTES:
-            raise IncludeError.at(source, f"{path} is larger than the allowed {MAX_BYTES} bytes")
-        return path.read_bytes()
+        return read_bytes(path, MAX_BYTES)
     except OSError as error:
         raise IncludeError.at(source, f"cannot read {path}: {error.strerror}") from None

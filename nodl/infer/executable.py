@@ -14,8 +14,8 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
+from boundary.files import check_regular, read_text
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executable_path
 from nodl.infer.analysis import start, start_function
 from nodl.infer.interpreter.run import Run
@@ -83,6 +83,7 @@ def _with_gaps(interfaces: list[NodeInterface], run: Run) -> tuple[NodeInterface
 def _is_python(path: str) -> bool:
     """By the first line, or the suffix of a script without one."""
     try:
+        check_regular(path)
         with open(path, "rb") as stream:
             start_of_file = stream.read(256)
     except OSError:
@@ -100,7 +101,7 @@ class _Finder:
         self._program = Program(folder for site in self._sites for folder in (site, *_linked_folders(site)))
 
     def run(self, path: str, package: str, executable: str) -> Run:
-        text = Path(path).read_text(encoding="utf-8", errors="replace")
+        text = read_text(path, errors="replace")
         developed = _DEVELOPED.search(text)
         if developed and "exec(" in text and os.path.isfile(developed[1]):
             return self.run(developed[1], package, executable)
@@ -151,7 +152,7 @@ def _linked_folders(site: str) -> Iterator[str]:
 
 def _lines(path: str) -> list[str]:
     try:
-        return [line.strip() for line in Path(path).read_text(encoding="utf-8").splitlines() if line.strip()]
+        return [line.strip() for line in read_text(path).splitlines() if line.strip()]
     except (OSError, UnicodeDecodeError):
         return []
 
@@ -170,7 +171,7 @@ class _EntryPoints(configparser.ConfigParser):
 def _console_script(path: str, name: str) -> str | None:
     parser = _EntryPoints(delimiters=("=",), interpolation=None, strict=False)
     try:
-        parser.read(path, encoding="utf-8")
-    except (configparser.Error, UnicodeDecodeError):
+        parser.read_string(read_text(path), path)
+    except (OSError, configparser.Error, UnicodeDecodeError):
         return None
     return parser.get("console_scripts", name, fallback=None)

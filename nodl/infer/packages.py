@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
+from boundary.files import read_text
+
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _PROGRAMS = re.compile(r"install\s*\(\s*PROGRAMS(.*?)DESTINATION", re.S | re.I)
@@ -57,7 +59,7 @@ def read_package(folder: str) -> Package:
 
 def _text(path: Path) -> str:
     try:
-        return path.read_text(encoding="utf-8", errors="replace")
+        return read_text(path, errors="replace")
     except OSError:
         return ""
 

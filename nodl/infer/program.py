@@ -7,12 +7,13 @@ of the roots (folders that hold top-level packages). What is not found there is 
 from __future__ import annotations
 
 import ast
+import errno
 import os
-import stat
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
-from pathlib import Path
+
+from boundary.files import read_bytes
 
 MAX_SOURCE_BYTES = 1_000_000
 
@@ -138,17 +139,17 @@ class Program:
         return listing
 
 
+_UNREADABLE = {errno.EFBIG: "is too large to be a program", errno.EINVAL: "is not a regular file"}
+
+
 def _parse(path: str, name: str) -> SourceModule:
     is_package = os.path.basename(path) == "__init__.py"
     empty = ast.Module(body=[], type_ignores=[])
     try:
-        if not stat.S_ISREG(os.stat(path).st_mode):  # a pipe would wait for its other end
-            return SourceModule(name, path, empty, "", is_package, "is not a regular file")
-        data = Path(path).read_bytes()
+        data = read_bytes(path, MAX_SOURCE_BYTES)
     except OSError as error:
-        return SourceModule(name, path, empty, "", is_package, f"cannot be read: {error.strerror}")
-    if len(data) > MAX_SOURCE_BYTES:
-        return SourceModule(name, path, empty, "", is_package, "is too large to be a program")
+        why = _UNREADABLE.get(error.errno or 0, f"cannot be read: {error.strerror}")
+        return SourceModule(name, path, empty, "", is_package, why)
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # invalid escapes in foreign sources
