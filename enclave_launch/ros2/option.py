@@ -21,6 +21,7 @@ from boundary.terminal import printable_lines
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import add_policy_options, add_security_options, build_parser
+from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, PERMISSIVE_NOTICE, check_needs_secure
 
 SECURE = "secure_enclaves"
 
@@ -30,7 +31,9 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
         add_security_options(group)
         add_policy_options(group)
-        for action in group._group_actions:
+        self._of_secured = tuple(group._group_actions)
+        for action in self._of_secured:
+            action.default = argparse.SUPPRESS  # what is there then was given
             if "--secure" in action.option_strings:
                 action.dest = SECURE
         # What ros2launch_security reads: not asked for.
@@ -38,10 +41,11 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
 
     def prelaunch(self, launch_description: Any, args: argparse.Namespace) -> tuple[Any, ...]:
         """:raises RuntimeError: what ros2 shows as a message, without traceback."""
-        if not getattr(args, SECURE):
-            return (launch_description,)
         try:
-            return (_secured(launch_description, args),)
+            if not getattr(args, SECURE):
+                check_needs_secure(self._of_secured, vars(args).keys() & (FOR_SECURE | FOR_PLAN))
+                return (launch_description,)
+            return (_secured(launch_description, _with_our_defaults(args)),)
         except EnclaveLaunchError as error:
             raise RuntimeError(str(error)) from error
 
@@ -59,9 +63,10 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
         raise UsageError("--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE")
     check_installed()
     path, arguments = target_of(args)
-    options = _with_our_defaults(args)
-    plan = resolve(path, arguments, options=resolve_options(options))
-    launch = provision(plan, args.keystore, options=security_options(options))
+    plan = resolve(path, arguments, options=resolve_options(args))
+    if args.strategy == "Permissive":
+        print(f"ros2 launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
+    launch = provision(plan, args.keystore, options=security_options(args))
     _say(*plan.warnings, *launch.report.warnings, *expiry_notices(launch, args.warn_expiry))
     gate = PlannedGate(
         plan.evaluation.processes,

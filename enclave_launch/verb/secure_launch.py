@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from boundary.terminal import printable, safe_output
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
+from enclave_launch.verb.usage import check_options, read_command_line, unsecured_notice
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,11 +34,13 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _guarded_main(argv: Sequence[str] | None) -> int:
-    options = build_parser().parse_intermixed_args(argv)
+    parser = build_parser()
+    line = read_command_line(parser, argv)
     before = gc.get_threshold()
     gc.set_threshold(_ALLOCATIONS)
     try:
-        return _main(options)
+        check_options(line, parser)
+        return _main(line.options)
     except EnclaveLaunchError as error:
         print(f"secure-launch: error: {error}", file=sys.stderr)
         return error.exit_status
@@ -204,6 +207,7 @@ def _launch_plainly(target: Target, options: argparse.Namespace) -> int:
     from enclave_launch.flow import evaluate_launch, run
 
     launch = evaluate_launch(target.launch_file, target.arguments, options=resolve_options(options))
+    print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
     return run(launch, options=_run_settings(options))
 
 
@@ -213,6 +217,10 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int
 
     _warn(plan.warnings)
     _check_before_keys_are_made(plan)
+    if options.strategy == "Permissive":
+        from enclave_launch.verb.usage import PERMISSIVE_NOTICE
+
+        print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
     _warn((*launch.report.warnings, *expiry_notices(launch, options.warn_expiry)))
     return run(launch, options=_run_settings(options))

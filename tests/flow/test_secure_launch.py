@@ -224,11 +224,8 @@ def test_secure_refuses_to_start_anything_when_one_node_has_no_manifest(
     assert "process started" not in refused.stdout and not (tmp_path / "ks").exists()
 
 
-def test_a_plain_launch_asks_nobody_what_its_nodes_say(
-    secure_launch: SecureLaunch, write: Write, tmp_path: Path
-) -> None:
-    (tmp_path / "broken.nodl.xml").write_text("<interface version='1'>")
+def test_a_plain_launch_asks_nobody_what_its_nodes_say(secure_launch: SecureLaunch, write: Write) -> None:
     file = write('<node exec="true" name="unknown_to_all"/>\n<executable cmd="echo plainly"/>')
-    run = secure_launch("--nodl", tmp_path / "broken.nodl.xml", file)
+    run = secure_launch(file)
     assert run.returncode == 0
     assert "process has finished cleanly" in run.stdout and "warning" not in run.stderr

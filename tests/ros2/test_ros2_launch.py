@@ -110,6 +110,14 @@ def test_strategy_is_passed_on(demo: Workspace) -> None:
         "demo.launch.xml",
     )
     assert screen.count("strategy=Permissive") == 4
+    assert screen.count("then runs unsecured instead of ending") == 1
+
+
+@pytest.mark.parametrize("words", [("--keystore", "ks"), ("--strategy", "Enforce"), ("--nodl", "x.nodl.xml")])
+def test_options_of_a_secured_launch_need_secure(words: tuple[str, str], demo: Workspace) -> None:
+    status, screen = launch(demo, *words, "demo", "demo.launch.xml")
+    assert status != 0 and f"{words[0]} has no effect without --secure" in screen
+    assert "enclave=" not in screen
 
 
 def test_without_secure_nothing_changes_and_the_attribute_is_accepted(demo: Workspace) -> None:

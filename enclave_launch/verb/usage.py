@@ -1,0 +1,98 @@
+"""Which options make sense together: one that would have no effect is wrong usage, never passed over.
+
+Somebody who writes ``--keystore`` believes that the robot starts secured. Pure.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import NamedTuple
+
+from enclave_launch.errors import UsageError
+
+
+class CommandLine(NamedTuple):
+    """``options``: every option with its value; ``given``: the names of those that were written."""
+
+    options: argparse.Namespace
+    given: frozenset[str]
+
+
+FOR_SECURE = frozenset(
+    {
+        "keystore",
+        "no_create_keystore",
+        "strategy",
+        "domain_id",
+        "valid_for",
+        "warn_expiry",
+        "compatible_subjects",
+        "ca_passphrase_file",
+        "ca_passphrase_env",
+        "allow_late",
+    }
+)
+"""Options of a keystore or of secured processes."""
+
+FOR_PLAN = frozenset({"nodl", "missing_nodl", "accept_patterns", "enclave_scope", "policy"})
+"""Options of the plan: an unsecured launch makes none."""
+
+_VIEWS = ("explain", "dump_params", "show_args", "print_description")
+
+
+def read_command_line(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> CommandLine:
+    """As ``parse_intermixed_args``, keeping apart what was given and what is a default."""
+    defaults = {action.dest: action.default for action in parser._actions}
+    for action in parser._actions:
+        action.default = argparse.SUPPRESS
+    given = vars(parser.parse_intermixed_args(argv))
+    known = {name: value for name, value in defaults.items() if value is not argparse.SUPPRESS}
+    return CommandLine(argparse.Namespace(**{**known, **given}), frozenset(given))
+
+
+def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
+    """Raises ``UsageError`` for options without effect; it names the flag that is missing."""
+    given, options = line.given, line.options
+    views = [name for name in _VIEWS if name in given]
+    if len(views) > 1:
+        raise UsageError(
+            f"{_flags(parser._actions, views)} each print something of their own: give one of them"
+        )
+    if "format" in given and (views or not options.dry_run):
+        beside = f" beside {_flags(parser._actions, views)}" if views else ""
+        raise UsageError(f"--format has no effect{beside}: it is for --dry-run; nothing was started")
+    if not options.secure:
+        check_needs_secure(parser._actions, given & FOR_SECURE)
+        if not views and not options.dry_run:
+            check_needs_secure(parser._actions, given & FOR_PLAN, "--secure (or --dry-run)")
+
+
+def check_needs_secure(
+    actions: Iterable[argparse.Action], given: Collection[str], flag: str = "--secure"
+) -> None:
+    """Raises ``UsageError`` when one of ``actions`` was given that has an effect only together with ``flag``."""
+    if idle := _flags(actions, given):
+        raise UsageError(f"{idle} has no effect without {flag}: nothing was started")
+
+
+def unsecured_notice(environment: Mapping[str, str]) -> str:
+    """What a launch without ``--secure`` is, in one line."""
+    if environment.get("ROS_SECURITY_ENABLE") == "true":
+        return "without --secure: no process gets an enclave from here, each follows the ROS_SECURITY_ variables it has"
+    return "unsecured: whoever reaches this DDS domain can read and write all that these processes say (no --secure)"
+
+
+PERMISSIVE_NOTICE = (
+    "--strategy Permissive: a process whose enclave is missing or incomplete "
+    "then runs unsecured instead of ending"
+)
+
+
+def _flags(actions: Iterable[argparse.Action], names: Collection[str]) -> str:
+    """As a person writes them, in the order of the help text."""
+    return ", ".join(_long(action) for action in actions if action.dest in names)
+
+
+def _long(action: argparse.Action) -> str:
+    return next((flag for flag in action.option_strings if flag.startswith("--")), action.dest)
