@@ -20,7 +20,6 @@ PACKAGE_DATA = {
     "enclave_launch": ["py.typed"],
     "nodl": ["py.typed", "schemas/*"],
     "keystore": ["py.typed", "schemas/*"],
-    "boundary": ["py.typed"],
 }
 ENTRY_POINTS = {
     "console_scripts": [
@@ -44,7 +43,7 @@ else:
     setuptools.setup(
         name=NAME,
         version=VERSION,
-        packages=setuptools.find_packages(include=["enclave_launch*", "nodl*", "keystore*", "boundary*"]),
+        packages=setuptools.find_packages(include=["enclave_launch*", "nodl*", "keystore*"]),
         package_data=PACKAGE_DATA,
         data_files=DATA_FILES,
         python_requires=">=3.10",

@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 from typing import TYPE_CHECKING, Union
 
-from boundary.terminal import printable_lines
+from enclave_launch.boundary.terminal import printable_lines
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan
 from enclave_launch.prefixes import ament_prefixes

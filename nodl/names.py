@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 
-from boundary.terminal import quoted
+from enclave_launch.boundary.terminal import quoted
 
 MAX_NODE_NAME_LENGTH = 255
 MAX_NAMESPACE_LENGTH = 245

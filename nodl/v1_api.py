@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
-from boundary.files import read_bytes
+from enclave_launch.boundary.files import read_bytes
 from nodl.ament_index import package_share_directory, search_prefixes
 from nodl.document import V1_SUFFIX
 from nodl.document.manifest_node import ManifestNode

@@ -12,7 +12,7 @@ from collections import OrderedDict
 from collections.abc import Callable
 from typing import Any, TextIO, TypeVar
 
-from boundary.files import check_regular, read_text
+from enclave_launch.boundary.files import check_regular, read_text
 
 MAX_CHARACTERS = 64 * 2**20  # of one launch file; a generated file with 100,000 nodes has about a third
 _MAX_KEPT_CHARACTERS = 32 * 2**20  # text of all kept files; their trees take about ten times that

@@ -13,7 +13,7 @@ from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from types import CodeType, ModuleType
 
-from boundary.files import check_regular, read_bytes
+from enclave_launch.boundary.files import check_regular, read_bytes
 from enclave_launch.source_location import SourceLocation
 
 MODULE_NAME = "python_launch_file"

@@ -14,7 +14,12 @@ from typing import Any
 
 import yaml
 
-from boundary.yaml_nodes import RefusedYaml, SafeLoader, refuse_deep_nesting, refuse_many_aliases
+from enclave_launch.boundary.yaml_nodes import (
+    RefusedYaml,
+    SafeLoader,
+    refuse_deep_nesting,
+    refuse_many_aliases,
+)
 
 MAX_CHARACTERS = 8_000_000  # libyaml and PyYAML together take some ten seconds for each million
 MAX_SLOW_CHARACTERS = 500_000  # of a text that only PyYAML's own scanner can read, at a third of that speed

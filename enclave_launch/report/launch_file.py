@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from boundary.terminal import printable
+from enclave_launch.boundary.terminal import printable
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch.actions.declare_launch_argument import DeclareLaunchArgument

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from boundary.terminal import printable_lines
+from enclave_launch.boundary.terminal import printable_lines
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 

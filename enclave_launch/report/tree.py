@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from boundary.terminal import printable
+from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan, PlannedProcess
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.plan_json import allowed_names

@@ -17,7 +17,7 @@ from typing import Any
 
 from ros2launch.option import OptionExtension
 
-from boundary.terminal import printable_lines
+from enclave_launch.boundary.terminal import printable_lines
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import add_policy_options, add_security_options, build_parser

@@ -18,7 +18,7 @@ from enum import Enum
 from functools import lru_cache
 from typing import NamedTuple
 
-from boundary.files import read_text
+from enclave_launch.boundary.files import read_text
 
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from boundary.files import read_text
+from enclave_launch.boundary.files import read_text
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
 
@@ -121,7 +121,7 @@ def _parse_value(text: str) -> ParameterValue | None:
         return _scalar(text)
     import yaml
 
-    from boundary.yaml_nodes import compose
+    from enclave_launch.boundary.yaml_nodes import compose
 
     try:
         node = compose(text)
@@ -134,7 +134,7 @@ def _parse_value(text: str) -> ParameterValue | None:
 def _read_cached(path: str, _modified: int, _size: int) -> Mapping[str, Section]:
     import yaml
 
-    from boundary.yaml_nodes import compose
+    from enclave_launch.boundary.yaml_nodes import compose
 
     try:
         document = compose(read_text(path))

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
 
-from boundary.terminal import printable, printable_lines
+from enclave_launch.boundary.terminal import printable, printable_lines
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from typing import Literal
 
-from boundary.terminal import printable
+from enclave_launch.boundary.terminal import printable
 from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.process_tree import Stream
 from enclave_launch.runtime.sinks import Sink

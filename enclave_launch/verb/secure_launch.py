@@ -9,7 +9,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from boundary.terminal import printable, safe_output
+from enclave_launch.boundary.terminal import printable, safe_output
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 from enclave_launch.verb.usage import check_options, read_command_line, unsecured_notice

@@ -29,7 +29,7 @@ from typing import Any
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, StrictStr, ValidationError
 
-from boundary.files import read_bytes
+from enclave_launch.boundary.files import read_bytes
 from keystore.errors import InvalidInput, printable
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boundary.files import read_bytes
+from enclave_launch.boundary.files import read_bytes
 from keystore.errors import printable
 from keystore.formats.policy import PolicyError
 from keystore.formats.safe_xml import parse_xml

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
-from boundary.files import read_bytes
+from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.governance_file import covers, governance_stands
 from keystore.disk.safe_files import resolve_root

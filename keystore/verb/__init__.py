@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from boundary.terminal import safe_output
+from enclave_launch.boundary.terminal import safe_output
 from keystore.errors import KeystoreError
 from keystore.formats.policy import PolicyError
 

@@ -12,7 +12,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from boundary.terminal import json_text, raw
+from enclave_launch.boundary.terminal import json_text, raw
 from keystore.errors import InvalidInput
 from keystore.formats.validity import parse_duration, parse_end, utc_now
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING, Any
 
-from boundary.terminal import printable
+from enclave_launch.boundary.terminal import printable
 from keystore.verb import common
 
 if TYPE_CHECKING:

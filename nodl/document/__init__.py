@@ -6,7 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from boundary.files import read_bytes
+from enclave_launch.boundary.files import read_bytes
 from nodl.document.manifest_node import ManifestNode
 from nodl.errors import InvalidNoDLError
 from nodl.source_ref import SourceRef

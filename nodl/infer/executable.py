@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from boundary.files import check_regular, read_text
+from enclave_launch.boundary.files import check_regular, read_text
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executable_path
 from nodl.infer.analysis import start, start_function
 from nodl.infer.interpreter.run import Run

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from boundary.files import read_text
+from enclave_launch.boundary.files import read_text
 
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")

@@ -13,7 +13,7 @@ import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-from boundary.files import read_bytes
+from enclave_launch.boundary.files import read_bytes
 
 MAX_SOURCE_BYTES = 1_000_000
 

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from boundary.terminal import safe_output
+from enclave_launch.boundary.terminal import safe_output
 
 VERBS = ("convert", "infer", "show", "validate")
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from boundary.terminal import printable
+from enclave_launch.boundary.terminal import printable
 from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:

@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from boundary.terminal import printable
+from enclave_launch.boundary.terminal import printable
 from nodl.ament_index import search_prefixes
 from nodl.document import V1_SUFFIX, read_document
 from nodl.errors import NoDLError

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from boundary.files import read_bytes, read_text
+from enclave_launch.boundary.files import read_bytes, read_text
 
 
 def test_a_regular_file_is_read(tmp_path: Path) -> None:

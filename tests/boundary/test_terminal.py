@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boundary.terminal import json_text, printable, printable_lines, quoted, safe_output
+from enclave_launch.boundary.terminal import json_text, printable, printable_lines, quoted, safe_output
 
 UNSAFE = {
     "escape sequence": ("\x1b[31m", "\\x1b[31m"),

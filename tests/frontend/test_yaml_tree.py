@@ -9,7 +9,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from boundary.yaml_nodes import MAX_NESTING, RefusedYaml
+from enclave_launch.boundary.yaml_nodes import MAX_NESTING, RefusedYaml
 from enclave_launch.frontend.yaml_tree import parse_yaml
 
 

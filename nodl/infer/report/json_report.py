@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from boundary.terminal import json_text
+from enclave_launch.boundary.terminal import json_text
 from nodl.infer.report.expanded import ExpandedSystem, Interface, Node
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from boundary.terminal import printable
+from enclave_launch.boundary.terminal import printable
 from nodl.infer.report.expanded import ExpandedSystem
 
 

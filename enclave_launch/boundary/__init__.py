@@ -1,4 +1,4 @@
-"""What crosses the border of our process, the same for all our packages; imports none of them.
+"""What crosses the border of our process. The ground floor of all three packages: it imports none of them.
 
 files.py        a file that others wrote -> its bytes: regular files of bounded size only
 yaml_nodes.py   YAML text -> PyYAML's nodes: bounded depth, aliases that cannot multiply
