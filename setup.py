@@ -17,7 +17,7 @@ DATA_FILES = [
 VERSION = "0.1.0"
 REQUIRES = ["lxml>=4.9", "pyyaml>=6.0", "cryptography>=42", "pydantic>=2.5"]
 PACKAGE_DATA = {
-    "enclave_launch": ["py.typed"],
+    "enclave_launch": ["py.typed", "recording/recorder.c"],
     "nodl": ["py.typed", "schemas/*"],
     "keystore": ["py.typed", "schemas/*"],
 }

@@ -3,7 +3,7 @@
 Takes package and executable (or plugin), gives their ``NodeInterface`` values, or tells where it looked.
 Sources, the first that knows the executable decides:
 
-1. manifests named by the user (``--nodl FILE``), to settle conflicts or stand in for missing ones;
+1. manifests named by the user (``--nodl FILE``, or a folder of them), to settle conflicts or stand in for missing ones;
 2. the package: v1 files ``share/<package>/*.nodl.xml`` and v2 resources ``nodl/<package>__<name>`` of
    the ament index. Documents that disagree are an error, never a choice.
 
@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
-from nodl.document import RESOURCE_TYPE, V1_SUFFIX, ManifestNode, read_document, resource_key
+from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, ManifestNode, read_document, resource_key
 from nodl.errors import ConflictingNoDLError
 from nodl.node_interface import NodeInterface
 
@@ -41,7 +41,7 @@ class ManifestLookup:
 
     def __init__(self, prefixes: Sequence[str], manifests: Iterable[str | Path] = ()):
         self._prefixes = tuple(prefixes)
-        self._manifests = tuple(str(manifest) for manifest in manifests)
+        self._manifests = tuple(file for manifest in manifests for file in _files(str(manifest)))
         self._chosen: tuple[ManifestNode, ...] | None = None
         self._packages: dict[str, _Package] = {}
 
@@ -136,6 +136,14 @@ def _v1_files(share: str) -> list[str]:
         return []
 
 
+def _files(path: str) -> list[str]:
+    """``path``, or the manifests of a folder and of those below it, in the order of their names."""
+    if not os.path.isdir(path):
+        return [path]
+    suffixes = (V1_SUFFIX, *(suffix for suffix in V2_SUFFIXES if suffix.startswith(".nodl.")))
+    return sorted(str(file) for file in Path(path).rglob("*.nodl.*") if file.name.endswith(suffixes))
+
+
 def _describes(node: ManifestNode, *, executable: str | None, plugin: str | None) -> bool:
     interface = node.interface
     if executable is not None:
@@ -163,7 +171,7 @@ def _agreed(subject: str, nodes: Sequence[ManifestNode]) -> tuple[NodeInterface,
         distinct.setdefault(_meaning(node.interface), node)
     kept = list(distinct.values())
     files = {node.interface.source.file for node in kept}
-    names = {node.interface.name for node in kept}
+    names = {(node.interface.name, node.interface.namespace) for node in kept}
     one_document_each = all(node.version == 2 and node.explicit_executable for node in kept)
     if len(names) < len(kept) or (len(files) > 1 and not one_document_each):
         raise ConflictingNoDLError(subject, (node.interface.source for node in kept))

@@ -6,6 +6,7 @@ the name is then the parameter ``t``, to be filled in with what the launch file 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -21,6 +22,7 @@ class ParameterPart(NamedTuple):
     """The value of the node's parameter ``name``; ``default`` is what the code declares, if known.
 
     ``item``: the parameter is a list and this is its element at an index, or ``"each"`` of them.
+    ``*`` in ``name`` stands for one part between dots: the names are the values of all such parameters.
     ``edits``: what the code does to the value before it uses it. Names that no ROS parameter can have stand
     for other inputs of the program: ``--option`` and ``<argument>`` of its command line, ``$VARIABLE`` of
     its environment.
@@ -34,9 +36,16 @@ class ParameterPart(NamedTuple):
     def texts(self, parameters: Mapping[str, object]) -> tuple[str, ...]:
         """What this part may stand for: normally one text; none when it has no value."""
         values: Sequence[object] = () if self.default is None else (self.default,)
-        if self.name in parameters:
-            values = self._items(parameters[self.name])
+        given = self._given(parameters)
+        if given:
+            values = [value for each in given for value in self._items(each)]
         return tuple(self._edited(str(value)) for value in values)
+
+    def _given(self, parameters: Mapping[str, object]) -> list[object]:
+        if "*" not in self.name:
+            return [parameters[self.name]] if self.name in parameters else []
+        pattern = re.escape(self.name).replace(r"\*", "[^.]+")
+        return [parameters[name] for name in sorted(parameters) if re.fullmatch(pattern, name)]
 
     def _items(self, value: object) -> Sequence[object]:
         if self.item is None:

@@ -47,6 +47,7 @@ class Endpoint(NamedTuple):
     source: SourceRef
     certainty: Certainty = Certainty.EXACT
     written: str = ""  # the text in the source where a reader took it for another name, else empty
+    introspected: bool = False  # a service whose calls are published below its name (service introspection)
 
 
 class Gap(NamedTuple):

@@ -28,7 +28,7 @@ from nodl.builtin_interfaces import Condition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import MAX_NAME_LENGTH, InvalidNameError, validate_namespace, validate_node_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind
-from nodl.remap import NodeNames, ParsedRule, Resolved
+from nodl.remap import ACTION_SERVICES, NodeNames, ParsedRule, Resolved
 
 Origin = Literal["declared", "built-in", "policy file"]
 
@@ -144,8 +144,18 @@ class _Collector:
             for final_operation, resolved in self._resolve(operation, template.text, place):
                 reason = Reason(self._fqn, "declared", place, written, resolved.rules, note)
                 self._result.permissions.append(Permission(final_operation, resolved.name, reason))
+                if endpoint.introspected:
+                    self._introspection(final_operation, resolved.name, reason)
         except InvalidNameError as error:
             self._unresolved(operation, place, str(error))
+
+    def _introspection(self, operation: Operation, name: str, reason: Reason) -> None:
+        """Servers and clients publish what they are asked and answer (rcl service_event_publisher.c)."""
+        services = [name] if operation in _SERVICES else [f"{name}/_action/{p}" for p in ACTION_SERVICES]
+        note = "the service's calls are published (introspection)"
+        for service in services:
+            event = Permission(Operation.PUBLISH, f"{service}/_service_event", reason._replace(note=note))
+            self._result.permissions.append(event)
 
     def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
         """Every node has them, by the dozen, and their names need no check but of the length."""

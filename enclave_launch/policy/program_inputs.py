@@ -41,13 +41,18 @@ class ProgramInputs(NamedTuple):
 
 
 def program_inputs(process: ResolvedProcess) -> ProgramInputs:
-    """The inputs of ``process``; an option's value follows ``=`` or is the next word without dash."""
+    """The inputs of ``process``; an option's value follows ``=`` or is the next word without dash, and where there
+    are no options each word is also known by its place (``<1>``, as learnt manifests have it)."""
     values = {f"${name}": value for name, value in process.environment.items()}
-    words = _own_words(process)
+    words = own_words(process)
     for word, following in zip(words, (*words[1:], ""), strict=False):
         if _is_flag(word):
             name, equals, value = word.partition("=")
             values[name] = value if equals or _is_flag(following) else following
+    if not any(
+        map(_is_flag, words)
+    ):  # an option may take the next word, so beside options places tell nothing
+        values.update((f"<{place}>", word) for place, word in enumerate(words, 1))
     return ProgramInputs(
         values,
         bare_words=any(not _is_flag(word) for word in words),
@@ -63,7 +68,7 @@ def _file_name(word: str) -> str:
     return word.rstrip("/").rpartition("/")[2]
 
 
-def _own_words(process: ResolvedProcess) -> Sequence[str]:
+def own_words(process: ResolvedProcess) -> Sequence[str]:
     """The words after the executable that are no ROS arguments."""
     program = _file_name(process.executable)
     start = next((i for i, word in enumerate(process.cmd) if _file_name(word) == program), 0)

@@ -5,19 +5,21 @@ A v2 document does not say who runs the node. The resource key ``<package>__<nam
 of the opaque ``codegen`` tells, which other tools ignore:
 
     codegen:
-      enclave_launch: {executable: talker, node: chatterbox, namespace: /demo, plugin: demo::Talker,
+      enclave_launch: {package: demo, executable: talker, node: chatterbox, namespace: /demo, plugin: demo::Talker,
                        library: rclcpp, lifecycle: false}
 
+What was learnt from runs stands there too (``v2_learnt``).
 Rules of includes, merging and collisions: ros-tooling/nodl, ``nodl_schema``.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from nodl.document.manifest_node import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
+from nodl.document.v2_learnt import LearntName, learnt_names, logger_services
 from nodl.document.v2_schema import IDENTITY_KEY, check_document
 from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
@@ -40,6 +42,7 @@ CATEGORIES: dict[str, EndpointKind] = {
 
 @dataclass(frozen=True, slots=True)
 class _Identity:
+    package: str | None
     node: str | None
     namespace: str | None
     executable: str | None
@@ -59,10 +62,10 @@ def parse_v2(
     root = check_document(parse_yaml(text, file))
     documents = (Included(file, root), *follow_includes(root, file, prefixes))
     identity = _identity(root, name)
-    endpoints = tuple(_endpoints(documents))
+    endpoints = (*_endpoints(documents, learnt_names(root)), *logger_services(root))
     parameters = _parameters(documents)
     interface = NodeInterface(
-        package=package,
+        package=identity.package or package,
         executable=identity.executable,
         plugin=identity.plugin,
         name=identity.node,
@@ -95,6 +98,7 @@ def _identity(root: YamlMap, name: str) -> _Identity:
         source = ours.source if ours else root.source
         raise InvalidElementError.at(source, str(error)) from None
     return _Identity(
+        package=_text(fields, "package"),
         node=node or _node_name_from(name),
         namespace=namespace,
         executable=executable,
@@ -119,7 +123,9 @@ def _node_name_from(name: str) -> str | None:
     return name
 
 
-def _endpoints(documents: Sequence[Included]) -> Iterator[Endpoint]:
+def _endpoints(
+    documents: Sequence[Included], learnt: Mapping[tuple[str, str], LearntName]
+) -> Iterator[Endpoint]:
     for category, kind in CATEGORIES.items():
         seen: dict[str, SourceRef] = {}
         for entry in _entries(documents, category):
@@ -134,7 +140,9 @@ def _endpoints(documents: Sequence[Included]) -> Iterator[Endpoint]:
                     source, f"'{name}' is listed twice under {category}, first at {seen[name]}"
                 )
             seen[name] = source
-            yield Endpoint(kind, NameTemplate.literal(name), _full_type(type_name, kind), source)
+            about = learnt.get((category, name), LearntName(NameTemplate.literal(name)))
+            full_type = _full_type(type_name, kind)
+            yield Endpoint(kind, about.template, full_type, source, introspected=about.introspected)
 
 
 def _entries(documents: Sequence[Included], category: str) -> Iterator[YamlMap]:

@@ -152,6 +152,10 @@ def _bytes_by_default(parameter: YamlMap, what: str) -> None:
         _list(_integer(0, 255))(default, f"{what}.default_value")
 
 
+_LISTS = (
+    *("publishers", "subscriptions", "service_servers"),
+    *("service_clients", "action_servers", "action_clients"),
+)
 _REFERENCE = _map(
     {"ref": _text(r"^[a-z][a-z0-9+.-]*://[^\s/][^\s]*$", "a reference such as nodl://package/name")},
     required=("ref",),
@@ -226,15 +230,36 @@ _PARAMETER = _map(
     required=("type",),
     also=_bytes_by_default,
 )
-# Our own section in the opaque ``codegen``: who runs the node, which NoDL v2 has no field for.
+# Our own section in the opaque ``codegen``: who runs the node, and what was learnt of its names from runs, which
+# NoDL v2 has no fields for.
+_LEARNT_ENDPOINT = _map(
+    {
+        "in": _one_of(*_LISTS),
+        "name": _text(),
+        "written": _text(),
+        "parameter": _text(),
+        "each": _boolean,
+        "default": _text(),
+        "proof": _text(),
+        "undecided": _list(_text()),
+        "introspection": _boolean,
+        "runs": _list(_text()),
+    },
+    required=("in", "name"),
+)
 _IDENTITY = _map(
     {
+        "package": _text(),
         "node": _text(),
         "namespace": _text(),
         "executable": _text(),
         "plugin": _text(),
         "library": _one_of("rclcpp", "rclpy"),
         "lifecycle": _boolean,
+        "logger_services": _boolean,
+        "incomplete": _list(_text()),
+        "runs": _list(_map(others=_anything)),
+        "endpoints": _list(_LEARNT_ENDPOINT),
     }
 )
 IDENTITY_KEY = "enclave_launch"

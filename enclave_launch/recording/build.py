@@ -1,0 +1,73 @@
+"""The recorder as a shared library: built by the system's C compiler on first use, kept in the user's cache.
+
+Touches the world: runs ``cc`` (or ``$CC``), writes one file. The name of the file holds the hash of the source, so
+that another version of this project builds its own.
+"""
+
+from __future__ import annotations
+
+import os
+import platform
+import shutil
+import stat
+import subprocess
+import tempfile
+from pathlib import Path
+
+from enclave_launch.errors import RuntimeFailure
+
+SOURCE = Path(__file__).with_name("recorder.c")
+_FLAGS = ("-std=gnu11", "-shared", "-fPIC", "-O2", "-Wl,-z,now")
+
+
+def recorder_library() -> Path:
+    """The library, built if it is not there. Raises ``RuntimeFailure`` where that is not possible."""
+    wanted = _cache() / _file_name()
+    if not _is_ours(wanted):
+        _build(wanted)
+    return wanted
+
+
+def _cache() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base, "enclave-launch")
+
+
+def _file_name() -> str:
+    import hashlib
+
+    text = SOURCE.read_bytes() + " ".join(_FLAGS).encode()
+    return f"recorder-{hashlib.sha256(text).hexdigest()[:16]}-{platform.machine()}.so"
+
+
+def _is_ours(path: Path) -> bool:
+    """Every process of a launch loads it: nobody else may have written it."""
+    try:
+        status = path.stat()
+    except OSError:
+        return False
+    others_may_write = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return status.st_uid == os.geteuid() and not others_may_write
+
+
+def _build(wanted: Path) -> None:
+    compiler = os.environ.get("CC") or "cc"
+    if shutil.which(compiler) is None:
+        raise RuntimeFailure(
+            f"recording needs a C compiler ('{compiler}' is not there): install one (apt install gcc libc6-dev), or "
+            "launch without recording"
+        )
+    try:
+        wanted.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryDirectory(dir=wanted.parent) as folder:
+            built = Path(folder, wanted.name)
+            command = [compiler, *_FLAGS, "-o", str(built), str(SOURCE), "-ldl"]
+            run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+            if run.returncode != 0:
+                raise RuntimeFailure(
+                    f"the recorder cannot be built: {' '.join(command)}: {run.stderr.strip()}"
+                )
+            built.chmod(0o755)
+            built.rename(wanted)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise RuntimeFailure(f"the recorder cannot be built in {wanted.parent}: {error}") from error

@@ -1,0 +1,140 @@
+"""Programs that the recorder cannot get into, and those that need care: told before they start. Reads their heads.
+
+``ld.so`` ignores LD_PRELOAD without a word for programs that gain privileges; a static program has no ``ld.so``; some
+programs start others with a cleaned environment (man 8 ld.so, ELF specification).
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import stat
+import struct
+from collections.abc import Iterator, Sequence
+from typing import BinaryIO, NamedTuple
+
+_LOAD, _DYNAMIC, _INTERPRETER = 1, 2, 3  # p_type
+_NEEDED, _STRING_TABLE = 1, 5  # d_tag
+_CLEANERS = frozenset({"sudo", "doas", "pkexec"})
+_LARGEST_TABLE = 1 << 20
+
+
+class Program(NamedTuple):
+    """``obstacle``: why it cannot be recorded, empty if it can; ``sanitizer``: a runtime that must be loaded first."""
+
+    path: str
+    obstacle: str = ""
+    sanitizer: str | None = None
+
+
+def look_at_command(words: Sequence[str], search_path: str = os.defpath) -> Program:
+    """The first program of a command line that stands in the way, else the last one that is run."""
+    programs = list(_programs(words, search_path))
+    hindered = next((program for program in programs if program.obstacle), None)
+    if hindered is not None:
+        return hindered
+    sanitized = next((program for program in programs if program.sanitizer), None)
+    return sanitized or (programs[-1] if programs else Program(""))
+
+
+def _programs(words: Sequence[str], search_path: str) -> Iterator[Program]:
+    for place, word in enumerate(words):
+        name = os.path.basename(word)
+        if name in _CLEANERS and place == 0:
+            yield Program(word, f"{name} starts programs with an environment of its own")
+        elif name == "env" and set(words[place + 1 : place + 2]) & {"-i", "-", "--ignore-environment"}:
+            yield Program(word, "env -i starts programs with an empty environment")
+        elif place == 0 or os.path.isabs(word):
+            path = shutil.which(word, path=search_path)
+            if path is not None:
+                yield look_at_program(path)
+
+
+def look_at_program(path: str, depth: int = 0) -> Program:
+    """What the head of the file says; a script is what its interpreter is."""
+    try:
+        with open(path, "rb") as file:
+            status = os.fstat(file.fileno())
+            if not stat.S_ISREG(status.st_mode):
+                return Program(path)
+            head = file.read(256)
+            if head[:2] == b"#!":
+                interpreter = head[2:].split(b"\n")[0].split()[:1]
+                deeper = depth < 4 and interpreter
+                return look_at_program(os.fsdecode(interpreter[0]), depth + 1) if deeper else Program(path)
+            gains = _gains_privileges(path, status)
+            return Program(path, gains) if gains else _elf(path, head, file)
+    except OSError:
+        return Program(path)  # its start will say so
+
+
+def _gains_privileges(path: str, status: os.stat_result) -> str:
+    if status.st_mode & stat.S_ISUID and status.st_uid != os.geteuid():
+        return f"{path} is set-uid: the dynamic linker ignores LD_PRELOAD for it"
+    if status.st_mode & stat.S_ISGID and status.st_mode & stat.S_IXGRP and status.st_gid != os.getegid():
+        return f"{path} is set-gid: the dynamic linker ignores LD_PRELOAD for it"
+    try:
+        os.getxattr(path, "security.capability")
+    except (OSError, AttributeError):
+        return ""
+    if os.geteuid() == 0:
+        return ""  # root has them already, so nothing is gained
+    return f"{path} has file capabilities: the dynamic linker ignores LD_PRELOAD for it"
+
+
+def _elf(path: str, head: bytes, file: BinaryIO) -> Program:
+    if head[:4] != b"\x7fELF":
+        return Program(path)
+    wide, little = head[4] == 2, head[5] == 1
+    if wide != (struct.calcsize("P") == 8):
+        return Program(path, f"{path} is a program of another word size than the recorder")
+    try:
+        segments = _segments(head, file, wide, "<" if little else ">")
+        if not any(kind == _INTERPRETER for kind, *_ in segments):
+            return Program(path, f"{path} is linked statically: nothing can be loaded into it")
+        needed = _needed(file, segments, wide, "<" if little else ">")
+    except (struct.error, ValueError):
+        return Program(path)
+    return Program(path, sanitizer=next((name for name in needed if name.startswith("libasan.so")), None))
+
+
+_Segment = tuple[int, int, int, int]  # type, offset in the file, address, size in the file
+
+
+def _segments(head: bytes, file: BinaryIO, wide: bool, order: str) -> list[_Segment]:
+    if wide:
+        (start,) = struct.unpack_from(f"{order}Q", head, 32)
+        size, count = struct.unpack_from(f"{order}HH", head, 54)
+        form, fields = f"{order}IIQQQQQQ", (0, 2, 3, 5)
+    else:
+        (start,) = struct.unpack_from(f"{order}I", head, 28)
+        size, count = struct.unpack_from(f"{order}HH", head, 42)
+        form, fields = f"{order}IIIIIIII", (0, 1, 2, 4)
+    file.seek(start)
+    table = file.read(min(size * count, _LARGEST_TABLE))
+    rows = [struct.unpack_from(form, table, place * size) for place in range(count)]
+    return [(row[fields[0]], row[fields[1]], row[fields[2]], row[fields[3]]) for row in rows]
+
+
+def _needed(file: BinaryIO, segments: Sequence[_Segment], wide: bool, order: str) -> list[str]:
+    """The libraries that the dynamic section asks for."""
+    dynamic = next((segment for segment in segments if segment[0] == _DYNAMIC), None)
+    if dynamic is None:
+        return []
+    file.seek(dynamic[1])
+    form = f"{order}{'QQ' if wide else 'II'}"
+    table = file.read(min(dynamic[3], _LARGEST_TABLE))
+    usable = len(table) - len(table) % struct.calcsize(form)
+    rows = list(struct.iter_unpack(form, table[:usable]))
+    strings = next((value for tag, value in rows if tag == _STRING_TABLE), 0)
+    offset = next(
+        (o + strings - a for kind, o, a, s in segments if kind == _LOAD and a <= strings < a + s), None
+    )
+    if offset is None:
+        return []
+    names = []
+    for tag, value in rows:
+        if tag == _NEEDED:
+            file.seek(offset + value)
+            names.append(os.fsdecode(file.read(256).split(b"\0")[0]))
+    return names

@@ -1,0 +1,75 @@
+"""What our section of a NoDL v2 document says of names that were learnt from runs (written by ``nodl.record``). Pure.
+
+    codegen:
+      enclave_launch:
+        logger_services: true
+        endpoints:
+          - {in: subscriptions, name: front, parameter: scan_topic, default: scan, proof: one run, runs: [a]}
+
+``name`` is that of the standard entry, the name that was seen. ``parameter`` gives the node's parameter (or ``<1>``,
+a word of its command line) whose value the name is, ``each`` says that it is a list, ``default`` the name where
+nothing is set. ``written`` is the source's name where NoDL v2 cannot hold it, ``introspection`` says that the calls of
+a service are published. ``proof``, ``undecided`` and ``runs`` are for the reader.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from nodl.document.v2_schema import IDENTITY_KEY
+from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.errors import InvalidElementError
+from nodl.name_template import NameTemplate, ParameterPart
+from nodl.names import InvalidNameError, validate_name
+from nodl.node_interface import Endpoint, EndpointKind
+
+
+class LearntName(NamedTuple):
+    template: NameTemplate
+    introspected: bool = False
+
+
+def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
+    """By list (``publishers``) and name of the standard entry. Raises ``InvalidElementError`` for a bad name."""
+    rows = _section(root).get("endpoints")
+    found: dict[tuple[str, str], LearntName] = {}
+    for row in rows.items if isinstance(rows, YamlList) else ():
+        if isinstance(row, YamlMap):
+            fields = {key: value.value for key, value in row.items.items() if isinstance(value, YamlScalar)}
+            template = _template(fields, row)
+            found[str(fields["in"]), str(fields["name"])] = LearntName(
+                template, fields.get("introspection") is True
+            )
+    return found
+
+
+def logger_services(root: YamlMap) -> Iterator[Endpoint]:
+    """The services of a node that was made with ``enable_logger_service`` (rclcpp node_logging.cpp)."""
+    given = _section(root).get("logger_services")
+    if isinstance(given, YamlScalar) and given.value is True:
+        for name, type_name in (("get", "GetLoggerLevels"), ("set", "SetLoggerLevels")):
+            template = NameTemplate.literal(f"~/{name}_logger_levels")
+            yield Endpoint(
+                EndpointKind.SERVICE_SERVER, template, f"rcl_interfaces/srv/{type_name}", given.source
+            )
+
+
+def _section(root: YamlMap) -> dict[str, YamlValue]:
+    codegen = root.items.get("codegen")
+    section = codegen.items.get(IDENTITY_KEY) if isinstance(codegen, YamlMap) else None
+    return section.items if isinstance(section, YamlMap) else {}
+
+
+def _template(fields: dict[str, str | int | float | bool | None], row: YamlMap) -> NameTemplate:
+    parameter, default = fields.get("parameter"), fields.get("default")
+    if parameter:
+        item = "each" if fields.get("each") is True else None
+        given = str(default) if default is not None else None
+        return NameTemplate((ParameterPart(str(parameter), given, item),))
+    name = str(fields.get("written") or fields["name"])
+    try:
+        validate_name(name)
+    except InvalidNameError as error:
+        raise InvalidElementError.at(row.source, str(error)) from None
+    return NameTemplate.literal(name)

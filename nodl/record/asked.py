@@ -1,0 +1,264 @@
+"""What a recorded node asked for: its own endpoints, apart from those that libraries make for every node. Pure.
+
+The library that called rcl tells them apart; only parameter services and the like, which the client libraries
+themselves write, are told by name and type.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from enum import Enum
+from typing import NamedTuple
+
+from nodl.node_interface import ClientLibrary, EndpointKind
+from nodl.record.assembly import RecordedNode, RecordedProcess
+from nodl.record.lines import EndpointMade, LoadedComponent, StartedProcess
+from nodl.record.written import meant_name
+from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+
+REFUSED = 1
+"""``RCL_RET_ERROR``: what an endpoint gives that DDS refuses. Other results say that an argument is bad."""
+
+_PARAMETER_SERVICES = frozenset(
+    {
+        "describe_parameters",
+        "get_parameter_types",
+        "get_parameters",
+        "list_parameters",
+        "set_parameters",
+        "set_parameters_atomically",
+    }
+)
+_LOGGER_SERVICES = frozenset({"get_logger_levels", "set_logger_levels"})
+_INTROSPECTION = "/_service_event"
+_FIRST_PART = "/_action/send_goal"
+
+
+class Role(Enum):
+    """Why an endpoint is there."""
+
+    OWN = "asked for by the program"
+    BUILT_IN = "every node has it"
+    LIFECYCLE = "every lifecycle node has it"
+    CONTAINER = "every component container has it"
+    LOGGER_SERVICE = "the node's logger service"
+    INTROSPECTION = "introspection of a service"
+    PART_OF_ACTION = "part of an action"
+    REPEATED = "rcl calls itself"
+
+
+class Asked(NamedTuple):
+    """One endpoint that the program asked for.
+
+    ``written`` as rcl got it, ``name`` as the source means it (``~/x`` for a name made from the node's own),
+    ``final`` after expansion and remapping; for an action that of its parts. ``moved``: rules that the program
+    itself holds made ``final`` of it, not those of the launch. ``introspected``: its service events are published.
+    """
+
+    kind: EndpointKind
+    written: str
+    name: str
+    final: str
+    type: str
+    rc: int
+    qos: tuple[int, ...] = ()
+    error: tuple[str, ...] = ()
+    moved: bool = False
+    introspected: bool = False
+    at: int = 0
+
+    @property
+    def granted(self) -> bool:
+        return self.rc == 0
+
+    @property
+    def refused(self) -> bool:
+        return self.rc == REFUSED
+
+
+class AskedNode(NamedTuple):
+    """What one node asked for. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
+
+    ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
+    the supervisor tells them at all.
+    """
+
+    package: str
+    executable: str
+    plugin: str
+    name: str
+    namespace: str
+    fqn: str
+    library: ClientLibrary
+    lifecycle: bool
+    states: tuple[str, ...]
+    endpoints: tuple[Asked, ...]
+    parameters: Mapping[str, object]
+    arguments: tuple[str, ...]
+    rules: RemapRules
+    known_start: bool
+    logger_services: bool = False
+    container: bool = False
+    process: str = ""
+    location: str = ""
+
+    @property
+    def program(self) -> str:
+        return f"{self.package}/{self.plugin or self.executable}"
+
+
+def role_of(endpoint: EndpointMade) -> Role:
+    """Why ``endpoint`` is there."""
+    by, kind, final = endpoint.by, endpoint.kind, endpoint.final or endpoint.written
+    if by == "librcl.so":
+        return Role.INTROSPECTION if final.endswith(_INTROSPECTION) else Role.BUILT_IN
+    if by == "librcl_lifecycle.so":
+        return Role.LIFECYCLE
+    if by == "librcl_action.so":
+        own = kind in (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
+        return Role.REPEATED if own else Role.PART_OF_ACTION
+    if kind is EndpointKind.SERVICE_SERVER:
+        return _role_of_server(endpoint)
+    if endpoint.written == "/parameter_events" and endpoint.type in ("", "rcl_interfaces/msg/ParameterEvent"):
+        published = kind is EndpointKind.PUBLISHER
+        return Role.BUILT_IN if published or not _is_rclpy(by) else Role.OWN
+    return Role.OWN
+
+
+def _role_of_server(endpoint: EndpointMade) -> Role:
+    if endpoint.written.startswith("~/_container/"):
+        return Role.CONTAINER
+    _, slash, last = endpoint.written.rpartition("/")
+    own_name = endpoint.fqn.rpartition("/")[2]
+    mine = slash and endpoint.written in (f"{own_name}/{last}", f"{endpoint.fqn}/{last}")
+    if not mine or not (endpoint.type == "" or endpoint.type.startswith("rcl_interfaces/")):
+        return Role.OWN
+    if last in _PARAMETER_SERVICES:
+        return Role.BUILT_IN
+    return Role.LOGGER_SERVICE if last in _LOGGER_SERVICES else Role.OWN
+
+
+def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
+    """What ``node`` asked for, with what the launch started there."""
+    started, component = process.started, node.component
+    rules = _rules(started, component)
+    made = node.made
+    roles = [role_of(endpoint) for endpoint in node.endpoints]
+    endpoints = tuple(_asked(node, roles, rules if started else None))
+    package, executable, plugin = _program(process, started, component)
+    origin = component or started
+    return AskedNode(
+        package=package,
+        executable=executable,
+        plugin=plugin,
+        name=made.name if made else "",
+        namespace=_namespace(made.namespace if made else ""),
+        fqn=node.fqn,
+        library=_library(node),
+        lifecycle=Role.LIFECYCLE in roles,
+        states=tuple(node.states),
+        endpoints=endpoints,
+        parameters=origin.parameters if origin else {},
+        arguments=started.arguments if started and not component else (),
+        rules=rules,
+        known_start=started is not None,
+        logger_services=Role.LOGGER_SERVICE in roles,
+        container=Role.CONTAINER in roles,
+        process=started.process if started else str(process.pid),
+        location=origin.location if origin else "",
+    )
+
+
+def all_asked(processes: Iterable[RecordedProcess]) -> list[AskedNode]:
+    """Every node that could be made, in the order of the record."""
+    return [asked_by(process, node) for process in processes for node in process.nodes.values() if node.fqn]
+
+
+def _program(
+    process: RecordedProcess, started: StartedProcess | None, component: LoadedComponent | None
+) -> tuple[str, str, str]:
+    if component is not None:
+        return component.package, "", component.plugin
+    if started is not None:
+        return started.package, started.executable.rpartition("/")[2], ""
+    return "", process.loaded.program.rpartition("/")[2] if process.loaded else "", ""
+
+
+def _rules(started: StartedProcess | None, component: LoadedComponent | None) -> RemapRules:
+    """The launch's rules that act on the node; one that rcl would refuse cannot have acted."""
+    if component is not None:
+        return RemapRules(local=_parsed(component.rules))
+    return RemapRules(process=_parsed(started.rules if started else ()))
+
+
+def _parsed(texts: Iterable[str]) -> tuple[ParsedRule, ...]:
+    rules = []
+    for text in texts:
+        try:
+            rules.append(parse_rule(text))
+        except InvalidRemapRuleError:
+            continue
+    return tuple(rules)
+
+
+def _asked(node: RecordedNode, roles: list[Role], rules: RemapRules | None) -> Iterable[Asked]:
+    introspected = {
+        endpoint.final.removesuffix(_INTROSPECTION)
+        for endpoint, role in zip(node.endpoints, roles, strict=True)
+        if role is Role.INTROSPECTION
+    }
+    parts: list[EndpointMade] = []
+    for endpoint, role in zip(node.endpoints, roles, strict=True):
+        if role is Role.PART_OF_ACTION:
+            parts.append(endpoint)
+        elif role is Role.OWN:
+            is_action = endpoint.kind in (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
+            final = _action_name(parts, endpoint) if is_action else endpoint.final
+            yield _own(endpoint, final, node.fqn, rules, introspected)
+            parts = [] if is_action else parts
+
+
+def _own(
+    endpoint: EndpointMade, final: str, fqn: str, rules: RemapRules | None, introspected: set[str]
+) -> Asked:
+    meant = meant_name(endpoint.kind, endpoint.written, final, fqn, rules)
+    return Asked(
+        endpoint.kind,
+        endpoint.written,
+        meant.name,
+        final,
+        endpoint.type,
+        endpoint.rc,
+        endpoint.qos,
+        endpoint.error,
+        meant.moved,
+        final in introspected,
+        endpoint.at,
+    )
+
+
+def _action_name(parts: list[EndpointMade], action: EndpointMade) -> str:
+    """An action's parts come before its own line, and only they have the name that it gets (rcl of jazzy and older
+    does not remap actions, though it resolves their names as if it did)."""
+    for part in reversed(parts):
+        if part.node == action.node and part.final.endswith(_FIRST_PART):
+            return part.final.removesuffix(_FIRST_PART)
+    return action.final
+
+
+def _namespace(written: str) -> str:
+    return "/" + written.strip("/") if written.strip("/") else ""
+
+
+def _library(node: RecordedNode) -> ClientLibrary:
+    callers = [node.made.by] if node.made else []
+    callers += [endpoint.by for endpoint in node.endpoints]
+    if any(_is_rclpy(by) for by in callers):
+        return ClientLibrary.RCLPY
+    if any(by.startswith("librclcpp") for by in callers):
+        return ClientLibrary.RCLCPP
+    return ClientLibrary.UNKNOWN
+
+
+def _is_rclpy(library: str) -> bool:
+    return library.startswith("_rclpy")

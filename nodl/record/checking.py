@@ -1,0 +1,169 @@
+"""A description of a node (manifest, inference, library table) held against what the node was recorded to ask. Pure.
+
+Each name of the description is resolved as rcl would resolve it for the recorded node: under its final name, with the
+rules and parameters that the launch gave it.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from enum import Enum
+from typing import NamedTuple
+
+from nodl.name_template import NameTemplate
+from nodl.names import InvalidNameError, split_fqn
+from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
+from nodl.record.asked import Asked, AskedNode
+from nodl.record.origins import arguments_as_inputs
+from nodl.remap import NodeNames
+
+_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+_ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
+
+
+class Verdict(Enum):
+    """How a description and a record differ."""
+
+    MISSING = "missing"  # recorded and not described: it would be refused
+    NEVER_SEEN = "never seen"  # described and not recorded: more than this run needed
+    WRONG = "wrong"  # both know it and say different things
+    NOT_KNOWN = "not known"  # the description itself has a gap there
+
+
+class Difference(NamedTuple):
+    """``kind`` ``None``: about the node as a whole."""
+
+    verdict: Verdict
+    node: str
+    kind: EndpointKind | None
+    name: str
+    detail: str = ""
+
+    def __str__(self) -> str:
+        what = f"{self.kind.value.replace('_', ' ')} {self.name}" if self.kind else self.name
+        return f"{self.verdict.value}: {self.node}: {what}{f' ({self.detail})' if self.detail else ''}"
+
+
+class Comparison(NamedTuple):
+    """``agreed``: how many endpoints both have."""
+
+    agreed: int
+    differences: tuple[Difference, ...]
+
+    @property
+    def fits(self) -> bool:
+        """Nothing is missing or wrong; that more is described than was seen is for the reader."""
+        return not any(d.verdict in (Verdict.MISSING, Verdict.WRONG) for d in self.differences)
+
+
+class _Described(NamedTuple):
+    kind: EndpointKind
+    pattern: re.Pattern[str]
+    shown: str
+    endpoint: Endpoint
+
+
+def compare(node: AskedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
+    """Hold the one of ``interfaces`` that describes ``node`` against its record."""
+    interface = _matching(node, interfaces)
+    if interface is None:
+        names = ", ".join(str(each.name) for each in interfaces)
+        missing = [_difference(Verdict.MISSING, node, asked) for asked in _granted(node)]
+        about = Difference(Verdict.WRONG, node.fqn, None, f"node name {node.name}", f"described: {names}")
+        return Comparison(0, (about, *missing))
+    described = [each for endpoint in interface.endpoints for each in _described(node, endpoint)]
+    asked = _granted(node)
+    differences = [*_about_the_node(node, interface)]
+    differences += [_difference(Verdict.MISSING, node, each) for each in asked if not _find(each, described)]
+    differences += _types(node, asked, described)
+    differences += _never_seen(node, asked, described)
+    differences += [
+        Difference(Verdict.NOT_KNOWN, node.fqn, None, gap.why, str(gap.source)) for gap in interface.gaps
+    ]
+    agreed = sum(1 for each in asked if _find(each, described))
+    return Comparison(agreed, tuple(dict.fromkeys(differences)))
+
+
+def _matching(node: AskedNode, interfaces: Sequence[NodeInterface]) -> NodeInterface | None:
+    same = [each for each in interfaces if each.name == node.name]
+    if len(same) > 1:
+        same = [each for each in same if (each.namespace or "") == node.namespace] or same
+    return same[0] if same else (interfaces[0] if len(interfaces) == 1 else None)
+
+
+def _granted(node: AskedNode) -> list[Asked]:
+    """What rcl took, or refused: names that it calls invalid are not asked of anybody."""
+    seen = {(each.kind, each.final): each for each in node.endpoints if each.rc in (0, 1) and each.final}
+    return list(seen.values())
+
+
+def _about_the_node(node: AskedNode, interface: NodeInterface) -> Iterable[Difference]:
+    if interface.name and node.name and interface.name != node.name:
+        yield Difference(
+            Verdict.WRONG, node.fqn, None, f"node name {interface.name}", f"recorded: {node.name}"
+        )
+    if (interface.namespace or "/").strip("/") != node.namespace.strip("/"):
+        yield Difference(
+            Verdict.WRONG,
+            node.fqn,
+            None,
+            f"namespace {interface.namespace or '/'}",
+            f"recorded: {node.namespace or '/'}",
+        )
+    if interface.lifecycle != node.lifecycle:
+        said = "a lifecycle node" if interface.lifecycle else "not a lifecycle node"
+        yield Difference(Verdict.WRONG, node.fqn, None, said, "the record says otherwise")
+
+
+def _difference(verdict: Verdict, node: AskedNode, asked: Asked) -> Difference:
+    return Difference(verdict, node.fqn, asked.kind, asked.final, f"written {asked.written!r}, {asked.type}")
+
+
+def _types(node: AskedNode, asked: Iterable[Asked], described: Sequence[_Described]) -> Iterable[Difference]:
+    for each in asked:
+        found = _find(each, described)
+        if found and found.endpoint.type and each.type and found.endpoint.type != each.type:
+            detail = f"type {found.endpoint.type}, recorded {each.type}; {found.endpoint.source}"
+            yield Difference(Verdict.WRONG, node.fqn, each.kind, each.final, detail)
+
+
+def _never_seen(
+    node: AskedNode, asked: Sequence[Asked], described: Iterable[_Described]
+) -> Iterable[Difference]:
+    for item in described:
+        if not any(item.kind is each.kind and item.pattern.fullmatch(each.final) for each in asked):
+            yield Difference(Verdict.NEVER_SEEN, node.fqn, item.kind, item.shown, str(item.endpoint.source))
+
+
+def _find(asked: Asked, described: Iterable[_Described]) -> _Described | None:
+    fitting = (e for e in described if e.kind is asked.kind and e.pattern.fullmatch(asked.final))
+    return next(fitting, None)
+
+
+def _described(node: AskedNode, endpoint: Endpoint) -> Iterable[_Described]:
+    inputs = {**arguments_as_inputs(node.arguments), **node.parameters}
+    for template in endpoint.name.fill_each(inputs):
+        for final in _finals(node, endpoint.kind, template):
+            pattern = re.compile(".+".join(re.escape(part) for part in final.split("*")))
+            yield _Described(endpoint.kind, pattern, final, endpoint)
+
+
+_STAND_IN = "STAR_OF_A_PATTERN"
+
+
+def _finals(node: AskedNode, kind: EndpointKind, template: NameTemplate) -> set[str]:
+    """The final name; of an action, with and without its remapping, as the distribution is not told here."""
+    namespace, name = split_fqn(node.fqn)
+    names = NodeNames(name, namespace, node.rules)
+    text = template.text.replace("*", _STAND_IN)
+    try:
+        if kind in _ACTIONS:
+            recorded = {each.final for each in node.endpoints if each.kind is kind}
+            both = {names.action(text, as_a_whole=whole).name for whole in (True, False)}
+            found = both & recorded or {names.action(text, as_a_whole=False).name}
+        else:
+            found = {(names.topic(text) if kind in _TOPICS else names.service(text)).name}
+    except InvalidNameError:
+        return set()
+    return {final.replace(_STAND_IN, "*") for final in found}

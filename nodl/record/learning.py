@@ -1,0 +1,200 @@
+"""Observations of nodes → what a manifest of each program says. Pure.
+
+All records together: the union of what was asked for, each entry with the runs that saw it. A record proves that
+something is there, never that it is not.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+from nodl.node_interface import ClientLibrary, EndpointKind
+from nodl.record.asked import Asked, AskedNode, all_asked
+from nodl.record.assembly import Record
+from nodl.record.lines import Run
+from nodl.record.origins import (
+    FIXED,
+    Name,
+    Observation,
+    Origin,
+    arguments_as_inputs,
+    origins_of,
+)
+
+_NUMBERED = re.compile(r"(.+?)_((?:0x)?(?=[0-9a-f]*[0-9])[0-9a-f]{6,}|[0-9]{3,})\Z")
+_RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ros, when it is given no name
+
+_UNKNOWN_TYPES = {
+    EndpointKind.PUBLISHER: "unknown/msg/Unknown",
+    EndpointKind.SUBSCRIPTION: "unknown/msg/Unknown",
+    EndpointKind.SERVICE_SERVER: "unknown/srv/Unknown",
+    EndpointKind.SERVICE_CLIENT: "unknown/srv/Unknown",
+    EndpointKind.ACTION_SERVER: "unknown/action/Unknown",
+    EndpointKind.ACTION_CLIENT: "unknown/action/Unknown",
+}
+
+
+class Entry(NamedTuple):
+    """One name of a node. ``written`` where the manifest cannot hold it as a plain name; ``moved``: rules of the
+    program itself made it of what the source writes, so that it is held as the final name."""
+
+    kind: EndpointKind
+    name: str
+    type: str
+    qos: tuple[int, ...]
+    runs: tuple[str, ...]
+    origin: Origin = FIXED
+    introspected: bool = False
+    moved_from: str = ""
+
+
+class ProgramKey(NamedTuple):
+    """Which program, and which node of it."""
+
+    package: str
+    executable: str
+    plugin: str
+    node: str
+    namespace: str
+
+
+class LearntNode(NamedTuple):
+    """One node of one program. ``incomplete`` and ``notes`` are for the person who reads the manifest."""
+
+    key: ProgramKey
+    library: ClientLibrary
+    lifecycle: bool
+    logger_services: bool
+    entries: tuple[Entry, ...]
+    runs: tuple[Run, ...]
+    incomplete: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def program(self) -> str:
+        return f"{self.key.package}/{self.key.plugin or self.key.executable}"
+
+
+class Learnt(NamedTuple):
+    """``unforeseeable``: nodes whose names differ in each run, as patterns; no manifest can name them."""
+
+    nodes: tuple[LearntNode, ...]
+    unforeseeable: tuple[str, ...] = ()
+
+
+class _Seen(NamedTuple):
+    node: AskedNode
+    run: Run
+
+
+def learn(records: Iterable[Record]) -> Learnt:
+    """What all ``records`` together teach; order does not matter."""
+    groups: dict[ProgramKey, list[_Seen]] = {}
+    unforeseeable: set[str] = set()
+    for record in sorted(records, key=lambda record: record.run.id):
+        for node in all_asked(record.attributed()):
+            if not node.known_start or node.container:
+                continue
+            pattern = _unforeseeable(node)
+            if pattern:
+                unforeseeable.add(f"{pattern} of {node.program}")
+            else:
+                groups.setdefault(_key(node), []).append(_Seen(node, record.run))
+    nodes = tuple(_learnt(key, groups[key]) for key in sorted(groups))
+    return Learnt(nodes, tuple(sorted(unforeseeable)))
+
+
+def _unforeseeable(node: AskedNode) -> str:
+    """The final name as a pattern, if the program makes it of a number or an address: another one in each run."""
+    name = node.fqn.rpartition("/")[2]
+    numbered = _numbered(name)
+    given = node.rules.node_name(node.name).rules  # by the launch, so it is the same next time
+    return f"{numbered}_*" if numbered and not given else ""
+
+
+def _numbered(name: str) -> str:
+    match = _RANDOM.match(name) or _NUMBERED.match(name)
+    return match[1] if match else ""
+
+
+def _key(node: AskedNode) -> ProgramKey:
+    name = _numbered(node.name) or node.name
+    return ProgramKey(node.package, node.executable, node.plugin, name, node.namespace)
+
+
+def _learnt(key: ProgramKey, seen: Sequence[_Seen]) -> LearntNode:
+    lifecycle = any(each.node.lifecycle for each in seen)
+    entries = tuple(_entries(seen))
+    libraries = [each.node.library for each in seen if each.node.library is not ClientLibrary.UNKNOWN]
+    return LearntNode(
+        key,
+        libraries[0] if libraries else ClientLibrary.UNKNOWN,
+        lifecycle,
+        any(each.node.logger_services for each in seen),
+        entries,
+        tuple({each.run.id: each.run for each in seen}.values()),
+        tuple(_missing(lifecycle, seen)),
+        tuple(_notes(entries, seen)),
+    )
+
+
+def _missing(lifecycle: bool, seen: Sequence[_Seen]) -> Iterable[str]:
+    if lifecycle and not any("active" in each.node.states for each in seen):
+        yield "a lifecycle node that was never active: what it makes when it is activated is not known"
+
+
+def _notes(entries: Iterable[Entry], seen: Sequence[_Seen]) -> Iterable[str]:
+    for entry in entries:
+        if entry.origin.undecided:
+            said = ", ".join(map(str, entry.origin.candidates))
+            yield f"{entry.name}: fixed, or from one of {said}: not decided; only this name is granted"
+        if entry.moved_from:
+            yield f"{entry.name}: the program writes {entry.moved_from} and remaps it itself"
+    bad = {(e.written, e.rc) for each in seen for e in each.node.endpoints if e.rc not in (0, 1)}
+    for written, rc in sorted(bad):
+        yield f"{written!r} was asked for and is not a valid name (rcl's error {rc}): a bug of the program"
+
+
+def _entries(seen: Sequence[_Seen]) -> Iterable[Entry]:
+    observations = [_observation(each) for each in seen]
+    origins = origins_of(observations)
+    done: set[object] = set()
+    for name, origin in origins.items():
+        key = (name.kind, name.type, origin.source) if origin.source else name
+        if key in done:
+            continue
+        done.add(key)
+        same = [other for other, o in origins.items() if origin.source and o.source == origin.source]
+        proven = any(origins[other].proven for other in same)
+        yield _entry(name, origin._replace(proven=proven), {name, *same}, seen)
+
+
+def _entry(name: Name, origin: Origin, names: set[Name], seen: Sequence[_Seen]) -> Entry:
+    askers = [(asked, each.run.id) for each in seen for asked in each.node.endpoints if _name(asked) in names]
+    runs = tuple(dict.fromkeys(run for _, run in askers))
+    first = next(asked for asked, _ in askers if _name(asked) == name)
+    introspected = any(asked.introspected for asked, _ in askers)
+    moved_from = first.written if first.moved else ""
+    return Entry(
+        name.kind,
+        name.name,
+        name.type or _UNKNOWN_TYPES[name.kind],
+        first.qos,
+        runs,
+        origin,
+        introspected,
+        moved_from,
+    )
+
+
+def _observation(seen: _Seen) -> Observation:
+    node = seen.node
+    names = frozenset(_name(asked) for asked in node.endpoints if asked.rc in (0, 1))
+    inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
+    return Observation(inputs, names, seen.run.id)
+
+
+def _name(asked: Asked) -> Name:
+    return Name(asked.kind, asked.name, asked.type)

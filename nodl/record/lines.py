@@ -1,0 +1,385 @@
+"""The lines of a record: JSON objects, one a line, told apart by ``what``. Pure.
+
+``loaded``, ``init``, ``node``, ``node_end``, ``state``, ``ended`` and the six kinds of endpoints come from the
+recorder in a process (``enclave_launch/recording/recorder.c``); they carry ``pid``, ``thread``, ``at`` (monotonic,
+nanoseconds) and ``n``, which counts the lines of a process from 1. ``run``, ``process`` and ``component`` come from
+the supervisor and say what it started. Unknown kinds and fields are passed over: newer recorders may say more.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from nodl.node_interface import EndpointKind
+
+
+class Loaded(NamedTuple):
+    """The recorder is in a process. ``session`` leads to the process that a supervisor started; ``forked``: the
+    process is a copy of its parent."""
+
+    pid: int
+    at: int
+    parent: int
+    session: int
+    program: str
+    forked: bool = False
+
+
+class Initialised(NamedTuple):
+    """``rcl_init``: the process uses ROS."""
+
+    pid: int
+    at: int
+    rc: int
+    middleware: str = ""
+    by: str = ""
+    error: tuple[str, ...] = ()
+
+
+class NodeMade(NamedTuple):
+    """``rcl_node_init``: ``name`` and ``namespace`` as the source gives them, ``fqn`` the final name."""
+
+    pid: int
+    thread: int
+    at: int
+    node: int
+    rc: int
+    name: str
+    namespace: str
+    fqn: str
+    by: str = ""
+    error: tuple[str, ...] = ()
+
+
+class NodeEnded(NamedTuple):
+    pid: int
+    at: int
+    node: int
+
+
+class StateEntered(NamedTuple):
+    """A lifecycle node is in ``state`` now: ``inactive``, ``active``, ``errorprocessing`` ..."""
+
+    pid: int
+    at: int
+    node: int
+    state: str
+
+
+class EndpointMade(NamedTuple):
+    """An endpoint that was asked for; ``rc`` 0 is granted, 1 refused or failed, others say that an argument is bad.
+
+    ``written`` is the name as the source has it, ``final`` after expansion and remapping (empty when rcl could not
+    say), ``by`` the library that called rcl, ``error`` all texts that passed, the first cause first. ``qos``:
+    history, depth, reliability, durability as rmw numbers them.
+    """
+
+    kind: EndpointKind
+    pid: int
+    thread: int
+    at: int
+    node: int
+    rc: int
+    written: str
+    fqn: str
+    final: str
+    type: str
+    by: str
+    qos: tuple[int, ...] = ()
+    error: tuple[str, ...] = ()
+
+
+class Ended(NamedTuple):
+    pid: int
+    at: int
+
+
+class Run(NamedTuple):
+    """What was run, said once by the supervisor; ``id`` differs for each run."""
+
+    id: str
+    launch_file: str = ""
+    distro: str = ""
+    isolation: str = ""
+    date: str = ""
+    secured: bool = False
+
+
+class StartedProcess(NamedTuple):
+    """A process of the launch. ``arguments``: the words behind the program that are no ROS arguments; ``rules``:
+    remap rules ``FROM:=TO`` of its command line."""
+
+    pid: int
+    process: str
+    package: str
+    executable: str
+    kind: str = "node"
+    fqn: str = ""
+    enclave: str = ""
+    location: str = ""
+    arguments: tuple[str, ...] = ()
+    rules: tuple[str, ...] = ()
+    parameters: Mapping[str, object] = MappingProxyType({})
+
+
+class LoadedComponent(NamedTuple):
+    """A composable node that the launch asks ``container`` to load, ``name`` and ``namespace`` as requested."""
+
+    container: str
+    package: str
+    plugin: str
+    name: str = ""
+    namespace: str = ""
+    location: str = ""
+    rules: tuple[str, ...] = ()
+    parameters: Mapping[str, object] = MappingProxyType({})
+
+
+Line = (
+    Loaded
+    | Initialised
+    | NodeMade
+    | NodeEnded
+    | StateEntered
+    | EndpointMade
+    | Ended
+    | Run
+    | StartedProcess
+    | LoadedComponent
+)
+
+
+class Complaint(NamedTuple):
+    """Why a record is not complete: a line that is missing, cut or unreadable. ``pid`` 0: not known whose."""
+
+    pid: int
+    why: str
+
+
+_ENDPOINTS = {kind.value: kind for kind in EndpointKind}
+
+
+_MOST_MISSING = 100_000
+
+
+class LineReader:
+    """Bytes in any portions → lines. Keeps what it could not read as ``complaints``."""
+
+    def __init__(self) -> None:
+        self.complaints: list[Complaint] = []
+        self._rest = b""
+        self._highest: dict[int, int] = {}
+        self._missing: dict[
+            int, set[int]
+        ] = {}  # threads number their lines in one order and write them in another
+
+    def feed(self, data: bytes) -> list[Line]:
+        """The lines that ``data`` completes."""
+        *whole, self._rest = (self._rest + data).split(b"\n")
+        return [line for text in whole if (line := self._line(text)) is not None]
+
+    def close(self) -> None:
+        """Nothing follows: a last line without its end was cut, and what has not come by now is lost."""
+        if self._rest.strip():
+            self._complain(0, f"a line was cut off: {_shown(self._rest)}")
+        self._rest = b""
+        for pid in list(self._missing):
+            self._settle(pid)
+
+    def _line(self, text: bytes) -> Line | None:
+        if not text.strip():
+            return None
+        try:
+            fields = json.loads(text)
+            line = _parse(fields)
+        except (ValueError, KeyError, TypeError, RecursionError):
+            self._complain(0, f"a line cannot be read: {_shown(text)}")
+            return None
+        self._check_number(fields)
+        return line
+
+    def _check_number(self, fields: Mapping[str, Any]) -> None:
+        pid, number = fields.get("pid"), fields.get("n")
+        if not isinstance(pid, int) or not isinstance(number, int):
+            return
+        if (
+            fields["what"] == "loaded"
+        ):  # the first of a program; one process may run several, one after another
+            self._settle(pid)
+            self._highest[pid] = 0
+        highest = self._highest.get(pid, 0)
+        missing = self._missing.setdefault(pid, set())
+        missing.update(range(highest + 1, min(number, highest + _MOST_MISSING)))
+        missing.discard(number)
+        self._highest[pid] = max(highest, number)
+        if fields.get("cut") is True:
+            self._complain(pid, f"line {number} of process {pid} has a text that was too long and is cut")
+
+    def _settle(self, pid: int) -> None:
+        missing = self._missing.pop(pid, set())
+        if missing:
+            lines = f"line {min(missing)}" if len(missing) == 1 else f"lines {min(missing)} to {max(missing)}"
+            self._complain(pid, f"{len(missing)} of the lines of process {pid} are missing: {lines}")
+
+    def _complain(self, pid: int, why: str) -> None:
+        self.complaints.append(Complaint(pid, why))
+
+
+def read_lines(text: bytes) -> tuple[list[Line], list[Complaint]]:
+    """A whole record at once."""
+    reader = LineReader()
+    lines = reader.feed(text)
+    reader.close()
+    return lines, reader.complaints
+
+
+def line_text(line: Run | StartedProcess | LoadedComponent) -> bytes:
+    """A line of the supervisor, ready to be appended."""
+    what = {Run: "run", StartedProcess: "process", LoadedComponent: "component"}[type(line)]
+    fields = {name: dict(v) if isinstance(v, Mapping) else v for name, v in line._asdict().items()}
+    text = json.dumps({"what": what, **fields}, ensure_ascii=True, default=_plain)
+    return text.encode() + b"\n"
+
+
+def _plain(value: object) -> object:
+    """Byte strings of parameters, as ROS parameter files write them."""
+    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
+
+
+def _parse(fields: Mapping[str, Any]) -> Line | None:
+    what = fields["what"]
+    if what in _ENDPOINTS:
+        return _endpoint(fields, _ENDPOINTS[what])
+    reader = _READERS.get(what)
+    return reader(fields) if reader else None
+
+
+def _endpoint(f: Mapping[str, Any], kind: EndpointKind) -> EndpointMade:
+    return EndpointMade(
+        kind,
+        _int(f, "pid"),
+        _int(f, "thread"),
+        _int(f, "at"),
+        _int(f, "node"),
+        _int(f, "rc"),
+        _str(f, "name"),
+        _str(f, "fqn"),
+        _str(f, "final"),
+        _str(f, "type"),
+        _str(f, "by"),
+        tuple(int(number) for number in f.get("qos", ())),
+        _texts(f, "error"),
+    )
+
+
+def _loaded(f: Mapping[str, Any]) -> Loaded:
+    forked = f.get("forked") is True
+    return Loaded(
+        _int(f, "pid"), _int(f, "at"), _int(f, "parent"), _int(f, "session"), _str(f, "program"), forked
+    )
+
+
+def _initialised(f: Mapping[str, Any]) -> Initialised:
+    return Initialised(
+        _int(f, "pid"), _int(f, "at"), _int(f, "rc"), _str(f, "middleware"), _str(f, "by"), _texts(f, "error")
+    )
+
+
+def _node(f: Mapping[str, Any]) -> NodeMade:
+    return NodeMade(
+        _int(f, "pid"),
+        _int(f, "thread"),
+        _int(f, "at"),
+        _int(f, "node"),
+        _int(f, "rc"),
+        _str(f, "name"),
+        _str(f, "namespace"),
+        _str(f, "fqn"),
+        _str(f, "by"),
+        _texts(f, "error"),
+    )
+
+
+def _run(f: Mapping[str, Any]) -> Run:
+    return Run(
+        _str(f, "id"),
+        _str(f, "launch_file"),
+        _str(f, "distro"),
+        _str(f, "isolation"),
+        _str(f, "date"),
+        f.get("secured") is True,
+    )
+
+
+def _process(f: Mapping[str, Any]) -> StartedProcess:
+    return StartedProcess(
+        _int(f, "pid"),
+        _str(f, "process"),
+        _str(f, "package"),
+        _str(f, "executable"),
+        _str(f, "kind"),
+        _str(f, "fqn"),
+        _str(f, "enclave"),
+        _str(f, "location"),
+        _texts(f, "arguments"),
+        _texts(f, "rules"),
+        _parameters(f),
+    )
+
+
+def _component(f: Mapping[str, Any]) -> LoadedComponent:
+    return LoadedComponent(
+        _str(f, "container"),
+        _str(f, "package"),
+        _str(f, "plugin"),
+        _str(f, "name"),
+        _str(f, "namespace"),
+        _str(f, "location"),
+        _texts(f, "rules"),
+        _parameters(f),
+    )
+
+
+_READERS: dict[str, Callable[[Mapping[str, Any]], Line]] = {
+    "loaded": _loaded,
+    "init": _initialised,
+    "node": _node,
+    "node_end": lambda f: NodeEnded(_int(f, "pid"), _int(f, "at"), _int(f, "node")),
+    "state": lambda f: StateEntered(_int(f, "pid"), _int(f, "at"), _int(f, "node"), _str(f, "state")),
+    "ended": lambda f: Ended(_int(f, "pid"), _int(f, "at")),
+    "run": _run,
+    "process": _process,
+    "component": _component,
+}
+
+
+def _int(fields: Mapping[str, Any], name: str) -> int:
+    value = fields.get(name, 0)
+    if not isinstance(value, int) or isinstance(value, bool):
+        raise TypeError(name)
+    return value
+
+
+def _str(fields: Mapping[str, Any], name: str) -> str:
+    value = fields.get(name) or ""
+    if not isinstance(value, str):
+        raise TypeError(name)
+    return value
+
+
+def _texts(fields: Mapping[str, Any], name: str) -> tuple[str, ...]:
+    return tuple(str(text) for text in fields.get(name) or ())
+
+
+def _parameters(fields: Mapping[str, Any]) -> Mapping[str, object]:
+    given = fields.get("parameters") or {}
+    if not isinstance(given, dict):
+        raise TypeError("parameters")
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+
+
+def _shown(text: bytes) -> str:
+    return ascii(text[:60].decode(errors="replace"))

@@ -1,0 +1,170 @@
+"""What was learnt of one node → the text of a NoDL v2 document, united with what stood there before. Pure.
+
+NoDL v2 has no place for a name that comes from a parameter, nor for runs: they are in our section of ``codegen``
+(``nodl.document.v2``), beside a standard entry under the name that was seen. Nothing is removed from a document
+because it was not seen: entries, descriptions and parameters that stand there stay.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from nodl.document.v2 import CATEGORIES
+from nodl.document.v2_schema import IDENTITY_KEY, NAME_PATTERN
+from nodl.node_interface import ClientLibrary, EndpointKind
+from nodl.record.learning import Entry, LearntNode
+
+_HEAD = "# Learnt by secure-launch --learn from what the node asked of librcl; see docs/recording.md.\n"
+_LISTS = {kind: category for category, kind in CATEGORIES.items()}
+_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+_HISTORY = {0: "SYSTEM_DEFAULT", 1: "KEEP_LAST", 2: "KEEP_ALL"}
+_RELIABILITY = {0: "SYSTEM_DEFAULT", 1: "RELIABLE", 2: "BEST_EFFORT", 4: "BEST_AVAILABLE"}
+_DURABILITY = {0: "SYSTEM_DEFAULT", 1: "TRANSIENT_LOCAL", 2: "VOLATILE", 4: "BEST_AVAILABLE"}
+
+
+def manifest_text(node: LearntNode, before: str = "") -> str:
+    """The document of ``node``; ``before`` is the text that stands there. Raises ``yaml.YAMLError`` for one that
+    is not YAML."""
+    import yaml
+
+    old = yaml.safe_load(before) if before.strip() else None
+    document = _united(_document(node), old if isinstance(old, dict) else {})
+    dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+    notes = "".join(f"# {_line(text)}\n" for text in (*node.incomplete, *node.notes))
+    text = yaml.dump(document, Dumper=dumper, sort_keys=False, width=110, allow_unicode=True)
+    return f"{_HEAD}{notes}{text}"
+
+
+def manifest_file_name(node: LearntNode, alone: bool) -> str:
+    """``PACKAGE__PROGRAM.nodl.yaml``; with the node's name where it is not ``alone`` in its program."""
+    key = node.key
+    program = (key.plugin or key.executable).replace("::", ".")
+    name = f"{key.package}__{program}" if key.package else program
+    return f"{_safe(name if alone else f'{name}.{key.node}')}.nodl.yaml"
+
+
+def _safe(text: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_.+-]", "_", text)
+
+
+def _line(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _document(node: LearntNode) -> dict[str, Any]:
+    document: dict[str, Any] = {"nodl_version": 2, "codegen": {IDENTITY_KEY: _section(node)}}
+    for kind, category in _LISTS.items():
+        entries = [entry for entry in node.entries if entry.kind is kind]
+        listed = [_entry(entry) for entry in entries]
+        if listed:
+            document[category] = list({each["name"]: each for each in listed}.values())
+    return document
+
+
+def _section(node: LearntNode) -> dict[str, Any]:
+    key = node.key
+    section: dict[str, Any] = {
+        "package": key.package,
+        "executable": key.executable,
+        "plugin": key.plugin,
+        "node": key.node,
+        "namespace": key.namespace,
+        "library": node.library.value if node.library is not ClientLibrary.UNKNOWN else "",
+        "lifecycle": node.lifecycle,
+        "logger_services": node.logger_services,
+        "incomplete": [_line(text) for text in node.incomplete],
+        "runs": [_run(run._asdict()) for run in node.runs],
+        "endpoints": [_about(entry) for entry in node.entries],
+    }
+    return {name: value for name, value in section.items() if value}
+
+
+def _run(fields: Mapping[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in fields.items() if value}
+
+
+def _entry(entry: Entry) -> dict[str, Any]:
+    fields: dict[str, Any] = {"name": _plain_name(entry), "type": entry.type}
+    if entry.kind in _TOPICS:
+        fields["qos"] = _quality(entry.qos)
+    return fields
+
+
+def _plain_name(entry: Entry) -> str:
+    """What NoDL v2 lets a name be; ``written`` in our section has the source's where that is something else."""
+    if re.search(NAME_PATTERN, entry.name):
+        return entry.name
+    return "unwritable_" + re.sub(r"[^A-Za-z0-9]+", "_", entry.name).strip("_")
+
+
+def _quality(qos: tuple[int, ...]) -> dict[str, Any]:
+    history, depth, reliability, durability = qos if len(qos) == 4 else (1, 10, 1, 2)
+    fields: dict[str, Any] = {"history": _HISTORY.get(history, "SYSTEM_DEFAULT")}
+    if fields["history"] == "KEEP_LAST":
+        fields["depth"] = max(1, depth)
+    fields["reliability"] = _RELIABILITY.get(reliability, "SYSTEM_DEFAULT")
+    fields["durability"] = _DURABILITY.get(durability, "SYSTEM_DEFAULT")
+    return fields
+
+
+def _about(entry: Entry) -> dict[str, Any]:
+    """What the standard entry cannot say."""
+    name, origin = _plain_name(entry), entry.origin
+    fields: dict[str, Any] = {"in": _LISTS[entry.kind], "name": name}
+    if name != entry.name:
+        fields["written"] = entry.name
+    if origin.source:
+        fields["parameter"] = origin.source.parameter
+        fields["each"] = origin.source.each
+        fields["default"] = origin.default
+        fields["proof"] = "another value was followed" if origin.proven else "one run"
+    if origin.undecided:
+        fields["undecided"] = [str(source) for source in origin.candidates]
+    fields["introspection"] = entry.introspected
+    fields["runs"] = list(entry.runs)
+    return {name: value for name, value in fields.items() if value not in (None, False, [])}
+
+
+def _united(new: dict[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
+    """``new``, with all of ``old`` that it does not say itself."""
+    united = {**{key: value for key, value in old.items() if key not in new}, **new}
+    section = _section_of(new)
+    ours, theirs = section.get("endpoints", []), _section_of(old).get("endpoints", [])
+    runs = {run["id"] for run in section.get("runs", []) if "id" in run}
+    known = {(each["in"], each["name"]) for each in ours}
+    learnt_again = {(e.get("in"), e.get("name")) for e in theirs if runs.issuperset(e.get("runs") or ["?"])}
+    for category in CATEGORIES:
+        dropped = {name for listed, name in learnt_again - known if listed == category}
+        united_list = _united_entries(new.get(category), old.get(category), dropped)
+        united.pop(category, None)
+        if united_list:
+            united[category] = united_list
+    gone = known | learnt_again
+    section["endpoints"] = [*ours, *(e for e in theirs if (e.get("in"), e.get("name")) not in gone)]
+    section["runs"] = _united_runs(section.get("runs", []), _section_of(old).get("runs", []))
+    others = old.get("codegen")
+    united["codegen"] = {**(others if isinstance(others, dict) else {}), IDENTITY_KEY: section}
+    order = ["nodl_version", "description", "codegen", "include", "parameters", *CATEGORIES]
+    return {key: united[key] for key in order if key in united}
+
+
+def _section_of(document: Mapping[str, Any]) -> dict[str, Any]:
+    codegen = document.get("codegen")
+    section = codegen.get(IDENTITY_KEY) if isinstance(codegen, dict) else None
+    return section if isinstance(section, dict) else {}
+
+
+def _united_entries(new: Any, old: Any, dropped: set[Any]) -> list[dict[str, Any]]:
+    """``dropped``: names that the same records explained differently before."""
+    ours = list(new or ())
+    theirs = {each["name"]: each for each in old or () if isinstance(each, dict) and "name" in each}
+    kept = [{**theirs.get(each["name"], {}), **each} for each in ours]
+    names = {each["name"] for each in ours} | dropped
+    return [*kept, *(each for name, each in theirs.items() if name not in names)]
+
+
+def _united_runs(new: Iterable[Any], old: Iterable[Any]) -> list[Any]:
+    runs = {run.get("id"): run for run in (*old, *new) if isinstance(run, dict)}
+    return [runs[key] for key in sorted(runs, key=str)]

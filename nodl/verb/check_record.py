@@ -1,0 +1,156 @@
+"""Hold manifests and inference against records of what nodes really asked for (secure-launch --learn writes them)."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from nodl.verb.options import add_prefix_argument
+
+if TYPE_CHECKING:
+    from nodl.lookup import ManifestLookup
+    from nodl.node_interface import NodeInterface
+    from nodl.record.asked import AskedNode
+    from nodl.record.checking import Comparison
+
+JUDGED = ("manifest", "inference")
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "check-record",
+        help="hold manifests and inference against recorded nodes",
+        description=__doc__,
+        epilog="exit status: 0 nothing is missing or wrong, 1 something is, 2 a record cannot be used",
+    )
+    parser.add_argument("records", nargs="+", metavar="RECORD", type=Path, help="files *.record, or folders")
+    parser.add_argument(
+        "--nodl", metavar="FILE|DIR", action="append", type=Path, default=[], help="manifests to judge"
+    )
+    parser.add_argument(
+        "--judge",
+        choices=(*JUDGED, "all"),
+        default="all",
+        help="what to hold against the records: manifests, inference from source, or each that says something",
+    )
+    parser.add_argument("--format", choices=("text", "json"), default="text")
+    add_prefix_argument(parser)
+    parser.set_defaults(run=run)
+    return parser
+
+
+class Judgement(NamedTuple):
+    """``described_by``: ``manifest`` or ``inference``; ``comparison`` ``None``: it says nothing of the node."""
+
+    node: AskedNode
+    described_by: str
+    comparison: Comparison | None
+    why: str = ""
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from nodl.ament_index import search_prefixes
+    from nodl.lookup import ManifestLookup
+
+    nodes, complaints = _recorded(_files(arguments.records))
+    if not nodes:
+        print("secure-nodl check-record: no node of a known program is in these records", file=sys.stderr)
+        return 2
+    for text in complaints:
+        print(f"the record is not complete: {text}", file=sys.stderr)
+    prefixes = search_prefixes(arguments.prefix)
+    lookup = ManifestLookup(prefixes, arguments.nodl)
+    judges = JUDGED if arguments.judge == "all" else (arguments.judge,)
+    judgements = [each for node in nodes for each in _judge(node, lookup, prefixes, judges)]
+    sys.stdout.write(_json(judgements) if arguments.format == "json" else _text(judgements))
+    fits = all(each.comparison is not None and each.comparison.fits for each in _counted(judgements))
+    return 0 if fits else 1
+
+
+def _files(paths: Iterable[Path]) -> list[Path]:
+    return [file for path in paths for file in (sorted(path.rglob("*.record")) if path.is_dir() else [path])]
+
+
+def _recorded(files: Iterable[Path]) -> tuple[list[AskedNode], list[str]]:
+    from nodl.record.asked import all_asked
+    from nodl.record.assembly import read_record
+
+    nodes: list[AskedNode] = []
+    complaints: list[str] = []
+    for file in files:
+        record = read_record(file.read_bytes())
+        nodes += [node for node in all_asked(record.attributed()) if node.known_start and not node.container]
+        complaints += [f"{file}: {complaint.why}" for complaint in record.complaints]
+    return nodes, complaints
+
+
+def _judge(
+    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], judges: Iterable[str]
+) -> Iterable[Judgement]:
+    from nodl.record.checking import compare
+
+    for judge in judges:
+        interfaces, why = (_described if judge == "manifest" else _inferred)(node, lookup, prefixes)
+        yield Judgement(node, judge, compare(node, interfaces) if interfaces else None, why)
+
+
+def _described(
+    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str]
+) -> tuple[Sequence[NodeInterface], str]:
+    found = lookup.find(node.package, executable=node.executable or None, plugin=node.plugin or None)
+    return found.found, f"no manifest; looked at {', '.join(found.searched)}"
+
+
+def _inferred(
+    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str]
+) -> tuple[Sequence[NodeInterface], str]:
+    from nodl.infer.executable import infer_executable
+
+    inferred = infer_executable(node.package, node.executable or None, node.plugin or None, prefixes=prefixes)
+    return inferred.interfaces, inferred.why
+
+
+def _counted(judgements: Sequence[Judgement]) -> list[Judgement]:
+    """A judge that says nothing of a node counts only if none of the others does."""
+    speaks = {id(each.node) for each in judgements if each.comparison is not None}
+    return [each for each in judgements if each.comparison is not None or id(each.node) not in speaks]
+
+
+def _text(judgements: Sequence[Judgement]) -> str:
+    lines: list[str] = []
+    for node, judge, comparison, why in _counted(judgements):
+        head = f"{node.fqn} ({node.program}), {judge}: "
+        if comparison is None:
+            lines.append(f"{head}{why}")
+            continue
+        lines.append(f"{head}{comparison.agreed} as recorded")
+        lines += [f"  {difference}" for difference in comparison.differences]
+    return "\n".join([*lines, ""])
+
+
+def _json(judgements: Iterable[Judgement]) -> str:
+    rows = [
+        {
+            "node": node.fqn,
+            "program": node.program,
+            "judged": judge,
+            "says_something": comparison is not None,
+            "agreed": comparison.agreed if comparison else 0,
+            "differences": [
+                {
+                    "verdict": each.verdict.value,
+                    "kind": each.kind.value if each.kind else None,
+                    "name": each.name,
+                    "detail": each.detail,
+                }
+                for each in (comparison.differences if comparison else ())
+            ],
+            "why": why if comparison is None else "",
+        }
+        for node, judge, comparison, why in judgements
+    ]
+    return json.dumps(rows, indent=2) + "\n"

@@ -1,0 +1,160 @@
+"""Which parameter a name came from: candidates after one observation, decided by a second one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from nodl.node_interface import EndpointKind
+from nodl.record.origins import (
+    FIXED,
+    Name,
+    Observation,
+    Origin,
+    Source,
+    arguments_as_inputs,
+    candidates,
+    origins_of,
+)
+
+P, S = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
+
+
+def name(text: str, kind: EndpointKind = S, type_name: str = "m/msg/A") -> Name:
+    return Name(kind, text, type_name)
+
+
+def seen(inputs: Mapping[str, object], *names: str | Name) -> Observation:
+    return Observation(inputs, frozenset(name(each) if isinstance(each, str) else each for each in names))
+
+
+def origin(text: str, *observations: Observation) -> Origin:
+    return origins_of(observations)[name(text)]
+
+
+def test_a_name_that_no_value_explains_is_fixed() -> None:
+    assert origin("scan", seen({"topic": "laser"}, "scan")) == FIXED
+
+
+def test_one_candidate_is_the_source_as_far_as_one_run_tells() -> None:
+    assert origin("scan", seen({"scan_topic": "scan"}, "scan")) == Origin(Source("scan_topic"))
+
+
+def test_another_value_that_was_followed_proves_it() -> None:
+    first, second = seen({"scan_topic": "scan"}, "scan"), seen({"scan_topic": "front"}, "front")
+    assert origin("scan", first, second) == Origin(Source("scan_topic"), proven=True)
+
+
+def test_another_value_that_was_not_followed_makes_it_fixed() -> None:
+    """A frame called ``map`` beside a topic that is always called ``map``."""
+    first, second = seen({"world": "map"}, "map"), seen({"world": "earth"}, "map")
+    assert origin("map", first, second) == FIXED
+
+
+def test_a_value_that_was_not_changed_proves_nothing() -> None:
+    same = seen({"scan_topic": "scan"}, "scan")
+    assert origin("scan", same, same) == Origin(Source("scan_topic"))
+
+
+@pytest.mark.parametrize("parameter", ["global_frame", "odom.frame_id", "scan.type"])
+def test_frames_and_types_are_no_candidates(parameter: str) -> None:
+    assert origin("map", seen({parameter: "map"}, "map")) == FIXED
+
+
+def test_what_is_called_a_topic_goes_before_other_values() -> None:
+    assert origin("scan", seen({"scan.topic": "scan", "label": "scan"}, "scan")) == Origin(
+        Source("scan.topic")
+    )
+
+
+def test_several_candidates_are_undecided_and_no_source() -> None:
+    undecided = origin("odom", seen({"odom0": "odom", "other": "odom"}, "odom"))
+    assert undecided.undecided and undecided.source is None
+    assert undecided.candidates == (Source("odom0"), Source("other"))
+
+
+def test_a_second_run_decides_between_several() -> None:
+    first = seen({"odom0": "odom", "other": "odom"}, "odom")
+    second = seen({"odom0": "wheels", "other": "odom"}, "wheels")
+    assert origin("odom", first, second) == Origin(Source("odom0"), proven=True)
+
+
+def test_a_value_as_a_part_of_a_name_is_a_coincidence() -> None:
+    assert origin("front/scan2", seen({"a": "front", "b": "scan"}, "front/scan2")) == FIXED
+
+
+def test_values_are_names_verbatim() -> None:
+    assert origin("~/p", seen({"a": "~/p"}, "~/p")) == Origin(Source("a"))
+    assert origin("/p", seen({"a": "p"}, "/p")) == FIXED
+
+
+def test_each_entry_of_a_list() -> None:
+    origins = origins_of([seen({"sources": ("a", "b")}, "a", "b")])
+    assert set(origins.values()) == {Origin(Source("sources", each=True))}
+
+
+def test_types_keep_two_names_of_one_value_apart() -> None:
+    twist, lock = name("joy", type_name="m/msg/Twist"), name("joy", type_name="m/msg/Bool")
+    first = seen({"topics.a.topic": "joy", "locks.a.topic": "joy"}, twist, lock)
+    second = seen(
+        {"topics.a.topic": "one", "locks.a.topic": "two"},
+        twist._replace(name="one"),
+        lock._replace(name="two"),
+    )
+    origins = origins_of([first, second])
+    assert origins[twist] == Origin(Source("topics.a.topic"), proven=True)
+    assert origins[lock] == Origin(Source("locks.a.topic"), proven=True)
+
+
+def test_keys_that_are_data_become_a_star_where_two_were_seen() -> None:
+    two = seen({"topics.joy.topic": "a", "topics.nav.topic": "b"}, "a", "b")
+    assert origins_of([two])[name("a")] == Origin(Source("topics.*.topic"))
+    one = seen({"topics.joy.topic": "a"}, "a")
+    assert origins_of([one])[name("a")] == Origin(Source("topics.joy.topic"))
+
+
+def test_the_name_where_nothing_is_set_is_the_default() -> None:
+    set_, unset = seen({"scan_topic": "front"}, "front", "odom"), seen({}, "scan", "odom")
+    origins = origins_of([set_, unset])
+    assert origins[name("front")] == Origin(Source("scan_topic"), proven=True, default="scan")
+    assert name("scan") not in origins
+    assert origins[name("odom")] == FIXED
+
+
+def test_words_of_a_command_line_count_by_their_place() -> None:
+    assert candidates("out", arguments_as_inputs(["in", "out"])) == (Source("<2>"),)
+    assert arguments_as_inputs(["--rate", "5", "in"]) == {}
+
+
+texts = st.sampled_from(["a", "b", "c", "d"])
+inputs = st.dictionaries(st.sampled_from(["p", "q_topic", "r.s.topic"]), texts, max_size=3)
+observations = st.lists(
+    st.builds(
+        lambda given_inputs, names: Observation(given_inputs, frozenset(name(each) for each in names)),
+        inputs,
+        st.frozensets(texts, max_size=3),
+    ),
+    min_size=1,
+    max_size=4,
+)
+
+
+@given(observations)
+def test_every_name_that_was_seen_is_granted_for_what_it_was_seen_with(seen_all: list[Observation]) -> None:
+    """A manifest made of the origins allows each recorded name under the recorded inputs."""
+    from nodl.name_template import ParameterPart
+
+    origins = origins_of(seen_all)
+    for observation in seen_all:
+        granted = set()
+        for each, found in origins.items():
+            if found.source is None:
+                granted.add(each.name)
+            else:
+                item = "each" if found.source.each else None
+                part = ParameterPart(found.source.parameter, found.default, item)
+                granted.update(part.texts(observation.inputs))
+        assert {each.name for each in observation.names} <= granted

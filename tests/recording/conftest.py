@@ -1,0 +1,106 @@
+"""The recorder, the stand-in for rcl, and real rclpy."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable, Mapping
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.recording.build import recorder_library
+from enclave_launch.recording.environment import RECORD_VARIABLE
+from nodl.record.assembly import Record, read_record
+
+ROOT = Path(__file__).parent.parent.parent
+STAND_IN = Path(__file__).parent / "stand_in"
+
+
+@pytest.fixture(scope="session")
+def recorder() -> Path:
+    return recorder_library()
+
+
+@pytest.fixture(scope="session")
+def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the stand-in's libraries and ``program``, as they would lie in an installation."""
+    folder = tmp_path_factory.mktemp("stand_in")
+    flags = ["-g", "-fPIC", f"-L{folder}", f"-Wl,-rpath,{folder}", "-Wl,--no-as-needed"]
+
+    def build(name: str, source: str, *more: str) -> None:
+        command = ["cc", *flags[:2], str(STAND_IN / source), "-o", str(folder / name), *flags[2:], *more]
+        subprocess.run(command, check=True)
+
+    build("librcutils.so", "rcl.c", "-shared", "-DPART=1")
+    build("librcl.so", "rcl.c", "-shared", "-DPART=2", "-lrcutils")
+    build("librcl_action.so", "rcl.c", "-shared", "-DPART=3", "-lrcl", "-lrcutils")
+    build("librcl_lifecycle.so", "rcl.c", "-shared", "-DPART=4", "-lrcl", "-lrcutils")
+    libraries = ("-lrcl", "-lrcl_action", "-lrcl_lifecycle", "-lrcutils")
+    build("librclcpp.so", "rclcpp.c", "-shared", "-pthread", *libraries)
+    build("program", "program.c", "-lrclcpp")
+    return folder
+
+
+class Recorded:
+    """One program that was run with the recorder."""
+
+    def __init__(self, status: int, record: Record, text: str, stderr: str) -> None:
+        self.status, self.record, self.text, self.stderr = status, record, text, stderr
+
+
+RunRecorded = Callable[..., Recorded]
+
+
+@pytest.fixture
+def run_recorded(recorder: Path, stand_in: Path, tmp_path: Path) -> RunRecorded:
+    """``run(script, *arguments, preload=…, record=…, **environment)`` runs the stand-in with the recorder."""
+
+    def run(
+        script: str,
+        *arguments: str,
+        command: tuple[str, ...] = (),
+        preload: str = "{}",
+        record: Path | None = None,
+        program: Path | None = None,
+        variables: Mapping[str, str] | None = None,
+    ) -> Recorded:
+        file = record or tmp_path / "record"
+        if record is None:
+            file.write_bytes(b"")
+        folder = tmp_path / "program"
+        folder.mkdir(exist_ok=True)
+        executable = program or stand_in / "program"
+        link = folder / "node"
+        link.unlink(missing_ok=True)
+        link.symlink_to(executable)
+        (folder / "node.asks").write_text(script)
+        environment = {
+            "PATH": os.environ["PATH"],
+            "LD_PRELOAD": preload.format(recorder),
+            RECORD_VARIABLE: str(file),
+            **(variables or {}),
+        }
+        ran = subprocess.run(
+            [*command, str(link), *arguments],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=60,
+        )
+        data = file.read_bytes() if file.is_file() else b""
+        return Recorded(ran.returncode, read_record(data), data.decode(errors="replace"), ran.stderr)
+
+    return run
+
+
+def rclpy_python(release: str) -> Path:
+    """The python of real rclpy of this release, which ``./dev test`` sets up; fails in CI where it is missing."""
+    python = ROOT / ".ros" / release / "bin" / "python"
+    if not python.exists():
+        message = f"no rclpy of {release}: ./dev test sets it up in .ros/{release}"
+        if os.environ.get("CI") == "true":
+            pytest.fail(message)
+        pytest.skip(message)
+    return python
