@@ -31,7 +31,7 @@ FLOORS = (
     {"plan"},
     {"interfaces", "options", "prefixes", "security_environment"},
     {"report", "runtime"},
-    {"secured"},
+    {"recording", "secured"},
     {"running"},
     {"flow"},
     {"verb"},
