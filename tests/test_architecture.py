@@ -41,7 +41,6 @@ FLOORS = (
 
 # Arrows that point up all the same: what a class of upstream's does only when it is used on its own, loaded then.
 UPWARD = {
-    ("description", "evaluation"),
     ("description", "runtime"),
     ("host", "description"),
 }

@@ -10,12 +10,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib import import_module
 from importlib.machinery import ModuleSpec
-from importlib.util import find_spec
 from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
+
+from enclave_launch.description.public_modules import exists, hidden_modules, public_module
 
 PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")
 FALLBACK_NAMES = ("lifecycle_msgs",)
@@ -65,27 +65,21 @@ class _Finder:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        if fullname.partition(".")[0] not in self._names or find_spec(_OURS + fullname) is None:
+        if fullname.partition(".")[0] not in self._names or not exists(fullname):
             return None
-        return ModuleSpec(fullname, cast(Any, _Alias()))
+        return ModuleSpec(fullname, cast(Any, _Loader()))
 
 
-class _Alias:
-    """Gives our module itself, which keeps its own name and spec."""
+class _Loader:
+    """Gives the module that the table describes, the same object each time."""
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
-        module = import_module(_OURS + spec.name)
-        self._own_spec = module.__spec__
-        return module
+        return public_module(spec.name)
 
     def exec_module(self, module: ModuleType) -> None:
-        """Submodules loaded already get their public name at once: importing one later would bind it in its
-        package, over a function of the same name (``launch_ros.utilities.evaluate_parameters``)."""
-        module.__spec__ = self._own_spec
-        below = f"{module.__name__}."
-        for name, loaded in list(sys.modules.items()):
-            if name.startswith(below):
-                sys.modules.setdefault(name.removeprefix(_OURS), loaded)
+        """Modules that a name of their package hides are there from the start, so that importing one binds nothing."""
+        for name in hidden_modules(module.__name__):
+            sys.modules.setdefault(name, public_module(name))
 
 
 _FINDER = _Finder(PUBLIC_NAMES)
@@ -112,12 +106,12 @@ def _withdraw(before: set[str]) -> None:
         if is_public(name) or (name not in before and name.startswith(FALLBACK_NAMES) and _is_ours(module)):
             del sys.modules[name]
     new = {name for name in sys.modules if name not in before and not name.startswith("enclave_launch")}
-    for name in _dependents(new, lambda module: module.startswith(_OURS)):
+    for name in _dependents(new, lambda origin: origin.startswith(_OURS) or is_public(origin)):
         _guests[name] = sys.modules.pop(name)
 
 
 def _is_ours(module: ModuleType) -> bool:
-    return module.__name__.startswith(_OURS)
+    return exists(module.__name__) and module is public_module(module.__name__)
 
 
 def _dependents(names: set[str], belongs: Callable[[str], bool]) -> set[str]:

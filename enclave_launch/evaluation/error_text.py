@@ -12,11 +12,9 @@ import sys
 from collections.abc import Iterator
 from types import TracebackType
 
-from enclave_launch.description.launch.conditions.invalid_condition_expression_error import (
-    InvalidConditionExpressionError,
-)
+from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_ARGUMENT
+from enclave_launch.description.conditions import InvalidConditionExpressionError
 from enclave_launch.errors import EnclaveLaunchError
-from enclave_launch.evaluation.arguments import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.host.protocol import MISSING_PREFIX
 from nodl.ament_index import PackageNotFoundError
 

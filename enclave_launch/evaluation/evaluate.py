@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.location import OUTSIDE, place_of
 from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
-from enclave_launch.evaluation.location import OUTSIDE, place_of
 from enclave_launch.host.current import active_host
 from enclave_launch.host.environment import environment_untouched
 from enclave_launch.host.plan_host import PlanHost
@@ -22,7 +22,7 @@ from enclave_launch.process import Evaluation
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.launch_description import LaunchDescription
+    from enclave_launch.description.launch_description import LaunchDescription
 
 Arguments = Sequence[tuple[str, str]]
 
@@ -52,11 +52,9 @@ def evaluate(
 
     Raises ``EvaluationError`` (file, line, element, include chain; ``cause`` is launch's own exception).
     """
-    from enclave_launch.description.launch.event_handlers.on_include_launch_description import (
-        OnIncludeLaunchDescription,
-    )
-    from enclave_launch.description.launch.events.include_launch_description import IncludeLaunchDescription
-    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.events.event import IncludeLaunchDescription
+    from enclave_launch.description.events.handlers import OnIncludeLaunchDescription
+    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.evaluation.explore import Explorer
 
     host = host or PlanHost()
@@ -77,9 +75,9 @@ def evaluate(
 
 def top_description(path: str, arguments: Arguments) -> Any:
     """The description that ``ros2 launch`` makes around a file: it includes the file with the arguments."""
-    from enclave_launch.description.launch.actions.include_launch_description import IncludeLaunchDescription
-    from enclave_launch.description.launch.launch_description import LaunchDescription
-    from enclave_launch.description.launch.launch_description_sources import AnyLaunchDescriptionSource
+    from enclave_launch.description.actions.includes import IncludeLaunchDescription
+    from enclave_launch.description.launch_description import LaunchDescription
+    from enclave_launch.description.sources import AnyLaunchDescriptionSource
 
     include = IncludeLaunchDescription(AnyLaunchDescriptionSource(path), launch_arguments=arguments)
     include.source_location = None
@@ -92,10 +90,8 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
 
     Raises ``EvaluationError`` as ``evaluate``.
     """
-    from enclave_launch.description.launch.launch_description_sources import (
-        get_launch_description_from_any_launch_file,
-    )
-    from enclave_launch.evaluation.arguments import check_is_description
+    from enclave_launch.description.argument_scan import check_is_description
+    from enclave_launch.description.sources import get_launch_description_from_any_launch_file
 
     path = os.path.abspath(launch_file)
     with evaluation_surroundings(host):
@@ -148,7 +144,7 @@ def _collector_paused() -> Iterator[None]:
 
 
 def _forget_elements_of_launch_files() -> None:
-    from enclave_launch.description.launch.frontend import expose
+    from enclave_launch.description.markup import expose
     from enclave_launch.frontend.python_file import MODULE_NAME
 
     expose.forget(MODULE_NAME)

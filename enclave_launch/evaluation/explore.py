@@ -10,19 +10,17 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.description.launch.events.process import ProcessStarted
-from enclave_launch.description.launch.events.shutdown import Shutdown
-from enclave_launch.description.launch.events.timer_event import TimerEvent
-from enclave_launch.evaluation.events import chain, run_handler
-from enclave_launch.evaluation.location import location_of, place_of
-from enclave_launch.evaluation.suppositions import process_event_arguments
+from enclave_launch.description.events.dispatch import chain, run_handler
+from enclave_launch.description.events.event import Shutdown, TimerEvent
+from enclave_launch.description.events.process import ProcessStarted, process_event_arguments
+from enclave_launch.description.location import location_of, place_of
 from enclave_launch.process import Unforeseeable
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.event import Event
-    from enclave_launch.description.launch.event_handler import BaseEventHandler
-    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.events.event import Event
+    from enclave_launch.description.events.handlers import BaseEventHandler
+    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.host.plan_host import PlanHost
 
 
@@ -148,7 +146,7 @@ class Explorer:
 
     def _report_unreached(self) -> None:
         """Handlers with entities that no event of this dry run could reach."""
-        from enclave_launch.description.launch.event_handler import EventHandler
+        from enclave_launch.description.events.handlers import EventHandler
 
         for handler in self._context._event_handlers.all():
             if handler.internal or id(handler) in self._fired or not isinstance(handler, EventHandler):

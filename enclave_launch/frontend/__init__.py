@@ -6,7 +6,6 @@
     shell_words.py            a command line as text -> its words
     yaml_scalar.py            text -> value by YAML 1.1 rules, mostly without loading PyYAML
     python_file.py            runs a Python launch file: foreign code, alone in its file, behind a switch
-    extensions.py             which modules register elements and substitutions
     error_location.py         exception -> file, line and element
 
 The classes that Python code sees (``launch.frontend.Parser``, ``launch_xml.Entity``...) are in

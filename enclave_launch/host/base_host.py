@@ -136,6 +136,6 @@ class BaseHost:
         return full.translate(str.maketrans("-.:", "___"))
 
     def log_directory(self) -> str:
-        from enclave_launch.description.launch.logging import launch_config
+        from enclave_launch.description.logging import launch_config
 
         return launch_config.log_dir

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 from enclave_launch.host.environment import environment_snapshot
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.launch_description import LaunchDescription
-    from enclave_launch.description.launch.launch_description_source import LaunchDescriptionSource
-    from enclave_launch.evaluation.arguments import Summary
+    from enclave_launch.description.argument_scan import Summary
+    from enclave_launch.description.launch_description import LaunchDescription
+    from enclave_launch.description.sources import LaunchDescriptionSource
 
 Key = tuple[type, str]
 

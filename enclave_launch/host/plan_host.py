@@ -9,9 +9,9 @@ from enclave_launch.host.base_host import BaseHost
 from enclave_launch.host.virtual_loop import VirtualLoop
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
-    from enclave_launch.description.launch.launch_context import LaunchContext
-    from enclave_launch.description.launch_ros.actions.lifecycle_node import LifecycleNode
+    from enclave_launch.description.actions.lifecycle import LifecycleNode
+    from enclave_launch.description.actions.processes import ExecuteLocal
+    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.host.protocol import Completion
     from enclave_launch.process import (
         LauncherCall,

@@ -11,9 +11,9 @@ from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
-    from enclave_launch.description.launch.launch_context import LaunchContext
-    from enclave_launch.description.launch_ros.actions.lifecycle_node import LifecycleNode
+    from enclave_launch.description.actions.lifecycle import LifecycleNode
+    from enclave_launch.description.actions.processes import ExecuteLocal
+    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.diagnostics import Diagnostic
     from enclave_launch.host.loading import LoadCache
     from enclave_launch.process import (

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 from enclave_launch.boundary.terminal import printable
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.actions.declare_launch_argument import DeclareLaunchArgument
-    from enclave_launch.description.launch.launch_description import LaunchDescription
+    from enclave_launch.description.actions.arguments import DeclareLaunchArgument
+    from enclave_launch.description.launch_description import LaunchDescription
 
 
 def arguments_text(description: LaunchDescription) -> str:
@@ -37,6 +37,6 @@ def _argument(argument: DeclareLaunchArgument) -> Iterator[str]:
 
 def description_text(description: LaunchDescription) -> str:
     """What ``-p`` prints: the description as a tree."""
-    from enclave_launch.description.launch.launch_introspector import LaunchIntrospector
+    from enclave_launch.description.introspection import LaunchIntrospector
 
     return LaunchIntrospector().format_launch_description(description) + "\n"

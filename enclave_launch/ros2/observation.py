@@ -13,7 +13,7 @@ import launch_ros.actions
 from launch.descriptions import executable as executable_description
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
-from enclave_launch.description.launch.actions.execute_local import first_word
+from enclave_launch.description.actions.processes import first_word
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
     UNSPECIFIED_NODE_NAMESPACE,

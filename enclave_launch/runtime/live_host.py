@@ -25,9 +25,9 @@ from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
 from enclave_launch.runtime.ros_services import ALTERNATIVE, RosServices
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
-    from enclave_launch.description.launch.launch_context import LaunchContext
-    from enclave_launch.description.launch_ros.actions.lifecycle_node import LifecycleNode
+    from enclave_launch.description.actions.lifecycle import LifecycleNode
+    from enclave_launch.description.actions.processes import ExecuteLocal
+    from enclave_launch.description.launch_context import LaunchContext
 
 
 class LiveHost(BaseHost):
@@ -113,7 +113,7 @@ class LiveHost(BaseHost):
     def _watch_state(self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext) -> None:
         if process.kind != "lifecycle_node" or self._services is None or process.fqn is None:
             return
-        from enclave_launch.description.launch_ros.events.lifecycle.state_transition import StateTransition
+        from enclave_launch.description.events.lifecycle import StateTransition
 
         node: Any = action
         self._services.watch_state(

@@ -10,11 +10,10 @@ from collections.abc import Awaitable, Callable
 from signal import Signals
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.description.launch.conditions import evaluate_condition_expression
-from enclave_launch.description.launch.event_handler import EventHandler
-from enclave_launch.description.launch.event_handlers import OnShutdown
-from enclave_launch.description.launch.events import Shutdown
-from enclave_launch.description.launch.events.process import (
+from enclave_launch.description.conditions import evaluate_condition_expression
+from enclave_launch.description.events.event import Shutdown
+from enclave_launch.description.events.handlers import EventHandler, OnShutdown
+from enclave_launch.description.events.process import (
     ProcessExited,
     ProcessStarted,
     ProcessStderr,
@@ -24,10 +23,7 @@ from enclave_launch.description.launch.events.process import (
     ShutdownProcess,
     SignalProcess,
 )
-from enclave_launch.description.launch.utilities import (
-    normalize_to_list_of_substitutions,
-    perform_substitutions,
-)
+from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.launch_log import LaunchLog, Level
 from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree, Stream
@@ -35,8 +31,8 @@ from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter, OutputS
 from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch.actions.execute_local import ExecuteLocal
-    from enclave_launch.description.launch.launch_context import LaunchContext
+    from enclave_launch.description.actions.processes import ExecuteLocal
+    from enclave_launch.description.launch_context import LaunchContext
 
 Prepare = Callable[[ResolvedProcess], Awaitable[ProcessSpec]]
 

@@ -23,13 +23,13 @@ from signal import SIG_IGN, SIGHUP, SIGINT, SIGQUIT, SIGTERM, Signals, getsignal
 from types import MappingProxyType
 from typing import Any, NamedTuple, TextIO
 
-from enclave_launch.description.launch.event_handlers import OnIncludeLaunchDescription, OnShutdown
-from enclave_launch.description.launch.events import IncludeLaunchDescription, Shutdown
-from enclave_launch.description.launch.launch_context import LaunchContext
+from enclave_launch.description.events.dispatch import handle_next
+from enclave_launch.description.events.event import IncludeLaunchDescription, Shutdown
+from enclave_launch.description.events.handlers import OnIncludeLaunchDescription, OnShutdown
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.location import place_of
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.evaluation.evaluate import Arguments, evaluation_surroundings, top_description
-from enclave_launch.evaluation.events import handle_next
-from enclave_launch.evaluation.location import place_of
 from enclave_launch.runtime.gate import EnclaveGate
 from enclave_launch.runtime.launch_log import LaunchLog, Level, captured_logging
 from enclave_launch.runtime.live_host import LiveHost

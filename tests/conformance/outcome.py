@@ -17,6 +17,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from enclave_launch.description.public_modules import upstream_name
+
 # Messages that come from the parsing library or from Python, not from launch: the type is what counts.
 _TYPE_ONLY = {
     *("UnexpectedCharacters", "UnexpectedEOF", "ParseError", "SyntaxError", "XMLSyntaxError"),
@@ -32,7 +34,7 @@ _NORMALIZED = [
     (re.compile(pattern), replacement)
     for pattern, replacement in (
         (r"0x[0-9a-f]{6,}", "0x.."),
-        (r"enclave_launch\.description\.", ""),
+        (r"(enclave_launch\.description\.[\w.]+)\.([A-Z]\w+)", lambda ours: upstream_name(ours[1], ours[2])),
         (r"typing\.List\[", "list["),
         (r", '[^']*launch_grammar_[^']*'", ""),
         (r"(cannot import name .*) \([^)]*\)", r"\1"),

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from enclave_launch.description.launch.frontend.parse_substitution import parse_substitution
+from enclave_launch.description.markup.parse_substitution import parse_substitution
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate
 from enclave_launch.frontend.error_location import likeliest
 from enclave_launch.host.plan_host import PlanHost

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import importlib
 from pathlib import Path
 
 import pytest
 
+from enclave_launch.description.public_modules import public_module
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate
 from enclave_launch.host.current import active_host
 from enclave_launch.host.plan_host import PlanHost
@@ -22,7 +22,7 @@ from enclave_launch.host.plan_host import PlanHost
     ],
 )
 def test_names_exist_where_the_release_has_them(module: str, name: str, absent: str, present: str) -> None:
-    package = importlib.import_module(f"enclave_launch.description.launch.{module}")
+    package = public_module(f"launch.{module}")
     with active_host(PlanHost(distro=absent)):
         assert name not in package.__all__
         with pytest.raises(AttributeError, match=name):

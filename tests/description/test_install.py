@@ -34,10 +34,10 @@ def helper_class() -> type:
 def test_the_public_names_are_our_very_classes() -> None:
     with installed():
         module = importlib.import_module("launch.actions.group_action")
-        from enclave_launch.description.launch.actions.group_action import GroupAction
+        from enclave_launch.description.actions.flow import GroupAction
 
         assert module.GroupAction is GroupAction
-        assert module.__name__ == "enclave_launch.description.launch.actions.group_action"
+        assert module.__name__ == "launch.actions.group_action"
     assert "launch.actions.group_action" not in sys.modules
 
 

@@ -60,7 +60,7 @@ def test_an_argument_behind_a_reset_is_missed_and_fails_later(folder: Path) -> N
 
 @pytest.mark.parametrize("name", ["needs", "gives", "hidden", "conditional", "behind_reset", "pair"])
 def test_the_public_walk_finds_the_same_names(folder: Path, name: str) -> None:
-    from enclave_launch.evaluation.arguments import _summarize
+    from enclave_launch.description.argument_scan import _summarize
 
     host = PlanHost()
     with evaluation_surroundings(host):

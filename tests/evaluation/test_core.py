@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.description.launch.event import Event
-from enclave_launch.description.launch.event_handler import EventHandler
-from enclave_launch.evaluation.events import HandlerTable, chain
+from enclave_launch.description.events.dispatch import HandlerTable, chain
+from enclave_launch.description.events.event import Event
+from enclave_launch.description.events.handlers import EventHandler
 from enclave_launch.host.environment import Environment, environment_untouched
 from enclave_launch.host.virtual_loop import VirtualLoop
 from enclave_launch.ros_rules.distro import Distro, Feature, choose_release, release_of

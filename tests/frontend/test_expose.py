@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.description.launch.action import Action
-from enclave_launch.description.launch.frontend import Entity, Parser, expose_action
-from enclave_launch.description.launch.frontend.expose import action_parse_methods, instantiate_action
-from enclave_launch.description.launch_xml import Parser as XmlParser
+from enclave_launch.description.action import Action
+from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.expose import action_parse_methods, expose_action, instantiate_action
+from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.markup.xml import Parser as XmlParser
 from enclave_launch.frontend.error_location import location_of
 
 

@@ -6,21 +6,24 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.description.launch.frontend import InvalidFrontendLaunchFileError, Parser
-from enclave_launch.description.launch.invalid_launch_file_error import InvalidLaunchFileError
-from enclave_launch.description.launch.launch_context import LaunchContext
-from enclave_launch.description.launch.launch_description import LaunchDescription
-from enclave_launch.description.launch.launch_description_sources import (
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.launch_description import LaunchDescription
+from enclave_launch.description.markup.parser import (
+    InvalidFrontendLaunchFileError,
+    InvalidLaunchFileError,
+    Parser,
+)
+from enclave_launch.description.sources import (
     AnyLaunchDescriptionSource,
     FrontendLaunchDescriptionSource,
     InvalidPythonLaunchFileError,
     PythonLaunchDescriptionSource,
+    XMLLaunchDescriptionSource,
+    YAMLLaunchDescriptionSource,
     get_launch_description_from_any_launch_file,
     get_launch_description_from_frontend_launch_file,
     get_launch_description_from_python_launch_file,
 )
-from enclave_launch.description.launch_xml.launch_description_sources import XMLLaunchDescriptionSource
-from enclave_launch.description.launch_yaml.launch_description_sources import YAMLLaunchDescriptionSource
 from enclave_launch.frontend.error_location import likeliest, location_of
 from enclave_launch.host.current import active_host
 from enclave_launch.host.plan_host import PlanHost
@@ -28,7 +31,7 @@ from enclave_launch.host.plan_host import PlanHost
 XML = '<launch>\n  <let name="a" value="b"/>\n</launch>'
 YAML = "launch:\n- let: {name: a, value: b}\n"
 PYTHON = """
-from enclave_launch.description.launch import LaunchDescription
+from enclave_launch.description.launch_description import LaunchDescription
 
 def generate_launch_description():
     return LaunchDescription([])
@@ -184,9 +187,9 @@ def test_roots() -> None:
         *("launch.xml", "xml", "launch", "launch.yaml", "launch.yml", "yaml", "yml"),
     }
     assert Parser.is_filename_valid("x.launch") and not Parser.is_filename_valid("x.launch.py")
-    assert [parser.__module__.split(".")[-2] for parser in Parser.get_parsers_from_filename("x.launch")] == [
-        "launch_xml",
-        "launch_yaml",
+    assert [parser.__module__.split(".")[-1] for parser in Parser.get_parsers_from_filename("x.launch")] == [
+        "xml",
+        "yaml",
     ]
 
 

@@ -7,20 +7,16 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.description.launch.frontend import expose_substitution
-from enclave_launch.description.launch.frontend.expose import instantiate_substitution
-from enclave_launch.description.launch.frontend.parse_substitution import (
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.markup.expose import expose_substitution, instantiate_substitution
+from enclave_launch.description.markup.parse_substitution import (
     parse_if_substitutions,
     parse_substitution,
     replace_escaped_characters,
 )
-from enclave_launch.description.launch.launch_context import LaunchContext
-from enclave_launch.description.launch.substitution import Substitution
-from enclave_launch.description.launch.substitutions.environment_variable import EnvironmentVariable
-from enclave_launch.description.launch.substitutions.launch_configuration import LaunchConfiguration
-from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
-from enclave_launch.description.launch.substitutions.this_launch_file_dir import ThisLaunchFileDir
-from enclave_launch.description.launch.utilities import perform_substitutions
+from enclave_launch.description.substitution import Substitution, TextSubstitution, perform_substitutions
+from enclave_launch.description.substitutions.paths import ThisLaunchFileDir
+from enclave_launch.description.substitutions.variables import EnvironmentVariable, LaunchConfiguration
 from enclave_launch.frontend.substitution_grammar import UnexpectedCharacters, VisitError
 from enclave_launch.host.current import active_host
 from enclave_launch.host.plan_host import PlanHost

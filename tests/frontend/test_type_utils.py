@@ -6,10 +6,10 @@ from typing import Any, List  # noqa: UP035  (what launch files write)
 
 import pytest
 
-from enclave_launch.description.launch.launch_context import LaunchContext
-from enclave_launch.description.launch.substitutions.launch_configuration import LaunchConfiguration
-from enclave_launch.description.launch.substitutions.text_substitution import TextSubstitution
-from enclave_launch.description.launch.utilities import type_utils as tu
+from enclave_launch.description import typed_values as tu
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.substitution import TextSubstitution
+from enclave_launch.description.substitutions.variables import LaunchConfiguration
 from enclave_launch.host.current import active_host
 from enclave_launch.host.plan_host import PlanHost
 

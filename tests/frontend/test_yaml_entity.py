@@ -7,8 +7,8 @@ from typing import Any, List  # noqa: UP035  (what parse methods write)
 
 import pytest
 
-from enclave_launch.description.launch.frontend import Entity as BaseEntity
-from enclave_launch.description.launch_yaml import Entity, Parser
+from enclave_launch.description.markup.entity import Entity as BaseEntity
+from enclave_launch.description.markup.yaml import Entity, Parser
 
 
 def entity(text: str) -> Entity:

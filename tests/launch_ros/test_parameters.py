@@ -11,7 +11,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.description.launch_ros.utilities import yaml_text
+from enclave_launch.description.parameters import yaml_text
 from enclave_launch.process import Evaluation
 from enclave_launch.ros_rules.rcl_parameters import as_rcl_reads, resolve_parameters
 from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule, parse_ros_arguments

@@ -17,8 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from enclave_launch.description import lifecycle_msgs
-from enclave_launch.description.lifecycle_msgs import msg as lifecycle_messages
+from enclave_launch.description.public_modules import public_module
 from nodl.names import validate_namespace, validate_node_name
 
 
@@ -111,8 +110,8 @@ def _messages() -> None:
     module("composition_interfaces")
     module("composition_interfaces.srv", LoadNode=LoadNode)
     if importlib.util.find_spec("lifecycle_msgs") is None:
-        sys.modules["lifecycle_msgs"] = lifecycle_msgs
-        sys.modules["lifecycle_msgs.msg"] = lifecycle_messages
+        sys.modules["lifecycle_msgs"] = public_module("lifecycle_msgs")
+        sys.modules["lifecycle_msgs.msg"] = public_module("lifecycle_msgs.msg")
         _PLACED.add("lifecycle_msgs")
     module("lifecycle_msgs.srv", ChangeState=Anything)
 

@@ -104,7 +104,7 @@ class {name}:
 """
 
 MESSAGES = """
-from enclave_launch.description.lifecycle_msgs.msg import *
+from enclave_launch.description.lifecycle_msgs import *
 class TransitionEvent: ...
 """
 

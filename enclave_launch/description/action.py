@@ -1,0 +1,90 @@
+"""Base of all actions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.entity import LaunchDescriptionEntity, creation_location
+
+if TYPE_CHECKING:
+    from enclave_launch.description.conditions import Condition
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.markup.entity import Entity
+    from enclave_launch.description.markup.parser import Parser
+
+
+class Action(LaunchDescriptionEntity):
+    """An intention, carried out by ``execute`` when its condition holds at that moment.
+
+    With a false condition nothing happens at all: no substitution is performed.
+    """
+
+    def __init__(self, *, condition: Condition | None = None) -> None:
+        self.__condition = condition
+        self.source_location = creation_location(type(self).__name__)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
+        """The constructor arguments that every element has: ``if`` and ``unless``."""
+        given = entity.given
+        if "if" not in given and "unless" not in given:
+            return Action, {}
+        if_text = entity.get_attr("if", optional=True)
+        unless_text = entity.get_attr("unless", optional=True)
+        if if_text is None and unless_text is None:
+            return Action, {}
+        if if_text is not None and unless_text is not None:
+            raise RuntimeError("if and unless conditions can't be used simultaneously")
+        from enclave_launch.description.conditions import IfCondition, UnlessCondition
+
+        if if_text is not None:
+            return Action, {"condition": IfCondition(parser.parse_substitution(if_text))}
+        return Action, {"condition": UnlessCondition(parser.parse_substitution(unless_text or ""))}
+
+    @property
+    def condition(self) -> Condition | None:
+        return self.__condition
+
+    def describe(self) -> str:
+        return repr(self)
+
+    def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        """The entities that ``execute`` will give, as far as known without a context."""
+        return []
+
+    def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        return self.get_sub_entities() if self.condition is None else []
+
+    def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
+        if self.condition is None:
+            return []
+        return [(f"Conditionally included by {self.describe()}", self.get_sub_entities())]
+
+    def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        if self.__condition is not None and not self.__condition.evaluate(context):
+            return None
+        try:
+            return self.execute(context)
+        finally:
+            if context.awaits_completion():
+                _tell_completion(self, context)
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        """Carry it out, and give the entities to visit next. The base does nothing."""
+        return None
+
+
+def _tell_completion(action: Action, context: LaunchContext) -> None:
+    """Emit ``ExecutionComplete``, at once or when the action's future is done; only if a handler registered
+    by now would take it."""
+    from enclave_launch.description.events.event import ExecutionComplete
+
+    event = ExecutionComplete(action=action)
+    if not context.would_handle_event(event):
+        return
+    future = action.get_asyncio_future()
+    if future is None:
+        context.emit_event_sync(event)
+    else:
+        future.add_done_callback(lambda _: context.emit_event_sync(event))

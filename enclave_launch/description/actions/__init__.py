@@ -1,0 +1,1 @@
+"""Actions, by what they are about."""

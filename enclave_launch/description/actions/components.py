@@ -1,0 +1,169 @@
+"""``composable_node``: what to load into a container. Not an action: ``node_container`` and the like hold these."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
+from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.parameters.normalize import normalize_parameters
+from enclave_launch.description.parameters.types import Parameters, SomeParameters
+from enclave_launch.description.remap_rules import RemapRules, SomeRemapRules, normalize_remap_rules
+from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
+    Substitution,
+    normalize_to_list_of_substitutions,
+)
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    from enclave_launch.source_location import SourceLocation
+
+
+class ComposableNode:
+    """Package and plugin with its name, namespace, parameters, remap rules and extra arguments.
+
+    As upstream the remap rules are read once: the same object loaded a second time has none.
+    """
+
+    source_location: SourceLocation | None = None
+
+    def __init__(
+        self,
+        *,
+        package: SomeSubstitutionsType,
+        plugin: SomeSubstitutionsType,
+        name: SomeSubstitutionsType | None = None,
+        namespace: SomeSubstitutionsType | None = None,
+        parameters: SomeParameters | None = None,
+        remappings: SomeRemapRules | None = None,
+        extra_arguments: SomeParameters | None = None,
+        condition: Condition | None = None,
+    ):
+        self.__package = normalize_to_list_of_substitutions(package)
+        self.__plugin = normalize_to_list_of_substitutions(plugin)
+        self.__name = None if name is None else normalize_to_list_of_substitutions(name)
+        self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
+        self.__parameters = None if parameters is None else normalize_parameters(parameters)
+        self.__remappings = normalize_remap_rules(remappings) if remappings else None
+        self.__extra_arguments = normalize_parameters(extra_arguments) if extra_arguments else None
+        self.__condition = condition
+
+    @classmethod
+    def parse(cls, parser: Parser, entity: Entity) -> tuple[type[ComposableNode], dict[str, Any]]:
+        """Keywords from a ``composable_node`` element; raises when something in it was not understood."""
+        from enclave_launch.description.actions.nodes import Node, parse_remaps
+
+        kwargs: dict[str, Any] = {
+            "package": parser.parse_substitution(entity.get_attr("pkg")),
+            "plugin": parser.parse_substitution(entity.get_attr("plugin")),
+            "name": parser.parse_substitution(entity.get_attr("name")),
+        }
+        condition = _parse_condition(entity, parser)
+        if condition is not None:
+            kwargs["condition"] = condition
+        namespace = entity.get_attr("namespace", optional=True)
+        if namespace is not None:
+            kwargs["namespace"] = parser.parse_substitution(namespace)
+        parameters = entity.get_attr("param", data_type=list[Entity], optional=True)
+        if parameters is not None:
+            kwargs["parameters"] = Node.parse_nested_parameters(parameters, parser)
+        remappings = entity.get_attr("remap", data_type=list[Entity], optional=True)
+        if remappings is not None:
+            kwargs["remappings"] = parse_remaps(remappings, parser)
+        extra_arguments = entity.get_attr("extra_arg", data_type=list[Entity], optional=True)
+        if extra_arguments is not None:
+            kwargs["extra_arguments"] = [_parse_extra_argument(item, parser) for item in extra_arguments]
+        entity.assert_entity_completely_parsed()
+        return cls, kwargs
+
+    @classmethod
+    def from_entity(cls, entity: Entity, parser: Parser) -> ComposableNode:
+        """Build the description and remember where it was written."""
+        kind, kwargs = cls.parse(parser, entity)
+        description = kind(**kwargs)
+        description.source_location = entity.source_location
+        return description
+
+    @property
+    def package(self) -> list[Substitution]:
+        return self.__package
+
+    @property
+    def node_plugin(self) -> list[Substitution]:
+        return self.__plugin
+
+    @property
+    def node_name(self) -> list[Substitution] | None:
+        return self.__name
+
+    @property
+    def node_namespace(self) -> list[Substitution] | None:
+        return self.__namespace
+
+    @property
+    def parameters(self) -> Parameters | None:
+        return self.__parameters
+
+    @property
+    def remappings(self) -> RemapRules | None:
+        return self.__remappings
+
+    @property
+    def extra_arguments(self) -> Parameters | None:
+        return self.__extra_arguments
+
+    def condition(self) -> Condition | None:
+        return self.__condition
+
+
+def _parse_condition(entity: Entity, parser: Parser) -> Condition | None:
+    if_text = entity.get_attr("if", optional=True)
+    unless_text = entity.get_attr("unless", optional=True)
+    if if_text is not None and unless_text is not None:
+        raise RuntimeError("if and unless conditions can't be used simultaneously")
+    if if_text is not None:
+        return IfCondition(predicate_expression=parser.parse_substitution(if_text))
+    if unless_text is not None:
+        return UnlessCondition(predicate_expression=parser.parse_substitution(unless_text))
+    return None
+
+
+def _parse_extra_argument(entity: Entity, parser: Parser) -> dict[tuple[Substitution, ...], Any]:
+    name = tuple(parser.parse_substitution(entity.get_attr("name")))
+    value = parser.parse_substitution(entity.get_attr("value"))
+    entity.assert_entity_completely_parsed()
+    return {name: value}
+
+
+# ``composable_lifecycle_node``: a component that is a lifecycle node. Only in newer distributions.
+
+
+class ComposableLifecycleNode(ComposableNode):
+    """With ``autostart`` launch configures and activates it once it is loaded."""
+
+    def __init__(self, *, autostart: bool = False, **kwargs: Any):
+        super().__init__(**kwargs)
+        self.__autostart = autostart
+
+    @classmethod
+    def parse(cls, parser: Parser, entity: Entity) -> tuple[type[ComposableLifecycleNode], dict[str, Any]]:
+        autostart = entity.get_attr("autostart", data_type=bool, optional=True)
+        _, kwargs = super().parse(parser, entity)
+        if autostart is not None:
+            kwargs["autostart"] = autostart
+        return cls, kwargs
+
+    @property
+    def node_autostart(self) -> bool:
+        return self.__autostart
+
+
+def parse_lifecycle_components(entity: Entity, parser: Parser) -> list[ComposableNode]:
+    """The ``composable_lifecycle_node`` children; where the distribution has none, they stay unread."""
+    if not current_release().has(Feature.LIFECYCLE_TAGS):
+        return []
+    children = entity.get_attr("composable_lifecycle_node", data_type=list[Entity], optional=True)
+    return [ComposableLifecycleNode.from_entity(child, parser) for child in children or ()]

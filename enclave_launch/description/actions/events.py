@@ -1,0 +1,98 @@
+"""Actions about events: emit one, register or unregister a handler, ``shutdown``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.action import Action
+from enclave_launch.description.entity import normalize_to_list_of_entities
+from enclave_launch.description.events.event import Shutdown as ShutdownEvent
+from enclave_launch.description.markup.expose import expose_action
+
+if TYPE_CHECKING:
+    from enclave_launch.description.entity import LaunchDescriptionEntity
+    from enclave_launch.description.events.event import Event
+    from enclave_launch.description.events.handlers import BaseEventHandler
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.markup.entity import Entity
+    from enclave_launch.description.markup.parser import Parser
+
+
+class EmitEvent(Action):
+    """Queue an event; it is handled after all that is being visited now."""
+
+    def __init__(self, *, event: Event, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.__event = event
+
+    @property
+    def event(self) -> Event:
+        return self.__event
+
+    def execute(self, context: LaunchContext) -> None:
+        context.emit_event_sync(self.__event)
+
+
+class RegisterEventHandler(Action):
+    """Register a handler, for events that are handled from now on."""
+
+    def __init__(self, event_handler: BaseEventHandler, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.__event_handler = event_handler
+
+    @property
+    def event_handler(self) -> BaseEventHandler:
+        return self.__event_handler
+
+    def execute(self, context: LaunchContext) -> None:
+        place = self.source_location
+        if place is not None and getattr(self.__event_handler, "source_location", None) is None:
+            self.__event_handler.source_location = place
+        context.register_event_handler(self.__event_handler)
+
+    def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
+        text, entities = self.__event_handler.describe()
+        return [(text, normalize_to_list_of_entities(entities))] if entities else []
+
+
+class UnregisterEventHandler(Action):
+    """Unregister a handler. Raises ``ValueError`` when it is not registered."""
+
+    def __init__(self, event_handler: BaseEventHandler, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.__event_handler = event_handler
+
+    @property
+    def event_handler(self) -> BaseEventHandler:
+        return self.__event_handler
+
+    def execute(self, context: LaunchContext) -> None:
+        context.unregister_event_handler(self.__event_handler)
+
+
+@expose_action("shutdown")
+class Shutdown(EmitEvent):
+    """End the launch. Only an event: what stands beside this action is still visited."""
+
+    def __init__(self, *, reason: Any = "reason not given", **kwargs: Any) -> None:
+        super().__init__(event=ShutdownEvent(reason=reason), **kwargs)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        reason = entity.get_attr("reason", optional=True)
+        if reason:
+            kwargs["reason"] = parser.parse_substitution(reason)
+        return cls, kwargs
+
+    def execute(self, context: LaunchContext) -> None:
+        from enclave_launch.description.events.process import ProcessExited
+
+        event = context.get_locals_as_dict().get("event")
+        if isinstance(event, ProcessExited):
+            from enclave_launch.description.logging import get_logger
+
+            name = event.process_name
+            get_logger("launch").info(f"process[{name}] was required: shutting down launched system")
+        super().execute(context)

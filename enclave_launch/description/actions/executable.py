@@ -1,0 +1,144 @@
+"""What to run: command, name, directory and environment of one process."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
+from enclave_launch.description.substitutions.variables import LaunchConfiguration
+
+if TYPE_CHECKING:
+    from enclave_launch.description.action import Action
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
+
+
+_DEFAULT_PREFIX: list[Substitution] = [LaunchConfiguration("launch-prefix", default="")]
+_PREFIX_FILTER: list[Substitution] = [LaunchConfiguration("launch-prefix-filter", default="")]
+
+Variables = list[tuple["list[Substitution]", "list[Substitution]"]]
+
+
+class Executable:
+    """Describes a process; ``prepare`` performs it. The ``final_...`` members are ``None`` before that."""
+
+    def __init__(
+        self,
+        *,
+        cmd: Iterable[SomeSubstitutionsType],
+        prefix: SomeSubstitutionsType | None = None,
+        name: SomeSubstitutionsType | None = None,
+        cwd: SomeSubstitutionsType | None = None,
+        env: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
+        additional_env: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
+        arguments: Iterable[SomeSubstitutionsType] | None = None,
+    ) -> None:
+        """``cmd`` and ``arguments``: each item is one argument. ``env`` replaces the environment,
+        ``additional_env`` adds to it. A ``prefix`` given here ignores the prefix filter."""
+        self.__cmd = [normalize_to_list_of_substitutions(word) for word in cmd]
+        self.__cmd += [normalize_to_list_of_substitutions(word) for word in arguments or ()]
+        self.__prefix = _DEFAULT_PREFIX if prefix is None else normalize_to_list_of_substitutions(prefix)
+        self.__prefix_filter = _PREFIX_FILTER if prefix is None else None
+        self.__name = None if name is None else normalize_to_list_of_substitutions(name)
+        self.__cwd = None if cwd is None else normalize_to_list_of_substitutions(cwd)
+        self.__env = None if env is None else _normalize(env)
+        self.__additional_env = None if additional_env is None else _normalize(additional_env)
+        self.__arguments = arguments
+        self.__final_cmd: list[str] | None = None
+        self.__final_cwd: str | None = None
+        self.__final_env: dict[str, str] | None = None
+        self.__final_name: str | None = None
+
+    @property
+    def name(self) -> list[Substitution] | None:
+        return self.__name
+
+    @property
+    def prefix(self) -> list[Substitution]:
+        return self.__prefix
+
+    @property
+    def cmd(self) -> list[list[Substitution]]:
+        """The command, shared: derived descriptions append to it."""
+        return self.__cmd
+
+    @property
+    def cwd(self) -> list[Substitution] | None:
+        return self.__cwd
+
+    @property
+    def env(self) -> Variables | None:
+        return self.__env
+
+    @property
+    def additional_env(self) -> Variables | None:
+        return self.__additional_env
+
+    @property
+    def arguments(self) -> Iterable[SomeSubstitutionsType] | None:
+        return self.__arguments
+
+    @property
+    def final_name(self) -> str | None:
+        return self.__final_name
+
+    @property
+    def final_cmd(self) -> list[str] | None:
+        return self.__final_cmd
+
+    @property
+    def final_cwd(self) -> str | None:
+        return self.__final_cwd
+
+    @property
+    def final_env(self) -> dict[str, str] | None:
+        """Shared between processes with the same environment: do not modify."""
+        return self.__final_env
+
+    def prepare(self, context: LaunchContext, action: Action) -> None:
+        """Perform command, prefix, name, directory and environment, in this order."""
+        cmd = [perform_substitutions(context, word) for word in self.__cmd]
+        if self.__prefix_applies(context, cmd):
+            prefix = perform_substitutions(context, self.__prefix)
+            cmd = [*shlex.split(prefix), *cmd] if prefix else cmd
+        self.__final_cmd = cmd
+        name = (
+            os.path.basename(cmd[0]) if self.__name is None else perform_substitutions(context, self.__name)
+        )
+        self.__final_name = f"{name}-{context.host.next_process_index()}"
+        self.__final_cwd = None if self.__cwd is None else perform_substitutions(context, self.__cwd)
+        self.__final_env = self.__environment(context)
+
+    def __prefix_applies(self, context: LaunchContext, cmd: list[str]) -> bool:
+        if self.__prefix_filter is None:
+            return True
+        pattern = perform_substitutions(context, self.__prefix_filter)
+        return re.match(pattern, os.path.basename(cmd[0])) is not None
+
+    def __environment(self, context: LaunchContext) -> dict[str, str]:
+        """Each variable sees the environment of the context, not the ones added before it."""
+        if self.__env is None:
+            base = context.process_environment.snapshot()
+        else:
+            base = _perform(context, self.__env)
+        if not self.__additional_env:
+            return base
+        return {**base, **_perform(context, self.__additional_env)}
+
+
+def _normalize(variables: Mapping[SomeSubstitutionsType, SomeSubstitutionsType]) -> Variables:
+    return [
+        (normalize_to_list_of_substitutions(name), normalize_to_list_of_substitutions(value))
+        for name, value in variables.items()
+    ]
+
+
+def _perform(context: LaunchContext, variables: Variables) -> dict[str, str]:
+    return {
+        perform_substitutions(context, name): perform_substitutions(context, value)
+        for name, value in variables
+    }

@@ -1,0 +1,179 @@
+"""``include``: another launch file or description, with the two ways it can go wrong that are ours to see: a file of a
+package that is not installed, and an include that never ends.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.action import Action
+from enclave_launch.description.actions.configurations import SetLaunchConfiguration
+from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.expose import expose_action
+from enclave_launch.description.sources import LaunchDescriptionSource
+from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
+from enclave_launch.diagnostics import include_left_out
+from enclave_launch.host.current import current_release
+from enclave_launch.host.loading import CyclicIncludeError
+from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    from enclave_launch.description.entity import LaunchDescriptionEntity
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.launch_description import LaunchDescription
+    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.substitution import SomeSubstitutionsType
+
+
+MAX_DEPTH = 200
+"""Nested includes; upstream runs out of stack at about this depth."""
+
+OpenFile = tuple[str, dict[str, Any]]
+"""A file that is being visited, and the launch configurations with which it was entered."""
+
+
+def left_out(include: IncludeLaunchDescription, context: LaunchContext) -> bool:
+    """Whether ``include`` names a file of a package that is not installed; that gives a warning."""
+    location = include.launch_description_source.expand(context)
+    if not context.host.is_missing(location) or os.path.exists(location):
+        return False
+    context.host.warn(include_left_out(location))
+    return True
+
+
+def prepare_include(include: IncludeLaunchDescription, context: LaunchContext) -> LaunchDescription:
+    """The description to visit: whatever a Python file returned. Raises ``CyclicIncludeError``."""
+    source = include.launch_description_source
+    _check_cycle(source.expand(context), context)
+    return source.get_launch_description(context)
+
+
+def _check_cycle(location: str, context: LaunchContext) -> None:
+    """The same file entered again with the same configurations will be entered for ever."""
+    path = os.path.abspath(location)
+    repeated = any(
+        known == path and configurations == context.launch_configurations
+        for known, configurations in context.open_files
+    )
+    if repeated or len(context.open_files) >= MAX_DEPTH:
+        cycle = [known for known, _ in context.open_files]
+        if path in cycle:
+            cycle = cycle[len(cycle) - 1 - cycle[::-1].index(path) :]
+        raise CyclicIncludeError(
+            "launch files include each other without end: " + " -> ".join([*cycle, path])
+        )
+
+
+def opened(include: IncludeLaunchDescription, context: LaunchContext) -> tuple[OpenFile, ...]:
+    """The files open below ``include``."""
+    path = os.path.abspath(include.launch_description_source.location)
+    return (*context.open_files, (path, include.entered_with))
+
+
+_FILE_LOCALS = ("current_launch_file_path", "current_launch_file_directory")
+Arguments = Iterable[tuple["SomeSubstitutionsType", "SomeSubstitutionsType"]]
+
+
+@expose_action("include")
+class IncludeLaunchDescription(Action):
+    """Loads another description and gives its entities, after setting the arguments one by one.
+
+    This is no scope: whatever the included file sets stays set.
+    """
+
+    def __init__(
+        self,
+        launch_description_source: LaunchDescriptionSource | SomeSubstitutionsType,
+        *,
+        launch_arguments: Arguments | None = None,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(**kwargs)
+        if not isinstance(launch_description_source, LaunchDescriptionSource):
+            from enclave_launch.description.sources import AnyLaunchDescriptionSource
+
+            launch_description_source = AnyLaunchDescriptionSource(launch_description_source)
+        self.__source: LaunchDescriptionSource = launch_description_source
+        self.__launch_arguments = () if launch_arguments is None else tuple(launch_arguments)
+        self.entered_with: dict[str, Any] = {}  # the launch configurations when it was executed
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["launch_description_source"] = parser.parse_substitution(entity.get_attr("file"))
+        tags = ["arg", "let"] if current_release().has(Feature.LET_IN_INCLUDE) else ["arg"]
+        given = [
+            child
+            for tag in tags
+            for child in entity.get_attr(tag, data_type=list[Entity], optional=True) or ()
+        ]
+        if given:
+            parse = parser.parse_substitution
+            kwargs["launch_arguments"] = [
+                (parse(child.get_attr("name")), parse(child.get_attr("value"))) for child in given
+            ]
+            for child in given:
+                child.assert_entity_completely_parsed()
+        return cls, kwargs
+
+    @property
+    def launch_description_source(self) -> LaunchDescriptionSource:
+        return self.__source
+
+    @property
+    def launch_arguments(self) -> tuple[tuple[SomeSubstitutionsType, SomeSubstitutionsType], ...]:
+        return self.__launch_arguments
+
+    def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        description = self.__source.try_get_launch_description_without_context()
+        return [] if description is None else [description]
+
+    def argument_names_without_context(self) -> list[str] | None:
+        """The names of the arguments given, ``None`` when one needs a context."""
+        from enclave_launch.description.launch_context import LaunchContext
+
+        context = LaunchContext()
+        try:
+            return self.__argument_names(context)
+        except Exception:  # a name may be any substitution, ours or a third party's
+            return None
+
+    def __argument_names(self, context: LaunchContext) -> list[str]:
+        return [
+            perform_substitutions(context, normalize_to_list_of_substitutions(name))
+            for name, _ in self.__launch_arguments
+        ]
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
+
+        self.entered_with = dict(context.launch_configurations)
+        if left_out(self, context):
+            return []
+        description = prepare_include(self, context)
+        before = {name: context.get_locals_as_dict().get(name) for name in _FILE_LOCALS}
+        self.__set_file_locals(context)
+        from enclave_launch.description.argument_scan import check_required_arguments
+
+        check_required_arguments(description, self.__argument_names(context))
+        arguments = [SetLaunchConfiguration(name, value) for name, value in self.__launch_arguments]
+        for argument in arguments:  # an error in one stands where the include stands
+            argument.source_location = self.source_location
+        if context.host.release.has(Feature.SCOPED_FILE_LOCALS) and None not in before.values():
+            from enclave_launch.description.actions.flow import OpaqueFunction
+
+            leave = OpaqueFunction(function=lambda context: context.extend_locals(before))
+            return [*arguments, description, leave]
+        return [*arguments, description]
+
+    def __set_file_locals(self, context: LaunchContext) -> None:
+        """A description made in a script has no file: both locals are its location then."""
+        path = os.path.abspath(self.__source.location)
+        exists = os.path.exists(path)
+        context.extend_locals(
+            {
+                "current_launch_file_path": path,
+                "current_launch_file_directory": os.path.dirname(path) if exists else self.__source.location,
+            }
+        )

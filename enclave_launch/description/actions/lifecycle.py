@@ -1,0 +1,306 @@
+"""``lifecycle_node``: nodes whose state launch can watch and change."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from typing import Any, ClassVar
+
+from enclave_launch.description.action import Action
+from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
+from enclave_launch.description.actions.flow import OpaqueFunction
+from enclave_launch.description.actions.nodes import Node
+from enclave_launch.description.entity import LaunchDescriptionEntity, SomeEntitiesType
+from enclave_launch.description.events.event import Event
+from enclave_launch.description.events.handlers import EventHandler
+from enclave_launch.description.events.lifecycle import ChangeState, StateTransition
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.lifecycle_msgs import State, Transition, TransitionEvent
+from enclave_launch.description.location import location_of
+from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.expose import expose_action
+from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.node_names import matches_node_name
+from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.host.current import current_release
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, LauncherCall, ProcessKind
+from enclave_launch.ros_rules.distro import Feature
+
+_CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
+
+
+@expose_action("lifecycle_node", feature=Feature.LIFECYCLE_TAGS)
+class LifecycleNode(Node):
+    """Answers ``ChangeState`` events; ``autostart`` (newer distributions) configures and activates."""
+
+    process_kind: ProcessKind = "lifecycle_node"
+
+    def __init__(
+        self,
+        *,
+        name: SomeSubstitutionsType,
+        namespace: SomeSubstitutionsType,
+        autostart: bool | None = None,
+        **kwargs: Any,
+    ):
+        if autostart is not None and not current_release().has(Feature.LIFECYCLE_AUTOSTART):
+            kwargs["autostart"] = autostart  # the base class refuses it, as upstream does
+        super().__init__(name=name, namespace=namespace, **kwargs)
+        self.__autostart = bool(autostart)
+
+    @classmethod
+    def parse(
+        cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
+    ) -> tuple[type[LifecycleNode], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser, ignore)
+        autostart = entity.get_attr("autostart", data_type=bool, optional=True)
+        if autostart is not None:
+            kwargs["autostart"] = autostart
+        return cls, kwargs
+
+    @property
+    def node_autostart(self) -> bool:
+        return self.__autostart
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        """Raises ``RuntimeError`` without a node name, and as ``Node.execute``."""
+        self._perform_substitutions(context)
+        if UNSPECIFIED_NODE_NAME in self.node_name:
+            raise RuntimeError("node_name unexpectedly incomplete for lifecycle node")
+        context.host.launcher_call(
+            LauncherCall(f"{self.node_name}/change_state", _CHANGE_STATE, location_of(self, context))
+        )
+        context.register_event_handler(_ChangeStateHandler(self))
+        actions = super().execute(context)
+        if not self.__autostart:
+            return actions
+
+        return [*(actions or ()), autostart_transition(self.node_name)]
+
+
+class _ChangeStateHandler(EventHandler):
+    """Passes requests for this node on to the host, which calls the service."""
+
+    event_class: type[Event] | None = ChangeState
+    internal = True
+
+    def __init__(self, node: LifecycleNode):
+        def change_state(context: LaunchContext) -> None:
+            request = context.locals.event
+            if request.lifecycle_node_matcher(node):
+                context.host.change_state(node, request.transition_id, context)
+
+        super().__init__(
+            matcher=lambda event: isinstance(event, ChangeState),
+            entities=[OpaqueFunction(function=change_state)],
+        )
+
+
+# (label, from, to) of every transition event, from ros2/rcl rcl_lifecycle/src/default_state_machine.c
+_TRANSITIONS = (
+    ("configure", "unconfigured", "configuring"),
+    ("transition_success", "configuring", "inactive"),
+    ("activate", "inactive", "activating"),
+    ("transition_success", "activating", "active"),
+    ("deactivate", "active", "deactivating"),
+    ("transition_success", "deactivating", "inactive"),
+    ("cleanup", "inactive", "cleaningup"),
+    ("transition_success", "cleaningup", "unconfigured"),
+    ("shutdown", "unconfigured", "shuttingdown"),
+    ("shutdown", "inactive", "shuttingdown"),
+    ("shutdown", "active", "shuttingdown"),
+    ("transition_success", "shuttingdown", "finalized"),
+    ("transition_failure", "configuring", "unconfigured"),
+    ("transition_failure", "activating", "inactive"),
+    ("transition_failure", "deactivating", "active"),
+    ("transition_error", "configuring", "errorprocessing"),
+    ("transition_error", "activating", "errorprocessing"),
+    ("transition_error", "deactivating", "errorprocessing"),
+    ("transition_error", "cleaningup", "errorprocessing"),
+    ("transition_error", "shuttingdown", "errorprocessing"),
+    ("transition_success", "errorprocessing", "unconfigured"),
+    ("transition_failure", "errorprocessing", "finalized"),
+)
+
+
+class OnStateTransition(EventHandler):
+    """Fires when everything that is given equals what the event says; ``matcher`` replaces all of it.
+
+    Raises ``RuntimeError`` for a target that is no lifecycle node.
+    """
+
+    def __init__(
+        self,
+        *,
+        entities: SomeEntitiesType,
+        target_lifecycle_node: LifecycleNode | None = None,
+        transition: str | None = None,
+        start_state: str | None = None,
+        goal_state: str | None = None,
+        matcher: Callable[[Event], bool] | None = None,
+        **kwargs: Any,
+    ):
+        if not isinstance(target_lifecycle_node, (LifecycleNode, type(None))):
+            raise RuntimeError("OnStateTransition requires a 'LifecycleNode' action as the target")
+        self.__target = target_lifecycle_node
+        self.__asked = (transition, start_state, goal_state)
+        super().__init__(matcher=matcher or self.__given_values_match, entities=entities, **kwargs)
+
+    def __given_values_match(self, event: Event) -> bool:
+        if not isinstance(event, StateTransition) or self.__target not in (None, event.action):
+            return False
+        told = (event.transition, event.start_state, event.goal_state)
+        return all(asked in (None, value) for asked, value in zip(self.__asked, told, strict=True))
+
+    def foresee(self, started: Sequence[Any]) -> Event | None:
+        """The first transition of a started lifecycle node that this handler would answer."""
+        nodes = [action for action in started if isinstance(action, LifecycleNode)]
+        if self.__target is not None:
+            nodes = [self.__target] if self.__target in nodes else []
+        return next(filter(self.matches, _possible_events(nodes)), None)
+
+    @property
+    def target_lifecycle_node(self) -> LifecycleNode | None:
+        return self.__target
+
+    @property
+    def handler_description(self) -> str:
+        return "<actions>"
+
+    @property
+    def matcher_description(self) -> str:
+        if self.__target is None:
+            return "event == StateTransition"
+        return f"event == StateTransition and event.action == LifecycleNode({hex(id(self.__target))})"
+
+
+def _possible_events(nodes: Sequence[LifecycleNode]) -> Iterator[StateTransition]:
+    for node in nodes:
+        for label, start, goal in _TRANSITIONS:
+            message = TransitionEvent(0, Transition(label=label), State(label=start), State(label=goal))
+            yield StateTransition(action=node, msg=message)
+
+
+# ``LifecycleTransition``: take nodes through a sequence of lifecycle transitions. Not in humble.
+
+
+def _passing(start_state: str, goal_state: str) -> dict[str, str]:
+    return {"start_state": start_state, "goal_state": goal_state}
+
+
+class LifecycleTransition(Action):
+    """Asks each node for the first transition; each reached goal state asks for the next one."""
+
+    transition_targets: ClassVar[dict[int, dict[str, str]]] = {
+        Transition.TRANSITION_CONFIGURE: _passing("configuring", "inactive"),
+        Transition.TRANSITION_CLEANUP: _passing("cleaningup", "unconfigured"),
+        Transition.TRANSITION_ACTIVATE: _passing("activating", "active"),
+        Transition.TRANSITION_DEACTIVATE: _passing("deactivating", "inactive"),
+        Transition.TRANSITION_UNCONFIGURED_SHUTDOWN: _passing("shuttingdown", "finalized"),
+        Transition.TRANSITION_INACTIVE_SHUTDOWN: _passing("shuttingdown", "finalized"),
+        Transition.TRANSITION_ACTIVE_SHUTDOWN: _passing("shuttingdown", "finalized"),
+    }
+
+    def __init__(
+        self,
+        *,
+        lifecycle_node_names: Sequence[SomeSubstitutionsType],
+        transition_ids: Sequence[int | SomeSubstitutionsType],
+        **kwargs: Any,
+    ):
+        super().__init__(**kwargs)
+        if not transition_ids:
+            raise ValueError("No transition_ids provided.")
+        if not lifecycle_node_names:
+            raise ValueError("No lifecycle_node_names provided.")
+        self.__names = [normalize_to_list_of_substitutions(name) for name in lifecycle_node_names]
+        self.__ids = [
+            normalize_to_list_of_substitutions(str(item) if isinstance(item, int) else item)
+            for item in transition_ids
+        ]
+        self.__handlers: dict[str, list[EventHandler]] = {}
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
+        """Handlers for every reached goal state, then the first request to every node.
+
+        Raises ``ValueError`` for an id that is no number, ``KeyError`` for one without a goal state.
+        """
+        names = [perform_substitutions(context, name) for name in self.__names]
+        ids = [_transition_id(perform_substitutions(context, item)) for item in self.__ids]
+        requests = {name: [_request(name, transition) for transition in ids] for name in names}
+        self.__handlers = {name: [] for name in names}
+        registrations = [
+            RegisterEventHandler(self.__after(name, transition, requests[name][step:]))
+            for step, transition in enumerate(ids, start=1)
+            for name in names
+        ]
+        for name in names:
+            self.__register_failure(context, name)
+        return [*registrations, *(requests[name][0] for name in names)]
+
+    def __after(self, name: str, transition: int, remaining: Sequence[Action]) -> EventHandler:
+        """Once ``transition`` has reached its goal: the next request, or the end of the sequence."""
+        target = self.transition_targets[transition]
+        done = OpaqueFunction(function=partial(self.__forget, name=name))
+        handler = OnStateTransition(
+            matcher=_reaches(name, target["goal_state"], target["start_state"]),
+            entities=[remaining[0] if remaining else done],
+            handle_once=True,
+        )
+        self.__handlers[name].append(handler)
+        return handler
+
+    def __register_failure(self, context: LaunchContext, name: str) -> None:
+        handler = EventHandler(
+            matcher=_reaches(name, "errorprocessing"),
+            entities=[OpaqueFunction(function=partial(self.__forget, name=name))],
+            handle_once=True,
+        )
+        handler.internal = True
+        self.__handlers[name].append(handler)
+        context.register_event_handler(handler)
+
+    def __forget(self, context: LaunchContext, *, name: str) -> None:
+        for handler in self.__handlers[name]:
+            try:
+                context.unregister_event_handler(handler)
+            except ValueError:
+                continue  # has fired already
+
+
+def autostart_transition(full_name: str) -> LifecycleTransition:
+    """What ``autostart`` does: configure, then activate."""
+    return LifecycleTransition(
+        lifecycle_node_names=[full_name],
+        transition_ids=[Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE],
+    )
+
+
+def _transition_id(text: str) -> int:
+    try:
+        return int(text)
+    except ValueError:
+        raise ValueError(f"expected integer for lifecycle transition, got {text}") from None
+
+
+def _request(name: str, transition: int) -> EmitEvent:
+    change = ChangeState(lifecycle_node_matcher=matches_node_name(name), transition_id=transition)
+    return EmitEvent(event=change)
+
+
+def _reaches(name: str, goal_state: str, start_state: str | None = None) -> Callable[[Event], bool]:
+    full_name = name if name.startswith("/") else f"/{name}"
+
+    def matches(event: Event) -> bool:
+        return (
+            isinstance(event, StateTransition)
+            and event.action.node_name == full_name
+            and event.goal_state == goal_state
+            and start_state in (None, event.start_state)
+        )
+
+    return matches

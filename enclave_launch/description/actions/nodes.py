@@ -1,0 +1,319 @@
+"""``node``: a process with the ROS arguments that name its node, set its parameters and remap its names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.actions.processes import ExecuteProcess
+from enclave_launch.description.argument_types import ensure_argument_type
+from enclave_launch.description.markup.entity import Entity, get_data_type_from_identifier
+from enclave_launch.description.markup.expose import expose_action
+from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.node_names import validate_namespace, validate_node_name, warn_about_repeats
+from enclave_launch.description.parameters.descriptions import ParameterFile, ParameterValue
+from enclave_launch.description.parameters.normalize import normalize_parameters
+from enclave_launch.description.parameters.of_node import NodeParameters
+from enclave_launch.description.remap_rules import PlacedRule, normalize_remap_rules, performed_remaps, placed
+from enclave_launch.description.substitution import (
+    Substitution,
+    TextSubstitution,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.description.substitutions.packages import ExecutableInPackage
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, ProcessKind
+from enclave_launch.ros_rules.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+
+if TYPE_CHECKING:
+    from enclave_launch.description.actions.node_extensions import NodeActionExtension
+    from enclave_launch.description.entity import LaunchDescriptionEntity
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.parameters.types import SomeParameters
+    from enclave_launch.description.remap_rules import SomeRemapRules
+    from enclave_launch.description.substitution import SomeSubstitutionsType
+    from enclave_launch.process import EnclaveRequest
+    from enclave_launch.source_location import SourceLocation
+
+
+class RosSpecificArgument(Substitution):
+    """A word of the command line that is only known while its node executes."""
+
+    def __init__(self, key: str):
+        super().__init__()
+        self.__key = key
+
+    def describe(self) -> str:
+        return f"Local('ros_specific_arguments[{self.__key!r}]')"
+
+    def perform(self, context: LaunchContext) -> str:
+        return str(context.locals.ros_specific_arguments[self.__key])
+
+
+@expose_action("node")
+class Node(ExecuteProcess):
+    """Starts ``executable`` of ``package`` (without package: the program as given).
+
+    Command line: user's ``arguments``; ``--ros-args`` and user's ``ros_arguments``; then ``--ros-args``
+    with name, namespace, global parameters, own parameters, global remap rules, own remap rules.
+    rcl takes the first matching rule, so the user's own come first and win.
+    """
+
+    UNSPECIFIED_NODE_NAME = UNSPECIFIED_NODE_NAME
+    UNSPECIFIED_NODE_NAMESPACE = UNSPECIFIED_NODE_NAMESPACE
+    process_kind: ProcessKind = "node"
+
+    def __init__(
+        self,
+        *,
+        executable: SomeSubstitutionsType,
+        package: SomeSubstitutionsType | None = None,
+        name: SomeSubstitutionsType | None = None,
+        namespace: SomeSubstitutionsType | None = None,
+        exec_name: SomeSubstitutionsType | None = None,
+        parameters: SomeParameters | None = None,
+        remappings: SomeRemapRules | None = None,
+        ros_arguments: list[SomeSubstitutionsType] | None = None,
+        arguments: Iterable[SomeSubstitutionsType] | None = None,
+        **kwargs: Any,
+    ):
+        program = executable if package is None else ExecutableInPackage(executable, package)
+        user_words: list[SomeSubstitutionsType] = list(arguments or ())
+        if ros_arguments is not None:
+            user_words += ["--ros-args"] + ros_arguments  # noqa: RUF005  # a TypeError unless it is a list
+        name_words: list[SomeSubstitutionsType] = [] if name is None else ["-r", RosSpecificArgument("name")]
+        if parameters is not None:
+            ensure_argument_type(parameters, list, "parameters", "Node")
+        super().__init__(
+            cmd=[program, *user_words, "--ros-args", *name_words], **{**kwargs, "name": exec_name}
+        )
+        self.__package = package
+        self.__executable = executable
+        self.__name = None if name is None else normalize_to_list_of_substitutions(name)
+        self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
+        self.__parameters = NodeParameters(normalize_parameters(parameters or []))
+        self.__remappings = list(normalize_remap_rules(remappings or ()))
+        self.__expanded_name = UNSPECIFIED_NODE_NAME
+        self.__expanded_namespace = UNSPECIFIED_NODE_NAMESPACE
+        self.__final_name: str | None = None
+        self.__expanded_remappings: list[PlacedRule] | None = None
+
+    @staticmethod
+    def parse_nested_parameters(params: list[Entity], parser: Parser) -> list[Any]:
+        """The ``param`` children of an element, in the shape of ``parameters=``."""
+        return [_parse_parameter(param, parser) for param in params]
+
+    @classmethod
+    def parse(
+        cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
+    ) -> tuple[type[Node], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser, ignore=["cmd", "name", *(ignore or ())])
+        given = entity.given
+        for attribute, keyword in _COMMAND_LINES:
+            if attribute in given and (text := entity.get_attr(attribute, optional=True)) is not None:
+                kwargs[keyword] = cls._parse_cmdline(text, parser)
+        for attribute, keyword in _TEXT_ATTRIBUTES:
+            if attribute in given and (text := entity.get_attr(attribute, optional=True)) is not None:
+                kwargs[keyword] = parser.parse_substitution(text)
+        kwargs["executable"] = parser.parse_substitution(entity.get_attr("exec"))
+        if "remap" in given:
+            remaps = entity.get_attr("remap", data_type=list[Entity], optional=True)
+            if remaps is not None:
+                kwargs["remappings"] = parse_remaps(remaps, parser)
+        if "param" in given:
+            params = entity.get_attr("param", data_type=list[Entity], optional=True)
+            if params is not None:
+                kwargs["parameters"] = cls.parse_nested_parameters(params, parser)
+        return cls, kwargs
+
+    @property
+    def node_package(self) -> SomeSubstitutionsType | None:
+        return self.__package
+
+    @property
+    def node_executable(self) -> SomeSubstitutionsType:
+        return self.__executable
+
+    @property
+    def node_name(self) -> str:
+        """Fully qualified, with placeholders for what launch does not know. Raises ``RuntimeError`` before
+        the action was executed."""
+        if self.__final_name is None:
+            raise RuntimeError("cannot access 'node_name' before executing action")
+        return self.__final_name
+
+    @property
+    def expanded_node_namespace(self) -> str:
+        return self.__expanded_namespace
+
+    @property
+    def expanded_remapping_rules(self) -> list[PlacedRule] | None:
+        return self.__expanded_remappings
+
+    def is_node_name_fully_specified(self) -> bool:
+        return not any(
+            placeholder in self.node_name
+            for placeholder in (UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE)
+        )
+
+    def _perform_substitutions(self, context: LaunchContext) -> None:
+        """Settle name, parameters and remap rules, once; subclasses may need the name before ``execute``."""
+        if self.__final_name is not None:
+            return
+        self.__settle_names(context)
+        section = self.node_name if self.is_node_name_fully_specified() else "/**"
+        self.__extend_command(self.__parameters.write(context, section))
+        self.__settle_remaps(context)
+
+    def __settle_names(self, context: LaunchContext) -> None:
+        """Raises ``InvalidNodeNameException``, ``InvalidNamespaceException``."""
+        if self.__name is not None:
+            self.__expanded_name = perform_substitutions(context, self.__name)
+            validate_node_name(self.__expanded_name)
+        own = None if self.__namespace is None else perform_substitutions(context, self.__namespace)
+        pushed = context.launch_configurations.get(NAMESPACE)
+        namespace = make_namespace_absolute(prefix_namespace(pushed, own))
+        if namespace is not None:
+            self.__expanded_namespace = namespace
+            self.cmd.extend([[TextSubstitution(text="-r")], [RosSpecificArgument("ns")]])
+            validate_namespace(namespace)
+        self.__final_name = prefix_namespace(self.__expanded_namespace, self.__expanded_name)
+
+    def __settle_remaps(self, context: LaunchContext) -> None:
+        everywhere = context.launch_configurations.get("ros_remaps") or []
+        rules = [*everywhere, *performed_remaps(self.__remappings, context)]
+        if rules:
+            self.__expanded_remappings = rules
+            self.__extend_command(word for rule in rules for word in ("-r", f"{rule[0]}:={rule[1]}"))
+
+    def __extend_command(self, words: Iterable[str]) -> None:
+        self.cmd.extend([[TextSubstitution(text=word)] for word in words])
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        self._perform_substitutions(context)
+        arguments = {"ns": f"__ns:={self.__expanded_namespace}"}
+        if self.__name is not None:
+            arguments["name"] = f"__node:={self.__expanded_name}"
+        for extension in _extensions():
+            words, arguments = extension.prepare_for_execute(context, arguments, self)
+            self.cmd.extend(normalize_to_list_of_substitutions(word) for word in words)
+        context.extend_locals({"ros_specific_arguments": arguments})
+        actions = super().execute(context)
+        if self.is_node_name_fully_specified():
+            warn_about_repeats(context, self.node_name, self.name)
+        return actions
+
+    def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
+        fields = super().resolved_fields(context)
+        place: SourceLocation = fields["location"]
+        enclave: EnclaveRequest = fields["enclave"]
+        found = parse_ros_arguments(self.__words_after_program(fields["cmd"]))
+        return fields | {
+            "kind": self.process_kind,
+            "package": None if self.__package is None else _performed(context, self.__package),
+            "executable": _performed(context, self.__executable),
+            "name": self.__expanded_name,
+            "namespace": self.__expanded_namespace,
+            "fqn": self.node_name,
+            "remaps": tuple([placed(rule, place) for rule in self.__expanded_remappings or ()]),
+            "parameters": self.__parameters.resolve(self.__name_tokens(), found.parameters),
+            "parameter_files": self.__parameters.written_files(context),
+            "enclave": enclave._replace(argument=found.enclave) if found.enclave else enclave,
+        }
+
+    def __words_after_program(self, cmd: tuple[str, ...]) -> tuple[str, ...]:
+        prefix_length = len(cmd) - len(self.process_description.cmd)
+        return cmd[prefix_length + 1 :]
+
+    def __name_tokens(self) -> list[str | None]:
+        """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""
+        known = self.node_name.replace(UNSPECIFIED_NODE_NAMESPACE, "").split("/")
+        return [None if token == UNSPECIFIED_NODE_NAME else token for token in known if token]
+
+
+_COMMAND_LINES = (("args", "arguments"), ("ros_args", "ros_arguments"))
+_TEXT_ATTRIBUTES = (
+    ("node-name", "node_name"),  # upstream reads it, and then the constructor refuses it
+    ("name", "name"),
+    ("exec_name", "exec_name"),
+    ("pkg", "package"),
+    ("namespace", "namespace"),
+)
+
+
+def _performed(context: LaunchContext, value: SomeSubstitutionsType) -> str:
+    return perform_substitutions(context, normalize_to_list_of_substitutions(value))
+
+
+def _extensions() -> Iterable[NodeActionExtension]:
+    from enclave_launch.description.actions.node_extensions import installed_extensions
+
+    return installed_extensions()
+
+
+def parse_remaps(remaps: list[Entity], parser: Parser) -> list[PlacedRule]:
+    """``remap`` children as pairs of templates."""
+    rules = []
+    for remap in remaps:
+        source = parser.parse_substitution(remap.get_attr("from"))
+        target = parser.parse_substitution(remap.get_attr("to"))
+        rules.append(PlacedRule.at(remap.source_location, source, target))
+    for remap in remaps:
+        remap.assert_entity_completely_parsed()
+    return rules
+
+
+def _parse_parameter(param: Entity, parser: Parser) -> Any:
+    """One ``param``: a file, or a dict of one name. Raises ``RuntimeError``, ``ValueError`` as upstream."""
+    given = param.given
+    if "from" not in given and "allow_substs" not in given and "name" in given:
+        return _parse_named_parameters([param], parser)
+    file = param.get_attr("from", optional=True)
+    allow_substs: Any = param.get_attr("allow_substs", data_type=bool, optional=True)
+    name = param.get_attr("name", optional=True)
+    if file is not None and name is not None:
+        raise RuntimeError("name and from attributes are mutually exclusive")
+    if file is not None:
+        if isinstance(allow_substs, str):
+            allow_substs = parser.parse_substitution(allow_substs)
+        param.assert_entity_completely_parsed()
+        return ParameterFile(
+            parser.parse_substitution(file), allow_substs=allow_substs if allow_substs else False
+        )
+    if name is None:
+        raise ValueError("param Entity should have name or from attribute")
+    if allow_substs is not None:
+        raise RuntimeError("'allow_substs' can only be used together with 'from' attribute")
+    return _parse_named_parameters([param], parser)
+
+
+def _parse_named_parameters(params: list[Entity], parser: Parser) -> dict[tuple[Substitution, ...], Any]:
+    return dict(_parse_named_parameter(param, parser) for param in params)
+
+
+def _parse_named_parameter(param: Entity, parser: Parser) -> tuple[tuple[Substitution, ...], Any]:
+    name = tuple(parser.parse_substitution(param.get_attr("name")))
+    given = param.given
+    type_name: Any = param.get_attr("type", data_type=None, optional=True) if "type" in given else None
+    data_type = None if type_name is None else get_data_type_from_identifier(type_name)
+    value: Any = param.get_attr("value", data_type=data_type, optional=True)
+    nested = param.get_attr("param", data_type=list[Entity], optional=True) if "param" in given else None
+    param.assert_entity_completely_parsed()
+    if value is not None and nested:
+        raise RuntimeError("nested parameters and value attributes are mutually exclusive")
+    if data_type is not None and nested:
+        raise RuntimeError("nested parameters and type attributes are mutually exclusive")
+    if value is not None:
+        return name, ParameterValue(parser.parse_if_substitutions(value), value_type=data_type)
+    if nested:
+        return name, _parse_named_parameters(nested, parser)
+    raise RuntimeError("either a value attribute or nested params are needed")
+
+
+def __getattr__(name: str) -> Any:
+    if name == "NodeActionExtension":  # upstream's place for it; kept apart so that it loads only when asked
+        from enclave_launch.description.actions.node_extensions import NodeActionExtension
+
+        return NodeActionExtension
+    raise AttributeError(f"module 'launch_ros.actions.node' has no attribute {name!r}")

@@ -1,0 +1,454 @@
+"""``executable``: the actions that start a process and let handlers react to it.
+
+Preparing performs all substitutions; starting is the host's business (``Host.start_process``): a dry run records, the
+runtime spawns, pipes output and emits the process events.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Callable, Iterable, Mapping
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.action import Action
+from enclave_launch.description.actions.events import Shutdown
+from enclave_launch.description.actions.executable import Executable
+from enclave_launch.description.location import location_of
+from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.expose import expose_action
+from enclave_launch.description.substitution import (
+    TextSubstitution,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.description.substitutions.variables import LaunchConfiguration
+from enclave_launch.host.current import current_release
+from enclave_launch.host.environment import changed
+from enclave_launch.process import EnclaveRequest, ResolvedProcess
+from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.namespaces import enclave_scope
+
+if TYPE_CHECKING:
+    from enclave_launch.description.entity import LaunchDescriptionEntity, SomeEntitiesType
+    from enclave_launch.description.events.process import ProcessExited
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
+    from enclave_launch.ros_rules.distro import Release
+
+
+if TYPE_CHECKING:
+    OnExit = SomeEntitiesType | Callable[[ProcessExited, LaunchContext], SomeEntitiesType | None]
+
+
+_SIGTERM_TIMEOUT = LaunchConfiguration("sigterm_timeout", default=5)
+_SIGKILL_TIMEOUT = LaunchConfiguration("sigkill_timeout", default=5)
+
+
+class ExecuteLocal(Action):
+    """Starts ``process_description`` when executed; may be executed once.
+
+    ``enclave`` (ours) names the DDS-Security enclave of the process: absolute, or below the scope in force.
+    """
+
+    def __init__(
+        self,
+        *,
+        process_description: Executable,
+        shell: bool = False,
+        sigterm_timeout: SomeSubstitutionsType = _SIGTERM_TIMEOUT,
+        sigkill_timeout: SomeSubstitutionsType = _SIGKILL_TIMEOUT,
+        emulate_tty: bool = False,
+        output: SomeSubstitutionsType | Mapping[str, Any] = "log",
+        output_format: str = "[{this.process_description.final_name}] {line}",
+        cached_output: bool = False,
+        log_cmd: bool = False,
+        on_exit: OnExit | None = None,
+        respawn: bool | SomeSubstitutionsType = False,
+        respawn_delay: float | None = None,
+        respawn_max_retries: int = -1,
+        enclave: SomeSubstitutionsType | None = None,
+        **kwargs: Any,
+    ) -> None:
+        super().__init__(**kwargs)
+        self.__process_description = process_description
+        self.__shell = shell
+        self.__sigterm_timeout = normalize_to_list_of_substitutions(sigterm_timeout)
+        self.__sigkill_timeout = normalize_to_list_of_substitutions(sigkill_timeout)
+        self.__emulate_tty = emulate_tty
+        self.__output = _output(os.environ.get("OVERRIDE_LAUNCH_PROCESS_OUTPUT", output))
+        self.__output_format = output_format
+        self.__cached_output = cached_output
+        self.__log_cmd = log_cmd
+        self.__on_exit = on_exit
+        self.__respawn = _respawn(respawn)
+        self.__respawn_delay = respawn_delay
+        self.__respawn_max_retries = respawn_max_retries
+        self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
+        self.__executed = False
+        self.__event_args: dict[str, Any] | None = None
+        self.__completed: Any = None
+        self.captured_output: tuple[list[str], list[str]] = ([], [])
+        self.final_return_code: int | None = None
+
+    @property
+    def process_description(self) -> Executable:
+        return self.__process_description
+
+    @property
+    def shell(self) -> bool:
+        return self.__shell
+
+    @property
+    def emulate_tty(self) -> bool:
+        return self.__emulate_tty
+
+    @property
+    def sigterm_timeout(self) -> list[Substitution]:
+        return self.__sigterm_timeout
+
+    @property
+    def sigkill_timeout(self) -> list[Substitution]:
+        return self.__sigkill_timeout
+
+    @property
+    def output(self) -> list[Substitution] | Mapping[str, Any]:
+        return self.__output
+
+    @property
+    def output_format(self) -> str:
+        return self.__output_format
+
+    @property
+    def cached_output(self) -> bool:
+        return self.__cached_output
+
+    @property
+    def log_cmd(self) -> bool:
+        return self.__log_cmd
+
+    @property
+    def respawn(self) -> Any:
+        """A bool once prepared, before that what was given."""
+        return self.__respawn
+
+    @property
+    def respawn_delay(self) -> float | None:
+        return self.__respawn_delay
+
+    @property
+    def respawn_max_retries(self) -> int:
+        return self.__respawn_max_retries
+
+    @property
+    def process_details(self) -> dict[str, Any] | None:
+        """``action``, ``name``, ``cmd``, ``cwd``, ``env`` and, once started, ``pid``; ``None`` before ``prepare``."""
+        return self.__event_args
+
+    @property
+    def return_code(self) -> int | None:
+        return self.final_return_code
+
+    def get_stdout(self) -> str:
+        """What the process wrote so far. Raises ``RuntimeError`` without ``cached_output``."""
+        return self.__captured(0, "stdout")
+
+    def get_stderr(self) -> str:
+        """As ``get_stdout``."""
+        return self.__captured(1, "stderr")
+
+    def __captured(self, stream: int, name: str) -> str:
+        if not self.__cached_output:
+            raise RuntimeError(
+                f"cached output must be true to be able to get {name}, proc '{self.__process_description.name}'"
+            )
+        return "".join(self.captured_output[stream])
+
+    def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        return self.__on_exit if isinstance(self.__on_exit, list) else []
+
+    def get_asyncio_future(self) -> Any:
+        return self.__completed
+
+    def prepare(self, context: LaunchContext) -> None:
+        """Perform everything that the process needs."""
+        self.__process_description.prepare(context, self)
+        description = self.__process_description
+        self.__event_args = {
+            "action": self,
+            "name": description.final_name,
+            "cmd": description.final_cmd,
+            "cwd": description.final_cwd,
+            "env": description.final_env,
+        }
+        if not isinstance(self.__respawn, bool):
+            from enclave_launch.description.typed_values import perform_typed_substitution
+
+            self.__respawn = bool(perform_typed_substitution(context, self.__respawn, bool))
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        """Prepare, then start unless the launch is shutting down."""
+        self.prepare(context)
+        if self.__executed:
+            raise RuntimeError(
+                f"ExecuteLocal action '{self.__process_description.final_name}': "
+                f"executed more than once: {self.describe()}"
+            )
+        self.__executed = True
+        if context.is_shutdown:
+            return None
+        if self.__on_exit is not None:
+            self.__register_on_exit(context, self.__on_exit)
+        self.__completed = context.host.start_process(self, self.resolve(context), context)
+        return None
+
+    def __register_on_exit(self, context: LaunchContext, on_exit: OnExit) -> None:
+        from enclave_launch.description.events.process_handlers import OnProcessExit
+
+        context.register_event_handler(OnProcessExit(target_action=self, on_exit=on_exit))
+
+    def resolve(self, context: LaunchContext) -> ResolvedProcess:
+        """The prepared process as a value."""
+        return ResolvedProcess(**self.resolved_fields(context))
+
+    def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
+        """The fields of ``resolve``'s value. Subclasses replace what they know better of their node."""
+        description = self.__process_description
+        name, cmd = description.final_name or "", tuple(description.final_cmd or ())
+        return {
+            "number": int(name.rpartition("-")[2]),
+            "kind": "executable",
+            "package": None,
+            "executable": first_word(cmd),
+            "process_name": name,
+            "name": None,
+            "namespace": None,
+            "fqn": None,
+            "cmd": cmd,
+            "remaps": (),
+            "parameters": {},
+            "environment": self.__changed_environment(context),
+            "enclave": self.enclave_request(context),
+            "location": location_of(self, context),
+            "on_event": context.on_event,
+            "cwd": description.final_cwd,
+            "shell": self.__shell is True,  # other true values do not make one, as upstream
+        }
+
+    def enclave_request(self, context: LaunchContext) -> EnclaveRequest:
+        """What the launch file says about the enclave, without the user's own ROS arguments."""
+        attribute = None if self.__enclave is None else perform_substitutions(context, self.__enclave)
+        return EnclaveRequest(attribute, enclave_scope(context.launch_configurations))
+
+    def __changed_environment(self, context: LaunchContext) -> Mapping[str, str]:
+        final = self.__process_description.final_env
+        environment = context.process_environment
+        if final is environment.snapshot():
+            return environment.changes()
+        return changed(environment.start, final or {})
+
+
+def first_word(cmd: tuple[str, ...]) -> str:
+    """The program of a command that is all one string when run by a shell."""
+    words = cmd[0].split() if cmd else []
+    return words[0] if words else ""
+
+
+def _output(output: Any) -> list[Substitution] | Mapping[str, Any]:
+    return output if isinstance(output, dict) else normalize_to_list_of_substitutions(output)
+
+
+def _respawn(respawn: bool | SomeSubstitutionsType) -> Any:
+    if isinstance(respawn, bool):
+        return respawn
+    from enclave_launch.description.typed_values import normalize_typed_substitution
+
+    return normalize_typed_substitution(respawn, bool)
+
+
+@expose_action("executable")
+class ExecuteProcess(ExecuteLocal):
+    """Starts a command; each item of ``cmd`` is one argument (plain text would be one argument per character)."""
+
+    def __init__(
+        self,
+        *,
+        cmd: Iterable[SomeSubstitutionsType],
+        prefix: SomeSubstitutionsType | None = None,
+        name: SomeSubstitutionsType | None = None,
+        cwd: SomeSubstitutionsType | None = None,
+        env: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
+        additional_env: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
+        **kwargs: Any,
+    ) -> None:
+        executable = Executable(
+            cmd=cmd, prefix=prefix, name=name, cwd=cwd, env=env, additional_env=additional_env
+        )
+        super().__init__(process_description=executable, **kwargs)
+
+    @classmethod
+    def _parse_cmdline(cls, cmd: str, parser: Parser) -> list[SomeSubstitutionsType]:
+        """Text of a command line -> its arguments, each a list of substitutions."""
+        return split_words(parser.parse_substitution(cmd))
+
+    @classmethod
+    def parse(
+        cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
+    ) -> tuple[type[Action], dict[str, Any]]:
+        """``ignore``: arguments that a subclass reads itself, or does not have."""
+        _, kwargs = super().parse(entity, parser)
+        skipped = ignore or ()
+        if "cmd" not in skipped:
+            kwargs["cmd"] = cls._parse_cmdline(entity.get_attr("cmd"), parser)
+        given = entity.given
+        for attribute, keyword, read in _attributes_of(current_release()):
+            if attribute in given and keyword not in skipped:
+                value = read(entity, parser, attribute)
+                if value is not None:
+                    kwargs[keyword] = value
+        return cls, kwargs
+
+    @property
+    def name(self) -> Any:
+        """The process name NAME-N once prepared, before that what was given."""
+        description = self.process_description
+        return description.name if description.final_name is None else description.final_name
+
+    @property
+    def cmd(self) -> Any:
+        description = self.process_description
+        return description.cmd if description.final_cmd is None else description.final_cmd
+
+    @property
+    def cwd(self) -> Any:
+        description = self.process_description
+        return description.cwd if description.final_cwd is None else description.final_cwd
+
+    @property
+    def env(self) -> Any:
+        description = self.process_description
+        return description.env if description.final_env is None else description.final_env
+
+    @property
+    def additional_env(self) -> Any:
+        return self.process_description.additional_env
+
+
+def _text(entity: Entity, parser: Parser, name: str) -> Any:
+    value = entity.get_attr(name, optional=True)
+    return None if value is None else parser.parse_substitution(value)
+
+
+def _flag(entity: Entity, parser: Parser, name: str) -> Any:
+    return entity.get_attr(name, data_type=bool, optional=True)
+
+
+def _count(entity: Entity, parser: Parser, name: str) -> Any:
+    return entity.get_attr(name, data_type=int, optional=True)
+
+
+def _seconds(entity: Entity, parser: Parser, name: str) -> Any:
+    value: Any = entity.get_attr(name, data_type=float, optional=True)
+    if value is not None and value < 0.0:
+        raise ValueError(
+            f"Attribute {name} of Entity node expected to be a non-negative value but got `{value}`"
+        )
+    return value
+
+
+def _seconds_as_text(entity: Entity, parser: Parser, name: str) -> Any:
+    value = _seconds(entity, parser, name)
+    return None if value is None else str(value)
+
+
+def _on_exit(entity: Entity, parser: Parser, name: str) -> Any:
+    value = entity.get_attr(name, optional=True)
+    if value is None:
+        return None
+    if value != "shutdown":
+        raise ValueError(
+            f"Attribute on_exit of Entity node expected to be shutdown but got `{value}`"
+            "Other on_exit actions not yet supported"
+        )
+    return [Shutdown()]
+
+
+def _environment(entity: Entity, parser: Parser, name: str) -> Any:
+    variables = entity.get_attr(name, data_type=list[Entity], optional=True)
+    if variables is None:
+        return None
+    parse = parser.parse_substitution
+    environment = {
+        tuple(parse(variable.get_attr("name"))): parse(variable.get_attr("value")) for variable in variables
+    }
+    for variable in variables:
+        variable.assert_entity_completely_parsed()
+    return environment
+
+
+_Attribute = tuple[
+    str, str, Callable[[Entity, "Parser", str], Any]
+]  # attribute, constructor argument, reader
+
+_ATTRIBUTES: tuple[_Attribute, ...] = (
+    ("cwd", "cwd", _text),
+    ("name", "name", _text),
+    ("launch-prefix", "prefix", _text),
+    ("output", "output", _text),
+    ("respawn", "respawn", _text),
+    ("enclave", "enclave", _text),
+    ("respawn_delay", "respawn_delay", _seconds),
+    ("shell", "shell", _flag),
+)
+_EXIT_AND_TTY: tuple[_Attribute, ...] = (
+    ("on_exit", "on_exit", _on_exit),
+    ("emulate_tty", "emulate_tty", _flag),
+)
+_TIMEOUTS: tuple[_Attribute, ...] = (
+    ("respawn_max_retries", "respawn_max_retries", _count),
+    ("sigkill_timeout", "sigkill_timeout", _seconds_as_text),
+    ("sigterm_timeout", "sigterm_timeout", _seconds_as_text),
+)
+_ENVIRONMENT: _Attribute = ("env", "additional_env", _environment)
+
+
+@lru_cache(maxsize=8)
+def _attributes_of(release: Release) -> tuple[_Attribute, ...]:
+    """The optional attributes of a process element, in the order in which upstream reads them."""
+    return (
+        *_ATTRIBUTES,
+        *(_EXIT_AND_TTY if release.has(Feature.EXIT_AND_TTY_ATTRIBUTES) else ()),
+        *(_TIMEOUTS if release.has(Feature.TIMEOUT_ATTRIBUTES) else ()),
+        _ENVIRONMENT,
+    )
+
+
+def split_words(template: Iterable[Substitution]) -> list[SomeSubstitutionsType]:
+    """Split a parsed command line into arguments.
+
+    Each text fragment is split as a shell would, on its own, so quotes cannot span a substitution. A
+    substitution's value is never split and glues to the text it touches. Blank text alone is one empty argument.
+    """
+    words: list[SomeSubstitutionsType] = []
+    word: list[Substitution] = []
+    for part in template:
+        if not isinstance(part, TextSubstitution):
+            word.append(part)
+            continue
+        tokens = shlex.split(part.text)
+        if not tokens or (part.text[0].isspace() and word):
+            words.append(word)
+            word = []
+        for position, token in enumerate(tokens):
+            if position:
+                words.append(word)
+                word = []
+            word.append(TextSubstitution(text=token))
+        if tokens and part.text[-1].isspace():
+            words.append(word)
+            word = []
+    if word:
+        words.append(word)
+    return words

@@ -1,0 +1,233 @@
+"""What holds for every node and component launched in this scope: ``push_ros_namespace``, ``push_ros_enclave``,
+``set_remap``, ``set_parameter``, ``set_parameters_from_file``; and ``set_use_sim_time`` of launch's own node.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from enclave_launch.description.action import Action
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.location import location_of
+from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.expose import expose_action
+from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
+from enclave_launch.description.parameters.normalize import normalize_parameter_dict
+from enclave_launch.description.parameters.types import ParameterName, ParameterValue, SomeParameterValue
+from enclave_launch.description.remap_rules import PlacedRule
+from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
+    Substitution,
+    SubstitutionFailure,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
+from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.namespaces import make_namespace_absolute, prefix_namespace, push_enclave_scope
+from nodl.names import InvalidNameError, validate_namespace
+
+
+@expose_action("push_ros_namespace")
+@expose_action("push-ros-namespace")
+class PushROSNamespace(Action):
+    """Joins ``namespace`` to the launch configuration ``ros_namespace``; only a scoped group pops it.
+
+    ``enclave`` goes to the enclave scope instead of the namespace (Security Enclaves article,
+    ``<push_ros_namespace namespace="foo" enclave="bar"/>``).
+    """
+
+    def __init__(
+        self, namespace: SomeSubstitutionsType, *, enclave: SomeSubstitutionsType | None = None, **kwargs: Any
+    ):
+        super().__init__(**kwargs)
+        self.__namespace = normalize_to_list_of_substitutions(namespace)
+        self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[PushROSNamespace], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["namespace"] = parser.parse_substitution(entity.get_attr("namespace"))
+        enclave = entity.get_attr("enclave", optional=True)
+        if enclave is not None:
+            kwargs["enclave"] = parser.parse_substitution(enclave)
+        return cls, kwargs
+
+    @property
+    def namespace(self) -> list[Substitution]:
+        return self.__namespace
+
+    @property
+    def enclave(self) -> list[Substitution] | None:
+        return self.__enclave
+
+    def execute(self, context: LaunchContext) -> None:
+        """Raises ``SubstitutionFailure`` when the joined namespace is not valid."""
+        pushed = perform_substitutions(context, self.__namespace)
+        enclave = None if self.__enclave is None else perform_substitutions(context, self.__enclave)
+        previous = context.launch_configurations.get("ros_namespace")
+        namespace = make_namespace_absolute(prefix_namespace(previous, pushed))
+        try:
+            validate_namespace(namespace or "")
+        except InvalidNameError as error:
+            raise SubstitutionFailure(
+                "The resulting namespace is invalid: "
+                f"[previous_namespace='{previous}', pushed_namespace='{pushed}']"
+            ) from error
+        push_enclave_scope(context.launch_configurations, enclave, pushed)
+        context.launch_configurations["ros_namespace"] = namespace
+
+
+PushRosNamespace = PushROSNamespace  # the older name, the only one in humble
+
+
+# ``push_ros_enclave``: the enclave scope of what follows, without touching the namespace.
+#
+# Not part of upstream's launch_ros: the second of the two alternatives in the Security Enclaves article.
+
+
+@expose_action("push_ros_enclave")
+@expose_action("push-ros-enclave")
+class PushRosEnclave(Action):
+    """A relative ``enclave`` nests in the scope in force, an absolute one replaces it."""
+
+    def __init__(self, enclave: SomeSubstitutionsType, **kwargs: Any):
+        super().__init__(**kwargs)
+        self.__enclave = normalize_to_list_of_substitutions(enclave)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[PushRosEnclave], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["enclave"] = parser.parse_substitution(entity.get_attr("enclave"))
+        return cls, kwargs
+
+    @property
+    def enclave(self) -> list[Substitution]:
+        return self.__enclave
+
+    def execute(self, context: LaunchContext) -> None:
+        push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.__enclave))
+
+
+@expose_action("set_remap")
+class SetRemap(Action):
+    """Appends to the list in the launch configuration ``ros_remaps``.
+
+    A scope copies the dictionary, not the list: a rule set in a group leaks out of it when the list
+    existed before, exactly as in launch.
+    """
+
+    def __init__(self, src: SomeSubstitutionsType, dst: SomeSubstitutionsType, **kwargs: Any):
+        super().__init__(**kwargs)
+        self.__src = normalize_to_list_of_substitutions(src)
+        self.__dst = normalize_to_list_of_substitutions(dst)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetRemap], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["src"] = parser.parse_substitution(entity.get_attr("from"))
+        kwargs["dst"] = parser.parse_substitution(entity.get_attr("to"))
+        return cls, kwargs
+
+    @property
+    def src(self) -> list[Substitution]:
+        return self.__src
+
+    @property
+    def dst(self) -> list[Substitution]:
+        return self.__dst
+
+    def execute(self, context: LaunchContext) -> None:
+        rule = PlacedRule.at(
+            location_of(self, context),
+            perform_substitutions(context, self.__src),
+            perform_substitutions(context, self.__dst),
+        )
+        context.launch_configurations.setdefault("ros_remaps", []).append(rule)
+
+
+@expose_action("set_parameter")
+class SetParameter(Action):
+    """Appends ``(name, value)`` to the list in the launch configuration ``global_params``.
+
+    Scoped as ``SetRemap`` is, leak included.
+    """
+
+    def __init__(self, name: SomeSubstitutionsType, value: SomeParameterValue, **kwargs: Any):
+        super().__init__(**kwargs)
+        self.__parameters = normalize_parameter_dict({tuple(normalize_to_list_of_substitutions(name)): value})
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetParameter], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["name"] = parser.parse_substitution(entity.get_attr("name"))
+        kwargs["value"] = parser.parse_substitution(entity.get_attr("value"))
+        return cls, kwargs
+
+    @property
+    def name(self) -> ParameterName:
+        return next(iter(self.__parameters))
+
+    @property
+    def value(self) -> ParameterValue:
+        return next(iter(self.__parameters.values()))
+
+    def execute(self, context: LaunchContext) -> None:
+        evaluated = evaluate_parameter_dict(context, self.__parameters)
+        context.launch_configurations.setdefault("global_params", []).extend(evaluated.items())
+
+
+@expose_action("set_parameters_from_file")
+class SetParametersFromFile(Action):
+    """Appends the path to ``global_params``. Whether the file exists is checked where it is used."""
+
+    def __init__(self, filename: SomeSubstitutionsType, **kwargs: Any):
+        super().__init__(**kwargs)
+        self._input_file = normalize_to_list_of_substitutions(filename)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetParametersFromFile], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["filename"] = parser.parse_substitution(entity.get_attr("filename"))
+        return cls, kwargs
+
+    def execute(self, context: LaunchContext) -> None:
+        path = perform_substitutions(context, self._input_file)
+        context.launch_configurations.setdefault("global_params", []).append(path)
+
+
+# ``set_use_sim_time``: the clock of launch's own node (for ``ros_timer``), not of the nodes it starts.
+
+
+@expose_action("set_use_sim_time")
+class SetUseSimTime(Action):
+    """Launched nodes get ``use_sim_time`` through ``SetParameter`` instead."""
+
+    def __init__(self, value: bool | SomeSubstitutionsType, **kwargs: Any):
+        super().__init__(**kwargs)
+        self.__value = value
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetUseSimTime], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        kwargs["value"] = parser.parse_substitution(entity.get_attr("value"))
+        return cls, kwargs
+
+    @property
+    def value(self) -> bool | SomeSubstitutionsType:
+        return self.__value
+
+    def execute(self, context: LaunchContext) -> None:
+        """Older releases pass the text of the front ends on unevaluated, and refuse to switch it off.
+
+        Raises ``ValueError`` for what is no bool, ``RuntimeError`` for ``False``.
+        """
+        value = self.__value
+        if context.host.release.has(Feature.SIM_TIME_IN_FRONTENDS):
+            perform_typed_substitution(context, normalize_typed_substitution(value, bool), bool)
+            return
+        if not isinstance(value, bool):
+            raise ValueError(f"Type 'Type.BOOL' and value '{value}' do not agree")
+        if not value:
+            raise RuntimeError("Failed to set use_sim_time parameter")

@@ -1,0 +1,154 @@
+"""The argument scan: which arguments a description declares, found without executing anything.
+
+Rules of launch's scan, oddities included: a nested include is loaded with an empty context, its failures are
+swallowed; only the first declaration of a name counts; a list ends at a ``reset``. Upstream repeats the scan of
+everything below at each include; here each file is summed up once (``LoadCache``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.actions.arguments import DeclareLaunchArgument
+from enclave_launch.description.actions.configurations import ResetLaunchConfigurations
+from enclave_launch.description.actions.includes import IncludeLaunchDescription
+from enclave_launch.host.current import current_host
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch_description import LaunchDescription
+
+
+MISSING_ARGUMENT = "Included launch description missing required argument"
+REQUIRED_ARGUMENT = "Required launch argument"
+"""How upstream's two texts about an argument that nobody gave begin."""
+
+
+@dataclass(slots=True)
+class Declared:
+    """One declaration. ``given``: argument names of the includes on the way to it, ``None`` without include;
+    the text is only wanted when it is missing."""
+
+    required: bool
+    description: str
+    given: list[str | None] | None = None
+
+
+@dataclass(slots=True)
+class Summary:
+    """What a description declares by name, and the argument names of all includes in it.
+
+    A ``None`` among the names: that include has a name which needs a context.
+    """
+
+    declared: dict[str, Declared] = field(default_factory=dict)
+    given: list[str | None] = field(default_factory=list)
+
+
+def check_is_description(description: LaunchDescription) -> None:
+    """Whatever a Python file returned is asked as upstream asks it, so that ``None`` or a list fails alike."""
+    description.get_launch_arguments_with_include_launch_description_actions  # noqa: B018
+
+
+def check_required_arguments(description: LaunchDescription, given: list[str]) -> None:
+    """Raise ``RuntimeError`` unless each required argument is given by the include itself or on the way to it.
+
+    Configurations that happen to be set do not count, as upstream.
+    """
+    check_is_description(description)
+    required = {name: d for name, d in _summarize(description).declared.items() if d.required}
+    offers = {id(d.given): d.given for d in required.values() if d.given is not None}
+    names = set(given).union(*offers.values())
+    if None not in names and required.keys() <= names:
+        return
+    _complain(required, given)
+
+
+def _complain(required: dict[str, Declared], given: list[str]) -> None:
+    """Raise what upstream raises, in its words: the list of names grows with each argument looked at."""
+    for name, declared in required.items():
+        if declared.given is not None:
+            given.extend(_known(declared.given))
+        if name not in given:
+            raise RuntimeError(
+                f"{MISSING_ARGUMENT} '{name}' "
+                f"(description: '{declared.description}'), given: [{', '.join(given)}]"
+            )
+
+
+def _known(names: list[str | None]) -> list[str]:
+    if None in names:
+        raise TypeError("'NoneType' object is not iterable")  # upstream's own stumble, and its error
+    return [name for name in names if name is not None]
+
+
+def _summarize(description: LaunchDescription) -> Summary:
+    known: Summary | None = getattr(description, "argument_summary", None)
+    if known is not None:
+        return known
+    summary = Summary()
+    for entity, conditional in _walk(description.describe_sub_entities(), False):
+        if isinstance(entity, DeclareLaunchArgument):
+            conditional = conditional or entity.condition is not None
+            entity._conditionally_included = conditional
+            required = entity.default_value is None and not conditional
+            summary.declared.setdefault(entity.name, Declared(required, entity.description))
+        elif isinstance(entity, IncludeLaunchDescription):
+            _add_include(summary, entity)
+    return summary
+
+
+def _add_include(summary: Summary, include: IncludeLaunchDescription) -> None:
+    names = include.argument_names_without_context()
+    given: list[str | None] = [None] if names is None else list(names)
+    nested = current_host().loads.summary(include.launch_description_source, _summarize)
+    if nested is not None:
+        given = given + nested.given
+        for name, declared in nested.declared.items():
+            if name not in summary.declared:
+                summary.declared[name] = Declared(declared.required, declared.description, given)
+    summary.given.extend(given)
+
+
+def _walk(entities: Iterable[Any], conditional: bool) -> Iterator[tuple[Any, bool]]:
+    """Every entity that the scan meets, and whether it stands in a conditional offer.
+
+    Includes are not entered: what is below one is the business of its own summary.
+    """
+    for entity in entities:
+        if isinstance(entity, ResetLaunchConfigurations):
+            return
+        yield entity, conditional
+        if isinstance(entity, IncludeLaunchDescription):
+            continue
+        yield from _walk(entity.describe_sub_entities(), False)
+        for _, offered in entity.describe_conditional_sub_entities():
+            yield from _walk(offered, True)
+
+
+def collect_arguments(
+    description: LaunchDescription, conditional: bool
+) -> list[tuple[DeclareLaunchArgument, list[IncludeLaunchDescription] | None]]:
+    """The declarations themselves, each with the list of includes that all below one include share."""
+    found: dict[str, tuple[DeclareLaunchArgument, list[IncludeLaunchDescription] | None]] = {}
+
+    def collect(
+        entities: Iterable[Any], conditional: bool, includes: list[IncludeLaunchDescription] | None
+    ) -> None:
+        for entity in entities:
+            if isinstance(entity, ResetLaunchConfigurations):
+                return
+            if isinstance(entity, DeclareLaunchArgument) and entity.name not in found:
+                entity._conditionally_included = conditional or entity.condition is not None
+                found[entity.name] = (entity, includes)
+            below = includes
+            if isinstance(entity, IncludeLaunchDescription):
+                below = [] if includes is None else includes
+                below.append(entity)
+            collect(entity.describe_sub_entities(), False, below)
+            for _, offered in entity.describe_conditional_sub_entities():
+                collect(offered, True, below)
+
+    collect(description.entities, conditional, None)
+    return list(found.values())

@@ -1,0 +1,1 @@
+"""Events, their handlers, and the queue between the two."""

@@ -1,0 +1,224 @@
+"""Events about one process, the matchers that pick a process, and the events a dry run makes up."""
+
+from __future__ import annotations
+
+import signal as signals
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.argument_types import ensure_argument_type
+from enclave_launch.description.events.event import Event
+
+if TYPE_CHECKING:
+    from enclave_launch.description.actions.processes import ExecuteLocal
+
+
+class RunningProcessEvent(Event):
+    """``process_name`` is NAME-N; ``cmd``, ``cwd``, ``env`` are final."""
+
+    name = "launch.events.process.RunningProcessEvent"
+
+    def __init__(
+        self,
+        *,
+        action: ExecuteLocal,
+        name: str,
+        cmd: list[str],
+        cwd: str | None,
+        env: Mapping[str, str] | None,
+        pid: int,
+    ) -> None:
+        self.__action = action
+        self.__name = name
+        self.__cmd = cmd
+        self.__cwd = cwd
+        self.__env = env
+        self.__pid = pid
+
+    @property
+    def action(self) -> ExecuteLocal:
+        return self.__action
+
+    @property
+    def execute_process_action(self) -> ExecuteLocal:
+        return self.__action
+
+    @property
+    def process_name(self) -> str:
+        return self.__name
+
+    @property
+    def cmd(self) -> list[str]:
+        return self.__cmd
+
+    @property
+    def cwd(self) -> str | None:
+        return self.__cwd
+
+    @property
+    def env(self) -> Mapping[str, str] | None:
+        return self.__env
+
+    @property
+    def pid(self) -> int:
+        return self.__pid
+
+    def subject(self) -> str:
+        return self.__name
+
+
+class ProcessStarted(RunningProcessEvent):
+    name = "launch.events.process.ProcessStarted"
+
+
+class ProcessExited(RunningProcessEvent):
+    name = "launch.events.process.ProcessExited"
+
+    def __init__(self, *, returncode: int, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.__returncode = returncode
+
+    @property
+    def returncode(self) -> int:
+        return self.__returncode
+
+
+class ProcessIO(RunningProcessEvent):
+    """``text`` (bytes) came from, or goes to, the stream with this file descriptor."""
+
+    name = "launch.events.process.ProcessIO"
+
+    def __init__(self, *, text: bytes, fd: int, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.__text = text
+        self.__fd = fd
+
+    @property
+    def text(self) -> bytes:
+        return self.__text
+
+    @property
+    def from_stdin(self) -> bool:
+        return self.__fd == 0
+
+    @property
+    def from_stdout(self) -> bool:
+        return self.__fd == 1
+
+    @property
+    def from_stderr(self) -> bool:
+        return self.__fd == 2
+
+
+class ProcessStdin(ProcessIO):
+    name = "launch.events.process.ProcessStdin"
+
+    def __init__(self, *, text: bytes, **kwargs: Any) -> None:
+        super().__init__(text=text, fd=0, **kwargs)
+
+
+class ProcessStdout(ProcessIO):
+    name = "launch.events.process.ProcessStdout"
+
+    def __init__(self, *, text: bytes, **kwargs: Any) -> None:
+        super().__init__(text=text, fd=1, **kwargs)
+
+
+class ProcessStderr(ProcessIO):
+    name = "launch.events.process.ProcessStderr"
+
+    def __init__(self, *, text: bytes, **kwargs: Any) -> None:
+        super().__init__(text=text, fd=2, **kwargs)
+
+
+class ProcessTargetedEvent(Event):
+    """For the processes that ``process_matcher`` accepts."""
+
+    name = "launch.events.process.ProcessTargetedEvent"
+
+    def __init__(self, *, process_matcher: Callable[[ExecuteLocal], bool]) -> None:
+        self.__process_matcher = process_matcher
+
+    @property
+    def process_matcher(self) -> Callable[[ExecuteLocal], bool]:
+        return self.__process_matcher
+
+
+# Matchers for ``ProcessTargetedEvent``; a process that was not prepared matches none.
+
+Matcher = Callable[["ExecuteLocal"], bool]
+
+
+def _matches(test: Callable[[dict[str, Any]], bool]) -> Matcher:
+    def matcher(action: ExecuteLocal) -> bool:
+        details = action.process_details
+        return details is not None and test(details)
+
+    return matcher
+
+
+def matches_pid(pid: int) -> Matcher:
+    return _matches(lambda details: bool(details["pid"] == pid))
+
+
+def matches_name(name: str) -> Matcher:
+    """By NAME-N."""
+    return _matches(lambda details: bool(details["name"] == name))
+
+
+def matches_executable(executable: str) -> Matcher:
+    """By the end of the first word of the command."""
+    return _matches(lambda details: bool(details["cmd"][0].endswith(executable)))
+
+
+class ShutdownProcess(ProcessTargetedEvent):
+    """Ends with SIGINT, then SIGTERM, then SIGKILL."""
+
+    name = "launch.events.process.ShutdownProcess"
+
+
+class SignalProcess(ProcessTargetedEvent):
+    """``signal_number``: one of ``signal.Signals``, or the text ``SIGKILL``."""
+
+    name = "launch.events.process.SignalProcess"
+
+    def __init__(
+        self, *, signal_number: str | signals.Signals, process_matcher: Callable[[ExecuteLocal], bool]
+    ) -> None:
+        super().__init__(process_matcher=process_matcher)
+        ensure_argument_type(signal_number, (str, signals.Signals), "signal_number", "SignalProcess")
+        self.__signal = signal_number
+
+    @property
+    def signal(self) -> str | signals.Signals:
+        return self.__signal
+
+    @property
+    def signal_name(self) -> str:
+        return self.__signal if isinstance(self.__signal, str) else self.__signal.name
+
+
+def process_event_arguments(action: Any) -> dict[str, Any]:
+    """The constructor arguments of an event about a process that was prepared."""
+    return {"pid": 0, **(action.process_details or {})}
+
+
+def suppose_process_event(matches: Callable[[Event], bool], started: Sequence[Any]) -> Event | None:
+    """The first of exit and output, of the started processes in order, that ``matches``; ``None``: none does.
+
+    ``matches`` is foreign code that may expect another kind of event; what it raises means no.
+    """
+
+    for action in started:
+        arguments = process_event_arguments(action)
+        for event in (
+            ProcessExited(returncode=0, **arguments),
+            ProcessStdout(text=b"", **arguments),
+            ProcessStderr(text=b"", **arguments),
+        ):
+            try:
+                if matches(event):
+                    return event
+            except Exception:  # foreign matcher, see above
+                continue
+    return None

@@ -1,0 +1,217 @@
+"""The state that a visit reads and changes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, MutableMapping
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.events.dispatch import EventQueue, HandlerTable
+from enclave_launch.host.current import current_host
+from enclave_launch.host.environment import Environment
+from enclave_launch.host.protocol import Host
+
+if TYPE_CHECKING:
+    from enclave_launch.description.actions.includes import OpenFile
+    from enclave_launch.description.events.event import Event
+    from enclave_launch.description.events.handlers import BaseEventHandler
+    from enclave_launch.description.substitution import Substitution
+
+
+class Locals:
+    """Read-only attribute access to the locals of the event being handled."""
+
+    def __init__(self, values: dict[str, Any]) -> None:
+        self.__dict__["_values"] = values
+
+    def __getattr__(self, key: str) -> Any:
+        values: dict[str, Any] = self.__dict__["_values"]
+        if key not in values:
+            raise AttributeError(
+                f"context.locals does not contain attribute '{key}', it contains: [{', '.join(values)}]"
+            )
+        return values[key]
+
+    def __setattr__(self, key: str, value: object) -> None:
+        raise AttributeError(f"can't set attribute '{key}', locals are read-only")
+
+
+class LaunchContext:
+    """Launch configurations, environment, locals, events. Upstream's class, plus:
+
+    ``host`` the way to the world; ``on_event`` what is being handled, ``None`` during the visit of the file;
+    ``includes`` the "file:line" of each include that we are in; ``open_files`` the files themselves.
+    """
+
+    def __init__(
+        self, *, argv: Iterable[str] | None = None, noninteractive: bool = False, host: Host | None = None
+    ) -> None:
+        self.__argv = argv if argv is not None else []
+        self.__noninteractive = noninteractive
+        self.__host = host
+        self.__loop: Any = None
+        self.__is_shutdown = False
+        self.__globals: dict[str, Any] = {}
+        self.__locals: dict[str, Any] = {}
+        self.__locals_stack: list[dict[str, Any]] = []
+        self.__combined: dict[str, Any] | None = None
+        self.__configurations: dict[str, Any] = {}
+        self.__configurations_stack: list[dict[str, Any]] = []
+        self.process_environment = Environment()
+        self._event_queue = EventQueue()
+        self._event_handlers = HandlerTable()
+        self._completion_futures: list[Any] = []
+        self.on_event: str | None = None
+        self.includes: tuple[str, ...] = ()
+        self.open_files: tuple[OpenFile, ...] = ()
+        self._timer_handler_installed = False
+
+    @property
+    def host(self) -> Host:
+        if self.__host is None:
+            self.__host = current_host()
+        return self.__host
+
+    @property
+    def argv(self) -> Iterable[str]:
+        return self.__argv
+
+    @property
+    def noninteractive(self) -> bool:
+        return self.__noninteractive
+
+    # Shutdown and the loop
+
+    @property
+    def is_shutdown(self) -> bool:
+        return self.__is_shutdown
+
+    def _set_is_shutdown(self, state: bool) -> None:
+        self.__is_shutdown = state
+
+    @property
+    def asyncio_loop(self) -> Any:
+        return self.__loop if self.__loop is not None else self.host.loop
+
+    def _set_asyncio_loop(self, loop: Any) -> None:
+        self.__loop = loop
+
+    def add_completion_future(self, completion_future: Any) -> None:
+        """The launch is not idle before this is done."""
+        self._completion_futures.append(completion_future)
+
+    # Locals
+
+    def _push_locals(self) -> None:
+        self.__locals_stack.append(dict(self.__locals))
+
+    def _pop_locals(self) -> None:
+        if not self.__locals_stack:
+            raise RuntimeError("locals stack unexpectedly empty")
+        self.__locals = self.__locals_stack.pop()
+        self.__combined = None
+
+    def extend_globals(self, extensions: dict[str, Any]) -> None:
+        """Add to the locals for good; real locals of the same name win."""
+        self.__globals.update(extensions)
+        self.__combined = None
+
+    def extend_locals(self, extensions: dict[str, Any]) -> None:
+        """Add to the locals until the event being handled is done."""
+        self.__locals.update(extensions)
+        self.__combined = None
+
+    def get_locals_as_dict(self) -> dict[str, Any]:
+        if self.__combined is None:
+            self.__combined = {**self.__globals, **self.__locals}
+        return self.__combined
+
+    @property
+    def locals(self) -> Locals:
+        return Locals(self.get_locals_as_dict())
+
+    # Environment: ``os.environ`` itself, as Python launch files rely on it
+
+    @property
+    def environment(self) -> MutableMapping[str, str]:
+        return os.environ
+
+    def _push_environment(self) -> None:
+        self.process_environment.push()
+
+    def _pop_environment(self) -> None:
+        self.process_environment.pop()
+
+    def _reset_environment(self) -> None:
+        self.process_environment.reset()
+
+    # Launch configurations
+
+    @property
+    def launch_configurations(self) -> dict[str, Any]:
+        return self.__configurations
+
+    def _push_launch_configurations(self) -> None:
+        """Keep a *shallow* copy: lists stay shared between the scopes, as upstream."""
+        self.__configurations_stack.append(self.__configurations.copy())
+
+    def _pop_launch_configurations(self) -> None:
+        if not self.__configurations_stack:
+            raise RuntimeError("launch_configurations stack unexpectedly empty")
+        self.__configurations = self.__configurations_stack.pop()
+
+    # Events
+
+    def would_handle_event(self, event: Event) -> bool:
+        return self._event_handlers.would_match(event)
+
+    def awaits_completion(self) -> bool:
+        """Could any handler take an ``ExecutionComplete``? A cheap first answer for each action visited."""
+        return self._event_handlers.awaits("launch.events.ExecutionComplete")
+
+    def register_event_handler(self, event_handler: BaseEventHandler, append: bool = False) -> None:
+        """The newest handler is asked first; with ``append`` this one is asked last."""
+        self._event_handlers.register(event_handler, append)
+
+    def unregister_event_handler(self, event_handler: BaseEventHandler) -> None:
+        """Raises ``ValueError`` when it is not registered."""
+        self._event_handlers.unregister(event_handler)
+
+    def emit_event_sync(self, event: Event) -> None:
+        self._event_queue.put_nowait(event, self.on_event)
+
+    async def emit_event(self, event: Event) -> None:
+        self.emit_event_sync(event)
+
+    def perform_substitution(self, substitution: Substitution) -> str:
+        return substitution.perform(self)
+
+    # Hypothetical events: what a dry run tries out leaves no trace
+
+    def save(self) -> dict[str, Any]:
+        """Everything that an event could change, for ``restore``."""
+        return {
+            "configurations": {
+                k: list(v) if isinstance(v, list) else v for k, v in self.__configurations.items()
+            },
+            "configurations_stack": list(self.__configurations_stack),
+            "locals": dict(self.__locals),
+            "locals_stack": list(self.__locals_stack),
+            "environment": self.process_environment.snapshot(),
+            "handlers": self._event_handlers.save(),
+            "queue": self._event_queue.save(),
+            "shutdown": self.__is_shutdown,
+            "on_event": self.on_event,
+        }
+
+    def restore(self, saved: dict[str, Any]) -> None:
+        self.__configurations = saved["configurations"]
+        self.__configurations_stack = saved["configurations_stack"]
+        self.__locals = saved["locals"]
+        self.__locals_stack = saved["locals_stack"]
+        self.__combined = None
+        self.process_environment.assign(saved["environment"])
+        self._event_handlers.restore(saved["handlers"])
+        self._event_queue.restore(saved["queue"])
+        self.__is_shutdown = saved["shutdown"]
+        self.on_event = saved["on_event"]

@@ -1,0 +1,74 @@
+"""A list of entities: what a launch file describes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from enclave_launch.description.entity import LaunchDescriptionEntity
+from enclave_launch.diagnostics import launch_file_deprecated
+
+if TYPE_CHECKING:
+    from enclave_launch.description.action import Action
+    from enclave_launch.description.actions.arguments import DeclareLaunchArgument
+    from enclave_launch.description.actions.includes import IncludeLaunchDescription
+    from enclave_launch.description.argument_scan import Summary
+    from enclave_launch.description.launch_context import LaunchContext
+
+
+class LaunchDescription(LaunchDescriptionEntity):
+    """Visited, it gives its entities. ``deprecated_reason`` is warned about at each visit."""
+
+    argument_summary: Summary | None = None  # of a file whose arguments were collected before
+
+    def __init__(
+        self,
+        initial_entities: Iterable[LaunchDescriptionEntity] | None = None,
+        *,
+        deprecated_reason: str | None = None,
+    ) -> None:
+        self.__entities = list(initial_entities) if initial_entities is not None else []
+        self.__deprecated_reason = deprecated_reason
+
+    @property
+    def entities(self) -> list[LaunchDescriptionEntity]:
+        return self.__entities
+
+    @property
+    def deprecated(self) -> bool:
+        return self.__deprecated_reason is not None
+
+    @property
+    def deprecated_reason(self) -> str | None:
+        return self.__deprecated_reason
+
+    def add_entity(self, entity: LaunchDescriptionEntity) -> None:
+        self.__entities.append(entity)
+
+    def add_action(self, action: Action) -> None:
+        self.add_entity(action)
+
+    def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
+        if self.__deprecated_reason is not None:
+            file = context.get_locals_as_dict().get("current_launch_file_path")
+            context.host.warn(launch_file_deprecated(file, self.__deprecated_reason))
+        return self.__entities
+
+    def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        return self.__entities
+
+    def get_launch_arguments(self, conditional_inclusion: bool = False) -> list[DeclareLaunchArgument]:
+        """The arguments that can be found without executing anything; the first declaration of each name."""
+        found = self.get_launch_arguments_with_include_launch_description_actions(conditional_inclusion)
+        return [argument for argument, _ in found]
+
+    def get_launch_arguments_with_include_launch_description_actions(
+        self, conditional_inclusion: bool = False
+    ) -> list[tuple[DeclareLaunchArgument, list[IncludeLaunchDescription] | None]]:
+        """As ``get_launch_arguments``, each with the includes on the way to it (``None``: none).
+
+        That list is shared by everything below one include of this description, as upstream.
+        """
+        from enclave_launch.description.argument_scan import collect_arguments
+
+        return collect_arguments(self, conditional_inclusion)

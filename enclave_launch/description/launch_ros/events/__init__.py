@@ -1,6 +1,0 @@
-"""API of ``launch_ros.events``."""
-
-from . import lifecycle
-from .matchers import matches_node_name
-
-__all__ = ["lifecycle", "matches_node_name"]

@@ -1,0 +1,133 @@
+"""``LaunchService`` runs descriptions by way of our own runtime; the small parts of asyncio that upstream adds."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterable
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.actions.events import EmitEvent
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.launch_description import LaunchDescription
+
+if TYPE_CHECKING:
+    from enclave_launch.description.events.event import Event
+    from enclave_launch.runtime.service import LaunchService as Runtime
+
+
+class LaunchService:
+    """Include descriptions, emit events, then run: what was asked before is done first, in order.
+
+    One run per object. ``shutdown`` works while ``run_async`` does.
+    """
+
+    def __init__(
+        self, *, argv: Iterable[str] | None = None, noninteractive: bool = False, debug: bool = False
+    ) -> None:
+        self.__argv = tuple(argv or ())
+        self.__noninteractive = noninteractive
+        self.__debug = debug
+        self.__description = LaunchDescription()
+        self.__context = LaunchContext(argv=self.__argv, noninteractive=noninteractive)
+        self.__running: Runtime | None = None
+
+    @property
+    def context(self) -> LaunchContext:
+        """The context before the run; a run makes its own."""
+        return self.__context
+
+    def include_launch_description(self, launch_description: LaunchDescription) -> None:
+        self.__description.add_entity(launch_description)
+
+    def emit_event(self, event: Event) -> None:
+        self.__description.add_action(EmitEvent(event=event))
+
+    def run(self, *, shutdown_when_idle: bool = True) -> int:
+        """Block until all is over; SIGINT shuts down in order. Gives 0, or 1 when something failed."""
+        import asyncio
+
+        return asyncio.run(self.__run(shutdown_when_idle, handle_interrupt=True))
+
+    async def run_async(self, *, shutdown_when_idle: bool = True) -> int:
+        """As ``run``, inside a running loop, and without touching signals."""
+        return await self.__run(shutdown_when_idle, handle_interrupt=False)
+
+    def shutdown(self, force_sync: bool = False) -> None:
+        """End the run in progress, in order; nothing happens without one."""
+        if self.__running is not None:
+            self.__running.shut_down("LaunchService.shutdown() called")
+
+    async def __run(self, shutdown_when_idle: bool, *, handle_interrupt: bool) -> int:
+        from enclave_launch.runtime.service import LaunchService as Runtime
+        from enclave_launch.runtime.service import RunOptions
+
+        description = self.__description
+
+        class InMemory(Runtime):
+            """The runtime, launching a description instead of a file."""
+
+            def description(self) -> LaunchDescription:
+                return description
+
+        options = RunOptions(
+            noninteractive=self.__noninteractive, debug=self.__debug, shutdown_when_idle=shutdown_when_idle
+        )
+        self.__running = InMemory("<script>", (), gate=None, options=options)
+        try:
+            if not handle_interrupt:
+                return await self.__running.run()
+            return await self.__run_with_signals(self.__running)
+        finally:
+            self.__running = None
+
+    @staticmethod
+    async def __run_with_signals(service: Runtime) -> int:
+        import asyncio
+        from signal import SIGINT, SIGTERM
+
+        loop = asyncio.get_running_loop()
+        for number in (SIGINT, SIGTERM):
+            loop.add_signal_handler(number, service.on_signal, number)
+        try:
+            return await service.run()
+        finally:
+            for number in (SIGINT, SIGTERM):
+                loop.remove_signal_handler(number)
+
+
+class AsyncSafeSignalManager:
+    """Within its ``with`` block, ``handle(signal, function)`` calls ``function(signum)`` from the loop."""
+
+    def __init__(self, loop: Any) -> None:
+        self.__loop = loop
+        self.__handled: set[int] = set()
+
+    def __enter__(self) -> AsyncSafeSignalManager:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for signum in self.__handled:
+            self.__loop.remove_signal_handler(signum)
+        self.__handled.clear()
+
+    def handle(self, signum: int, handler: Callable[[int], object] | None) -> None:
+        """Handle ``signum`` from now on; ``None`` stops that."""
+        number = signal.Signals(signum)
+        if handler is None:
+            self.__handled.discard(number)
+            self.__loop.remove_signal_handler(number)
+            return
+        self.__loop.add_signal_handler(number, handler, number)
+        self.__handled.add(number)
+
+
+def create_future(loop: Any) -> Any:
+    """A future of ``loop``, or of the loop that is running."""
+    if loop is None:
+        import asyncio
+
+        loop = asyncio.get_event_loop()
+    return loop.create_future()

@@ -1,0 +1,56 @@
+"""Where in the launch files an entity stands, and through which includes we came there."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from enclave_launch.frontend import error_location
+from enclave_launch.source_location import SourceLocation
+
+if TYPE_CHECKING:
+    from enclave_launch.description.entity import LaunchDescriptionEntity
+    from enclave_launch.description.launch_context import LaunchContext
+
+
+OUTSIDE = "<launch>"
+"""The file of what no file contains: the description that stands for the command line."""
+
+_MARK = "_enclave_launch_place"
+
+
+def location_of(entity: object, context: LaunchContext) -> SourceLocation:
+    """The place of ``entity``; the file being evaluated when it is not known itself."""
+    place: SourceLocation | None = getattr(entity, "source_location", None)
+    if place is None:
+        file = context.open_files[-1][0] if context.open_files else OUTSIDE
+        return SourceLocation(file, 0, type(entity).__name__, context.includes)
+    return SourceLocation(place.file, place.line, place.element, context.includes)
+
+
+def includes_below(include: LaunchDescriptionEntity, context: LaunchContext) -> tuple[str, ...]:
+    """The chain for what ``include`` brings in. The include that stands for the command line is no step of it."""
+    if include.source_location is None:
+        return context.includes
+    return (*context.includes, str(include.source_location))
+
+
+def annotate(error: BaseException, entity: object, context: LaunchContext) -> None:
+    """Note on ``error`` which entity raised it; the innermost note stays.
+
+    An error in a file that an include was about to load stands in that file, not at the include.
+    """
+    if place_of(error) is not None:
+        return
+    place = location_of(entity, context)
+    inside = error_location.location_of(error)
+    if inside is not None:
+        is_step = inside.file not in (place.file, OUTSIDE) and place.file != OUTSIDE
+        includes = (*context.includes, str(place)) if is_step else context.includes
+        place = SourceLocation(inside.file, inside.line, inside.element, includes)
+    setattr(error, _MARK, place)
+
+
+def place_of(error: BaseException) -> SourceLocation | None:
+    """What ``annotate`` noted."""
+    place: SourceLocation | None = getattr(error, _MARK, None)
+    return place

@@ -1,0 +1,1 @@
+"""XML and YAML: text in, actions and substitutions out (API of ``launch.frontend``)."""

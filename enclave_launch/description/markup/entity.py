@@ -1,0 +1,118 @@
+"""``Entity``: one element of a launch file in any syntax, and the types its attributes are asked for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, List, TypeVar, overload  # noqa: UP035  (upstream names typing.List)
+
+if TYPE_CHECKING:
+    from collections.abc import Container
+
+    from enclave_launch.source_location import SourceLocation
+
+
+T = TypeVar("T")
+
+
+class _Everything:
+    def __contains__(self, name: object) -> bool:
+        return True
+
+
+_EVERYTHING = _Everything()
+
+
+class Entity:
+    """Element with a type name, attributes and children. XML and YAML bring the implementations."""
+
+    @property
+    def type_name(self) -> str:
+        """Name of the element: ``node``, ``arg``, ..."""
+        raise NotImplementedError()
+
+    @property
+    def parent(self) -> Entity | None:
+        """Upstream's front ends never fill this in, nor do ours."""
+        raise NotImplementedError()
+
+    @property
+    def children(self) -> list[Entity]:
+        """All child elements, in order; asking for them counts as having read them."""
+        raise NotImplementedError()
+
+    @property
+    def source_location(self) -> SourceLocation | None:
+        """File, line and element name (ours; upstream has no positions)."""
+        return None
+
+    @property
+    def given(self) -> Container[str]:
+        """Names for which ``get_attr`` may find something (ours): most optional attributes are not there, and
+        to ask for each takes time. By default any name."""
+        return _EVERYTHING
+
+    @overload
+    def get_attr(
+        self, name: str, *, data_type: type[T], optional: bool, can_be_str: bool = True
+    ) -> T | None: ...
+
+    @overload
+    def get_attr(self, name: str, *, data_type: type[T], can_be_str: bool = True) -> T: ...
+
+    @overload
+    def get_attr(self, name: str, *, optional: bool, can_be_str: bool = True) -> str | None: ...
+
+    @overload
+    def get_attr(self, name: str, *, can_be_str: bool = True) -> str: ...
+
+    @overload
+    def get_attr(
+        self, name: str, *, data_type: None, optional: bool = False, can_be_str: bool = True
+    ) -> Any: ...
+
+    def get_attr(
+        self, name: str, *, data_type: Any = str, optional: bool = False, can_be_str: bool = True
+    ) -> Any:
+        """Read attribute ``name`` as ``data_type``.
+
+        ``data_type``: ``str``, ``int``, ``float``, ``bool``, a ``List`` of one of them, ``None`` for YAML
+        typing, or ``List[Entity]`` for the child elements called ``name``. With ``can_be_str`` text without
+        the type stays text, because it may hold substitutions.
+
+        Raises ``AttributeError`` when absent and not ``optional`` (else returns ``None``), ``TypeError`` for
+        a value of the wrong type.
+        """
+        raise NotImplementedError()
+
+    def assert_entity_completely_parsed(self) -> None:
+        """Raise ``ValueError`` naming the attributes and children that nobody has read."""
+        raise NotImplementedError()
+
+
+# Types that front ends can be asked for (API of ``launch.frontend.type_utils``).
+
+_TYPE_OF_IDENTIFIER: dict[str, Any] = {
+    "str": str,
+    "bool": bool,
+    "float": float,
+    "int": int,
+    "list_of_str": List[str],  # noqa: UP006
+    "list_of_bool": List[bool],  # noqa: UP006
+    "list_of_float": List[float],  # noqa: UP006
+    "list_of_int": List[int],  # noqa: UP006
+    "yaml": None,
+}
+
+
+def check_is_list_entity(data_type: Any) -> bool:
+    """Whether ``data_type`` is a list type whose items are entities."""
+    items = getattr(data_type, "__args__", None)
+    if not items or getattr(data_type, "__origin__", None) is not list:
+        return False
+    return isinstance(items[0], type) and issubclass(items[0], Entity)
+
+
+def get_data_type_from_identifier(type_identifier: str) -> Any:
+    """``'list_of_int'`` -> ``List[int]``; ``'yaml'`` -> ``None``. ``ValueError`` for an unknown one."""
+    if type_identifier not in _TYPE_OF_IDENTIFIER:
+        raise ValueError(f"Got invalid type identifier '{type_identifier}'")
+    return _TYPE_OF_IDENTIFIER[type_identifier]

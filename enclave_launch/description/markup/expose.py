@@ -1,0 +1,158 @@
+"""Registries of the actions and substitutions that XML and YAML can name (API of ``launch.frontend.expose``).
+
+``parse`` methods are registered by decorator when their module is imported; ``instantiate_*`` calls them.
+A name that is not registered yet is looked for in our own modules, then in other installed packages
+(``extensions``).
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+from enclave_launch.description.markup import extensions
+from enclave_launch.frontend import error_location
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    from enclave_launch.description.action import Action
+    from enclave_launch.description.markup.entity import Entity
+    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
+
+
+ParseMethod = Callable[..., tuple[type, dict[str, Any]]]
+Exposed = TypeVar("Exposed")
+_OUR_PACKAGE = "enclave_launch."
+
+action_parse_methods: dict[str, ParseMethod] = {}
+substitution_parse_methods: dict[str, ParseMethod] = {}
+
+# Names that not every release has; kept beside the registries, which third parties may read and which map to
+# plain callables upstream.
+_METHODS = {"action": action_parse_methods, "substitution": substitution_parse_methods}
+_GATES: dict[str, dict[str, Feature]] = {"action": {}, "substitution": {}}
+
+
+def instantiate_action(entity: Entity, parser: Parser) -> Action:
+    """Build the action that ``entity`` names.
+
+    Raises ``RuntimeError`` for an unknown tag, ``ValueError`` for an attribute or child nobody read, and
+    whatever the action's ``parse`` or constructor raises; each carries the place (``error_location``).
+    """
+    try:
+        type_name = entity.type_name
+        parse = _lookup("action", type_name)
+        if parse is None:
+            raise RuntimeError(f"Unrecognized entity of the type: {type_name}")
+        action_type, kwargs = parse(entity, parser)
+        action: Action = action_type(**kwargs)
+    except Exception as error:  # foreign parse methods too; the error goes on with its place noted
+        error_location.mark(error, entity)
+        raise
+    action.source_location = entity.source_location
+    return action
+
+
+def instantiate_substitution(
+    type_name: str, args: Iterable[SomeSubstitutionsType] | None = None
+) -> Substitution:
+    """Build the substitution ``$(type_name args...)``; ``RuntimeError`` when there is none of that name."""
+    parse = _lookup("substitution", type_name)
+    if parse is None:
+        raise RuntimeError(f"Unknown substitution: {type_name}")
+    substitution_type, kwargs = parse([] if args is None else args)
+    substitution: Substitution = substitution_type(**kwargs)
+    return substitution
+
+
+def is_ours(name: str) -> bool:
+    """Whether substitution ``name`` is one of this package's, or unknown: not foreign code."""
+    method = _lookup("substitution", name)
+    return method is None or method.__module__.startswith(_OUR_PACKAGE)
+
+
+def expose_action(name: str, *, feature: Feature | None = None) -> Callable[[Exposed], Exposed]:
+    """Register a class with a ``parse`` class method, or a parse function, as element ``name``.
+
+    ``feature`` (ours): the element is unknown to releases without it.
+    """
+    return _exposer("action", name, feature)
+
+
+def expose_substitution(name: str, *, feature: Feature | None = None) -> Callable[[Exposed], Exposed]:
+    """Register a class with a ``parse`` class method, or a parse function, as ``$(name ...)``.
+
+    ``feature`` (ours): the substitution is unknown to releases without it.
+    """
+    return _exposer("substitution", name, feature)
+
+
+def _lookup(kind: str, name: str) -> ParseMethod | None:
+    """The registered parse method, imported if need be; ``None`` if the release in force has none."""
+    gate = _GATES[kind].get(name)
+    if gate is not None and not current_release().has(gate):
+        return None
+    method = _METHODS[kind].get(name)
+    return _import_and_lookup(kind, name) if method is None else method
+
+
+def _import_and_lookup(kind: str, name: str) -> ParseMethod | None:
+    for register in extensions.registrations_of(kind, name):
+        register()
+        if name in _METHODS[kind]:
+            return _lookup(kind, name)
+    return None
+
+
+def _exposer(kind: str, name: str, gate: Feature | None) -> Callable[[Exposed], Exposed]:
+    methods = _METHODS[kind]
+
+    def expose(exposed: Exposed) -> Exposed:
+        method = _parse_method(exposed, name, kind)
+        known = inspect.unwrap(methods[name]) if name in methods else method
+        if known != method:
+            raise RuntimeError(f"Two {kind} parsing methods exposed with the same name: [{name}].")
+        methods[name] = _checking_leftovers(method) if kind == "action" else method
+        if gate is not None:
+            _GATES[kind][name] = gate
+        return exposed
+
+    return expose
+
+
+def forget(module: str) -> None:
+    """Drop what ``module`` registered: a launch file may register elements, each time it is evaluated."""
+    for methods in _METHODS.values():
+        for name, method in list(methods.items()):
+            registered = inspect.unwrap(method)
+            if getattr(registered, "__self__", registered).__module__ == module:
+                del methods[name]
+
+
+def _parse_method(exposed: object, name: str, kind: str) -> ParseMethod:
+    if inspect.isclass(exposed):
+        method = getattr(exposed, "parse", None)
+        if not inspect.ismethod(method):
+            raise RuntimeError("Did not find a class method called 'parse' in the class being decorated.")
+        return method
+    if inspect.isfunction(exposed):
+        return exposed
+    raise RuntimeError(
+        f"Exposed {kind} parser for {name} is not a callable or a class containing a parse method"
+    )
+
+
+def _checking_leftovers(parse: ParseMethod) -> ParseMethod:
+    """``parse``, and afterwards a check that every attribute and child of the entity was read."""
+
+    @functools.wraps(parse)
+    def parse_and_check(entity: Entity, parser: Parser) -> tuple[type, dict[str, Any]]:
+        result = parse(entity, parser)
+        entity.assert_entity_completely_parsed()
+        return result
+
+    return parse_and_check

@@ -1,0 +1,92 @@
+"""Names of nodes: which are valid, how often each is used, how a handler matches them."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from typing import Any
+
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.diagnostics import node_name_repeated
+from enclave_launch.ros_rules.namespaces import make_namespace_absolute as make_namespace_absolute
+from enclave_launch.ros_rules.namespaces import prefix_namespace as prefix_namespace
+from nodl import names
+
+
+class NameValidationException(ValueError):
+    """A name that rmw would refuse: the reason, the name, and where in it."""
+
+    def __init__(self, error: names.InvalidNameError, what: str):
+        position = error.position or 0
+        super().__init__(f"Invalid {what}: {error.reason}:\n  '{error.name}'\n   {' ' * position}^")
+
+
+class InvalidNodeNameException(NameValidationException):
+    pass
+
+
+class InvalidNamespaceException(NameValidationException):
+    pass
+
+
+def validate_node_name(name: str) -> None:
+    """Raises ``InvalidNodeNameException``."""
+    try:
+        names.validate_node_name(name)
+    except names.InvalidNameError as error:
+        raise InvalidNodeNameException(error, "node name") from None
+
+
+def validate_namespace(namespace: str) -> None:
+    """Raises ``InvalidNamespaceException``."""
+    try:
+        names.validate_namespace(namespace)
+    except names.InvalidNameError as error:
+        raise InvalidNamespaceException(error, "namespace") from None
+
+
+def is_root_namespace(ns: str) -> bool:
+    return ns == "/"
+
+
+def is_namespace_absolute(ns: str) -> bool:
+    return ns.startswith("/")
+
+
+# How often each fully qualified node name was used in this launch, to warn about repeats.
+
+_GLOBAL = "unique_ros_node_names"
+
+
+def add_node_name(context: LaunchContext, node_name: str) -> None:
+    _counts(context)[node_name] += 1
+
+
+def get_node_name_count(context: LaunchContext, node_name: str) -> int:
+    return _counts(context)[node_name]
+
+
+def warn_about_repeats(context: LaunchContext, node_name: str, started_by: str) -> None:
+    """Count one more node of this fully qualified name and warn if it is not the first.
+
+    ``started_by``: the process, or for a component its container.
+    """
+    add_node_name(context, node_name)
+    count = get_node_name_count(context, node_name)
+    if count > 1:
+        context.host.warn(node_name_repeated(node_name, count, started_by))
+
+
+def _counts(context: LaunchContext) -> Counter[str]:
+    """The table lives in the context's globals, where third-party code may look for it."""
+    counts: Counter[str] | None = getattr(context.locals, _GLOBAL, None)
+    if counts is None:
+        counts = Counter()
+        context.extend_globals({_GLOBAL: counts})
+    return counts
+
+
+def matches_node_name(node_name: str) -> Callable[[Any], bool]:
+    """Match node actions by their fully qualified name; without a leading slash it is in the root namespace."""
+    full_name = node_name if node_name.startswith("/") else f"/{node_name}"
+    return lambda action: bool(action.node_name == full_name)

@@ -1,0 +1,1 @@
+"""Parameters of nodes and components, from what users write to what a node sees."""

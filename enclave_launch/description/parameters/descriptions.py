@@ -1,0 +1,155 @@
+"""What users wrap parameters in: a typed value, a single rule, a file."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, cast
+
+from enclave_launch.description.argument_types import ensure_argument_type
+from enclave_launch.description.markup.parse_substitution import parse_substitution
+from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
+    SomeSubstitutionsType_types_tuple,
+    SubstitutionFailure,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.parameters.types import EvaluatedParameterValue
+    from enclave_launch.description.substitution import Substitution
+
+
+class ParameterValue:
+    """A value, or substitutions whose text becomes one, of ``value_type`` (``None``: by YAML's rules)."""
+
+    def __init__(self, value: Any, *, value_type: Any = None):
+        self.__value = normalize_typed_substitution(value, value_type)
+        self.__value_type = value_type
+        self.__evaluated: EvaluatedParameterValue | None = None
+
+    @property
+    def value(self) -> Any:
+        return self.__value if self.__evaluated is None else self.__evaluated
+
+    @property
+    def value_type(self) -> Any:
+        return self.__value_type
+
+    def __str__(self) -> str:
+        return f"launch_ros.description.ParameterValue(value={self.value}, value_type={self.value_type})"
+
+    def evaluate(self, context: LaunchContext) -> EvaluatedParameterValue:
+        """The typed value; the first one is kept. Raises ``ValueError`` where coercion fails."""
+        evaluated = perform_typed_substitution(context, self.value, self.__value_type)
+        self.__evaluated = cast("EvaluatedParameterValue", evaluated)
+        return self.__evaluated
+
+
+class Parameter:
+    """One parameter given as a rule on the command line: ``-p NAME:=YAML``."""
+
+    def __init__(self, name: SomeSubstitutionsType, value: Any, *, value_type: Any = None):
+        ensure_argument_type(name, SomeSubstitutionsType_types_tuple, "name")
+        self.__name = normalize_to_list_of_substitutions(name)
+        self.__value = ParameterValue(value, value_type=value_type)
+        self.__evaluated: tuple[str, EvaluatedParameterValue] | None = None
+
+    @property
+    def name(self) -> list[Substitution] | str:
+        return self.__name if self.__evaluated is None else self.__evaluated[0]
+
+    @property
+    def value(self) -> Any:
+        return self.__value.value
+
+    @property
+    def value_type(self) -> Any:
+        return self.__value.value_type
+
+    def __str__(self) -> str:
+        return (
+            f"launch_ros.description.Parameter(name={self.name}, value={self.value}, "
+            f"value_type={self.value_type})"
+        )
+
+    def evaluate(self, context: LaunchContext) -> tuple[str, EvaluatedParameterValue]:
+        if self.__evaluated is None:
+            name = perform_substitutions(context, self.__name)
+            self.__evaluated = (name, self.__value.evaluate(context))
+        return self.__evaluated
+
+
+class ParameterFile:
+    """A parameter file; with ``allow_substs`` its whole text, comments included, is a template."""
+
+    def __init__(
+        self,
+        param_file: SomeSubstitutionsType | os.PathLike[str] | bytes,
+        *,
+        allow_substs: bool | SomeSubstitutionsType = False,
+    ):
+        ensure_argument_type(
+            param_file,
+            (*SomeSubstitutionsType_types_tuple, os.PathLike, bytes),
+            "param_file",
+            "ParameterFile()",
+        )
+        ensure_argument_type(allow_substs, bool, "allow_subst", "ParameterFile()")
+        self.__param_file: list[Substitution] | os.PathLike[str]
+        if isinstance(param_file, SomeSubstitutionsType_types_tuple):
+            self.__param_file = normalize_to_list_of_substitutions(cast("SomeSubstitutionsType", param_file))
+        else:
+            self.__param_file = param_file
+        self.__allow_substs = bool(allow_substs)
+        self.__evaluated: Path | None = None
+
+    @property
+    def param_file(self) -> list[Substitution] | os.PathLike[str]:
+        return self.__param_file if self.__evaluated is None else self.__evaluated
+
+    @property
+    def allow_substs(self) -> bool:
+        return self.__allow_substs
+
+    def __str__(self) -> str:
+        return (
+            f"launch_ros.description.ParameterFile(param_file={self.param_file}, "
+            f"allow_substs={self.allow_substs})"
+        )
+
+    def evaluate(self, context: LaunchContext) -> Path:
+        """The path to pass on: the file itself, or a generated copy with the substitutions performed.
+
+        Raises ``FileNotFoundError`` for a missing file that is to be substituted, ``SubstitutionFailure``
+        when it is not YAML afterwards.
+        """
+        if self.__evaluated is None:
+            path = self.__path(context)
+            self.__evaluated = _substituted(context, path) if self.__allow_substs else path
+        return self.__evaluated
+
+    def __path(self, context: LaunchContext) -> Path:
+        if isinstance(self.__param_file, list):
+            return Path(perform_substitutions(context, self.__param_file))
+        return Path(self.__param_file)
+
+    def cleanup(self) -> None:
+        """Forget the generated copy; the host removes its files itself."""
+        self.__evaluated = None
+
+
+def _substituted(context: LaunchContext, path: Path) -> Path:
+    import yaml
+
+    from enclave_launch.description.parameters import yaml_text
+
+    text = perform_substitutions(context, parse_substitution(path.read_text(encoding="utf-8")))
+    try:
+        yaml_text.load(text)
+    except yaml.YAMLError:
+        raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
+    return Path(context.host.write_parameter_file(text))

@@ -1,0 +1,82 @@
+"""The parameters of one ``Node``: as words of its command line, and as the values its node will see."""
+
+from __future__ import annotations
+
+import os
+import pathlib
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.parameters import yaml_text
+from enclave_launch.description.parameters.descriptions import Parameter
+from enclave_launch.description.parameters.evaluate import evaluate_parameters
+from enclave_launch.diagnostics import parameter_file_missing
+from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.ros_rules.rcl_parameters import Section, as_rcl_reads, resolve_parameters
+from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.parameters.types import Parameters
+
+
+class NodeParameters:
+    """Global parameters come first, then the node's own; each dict becomes a file of its own."""
+
+    def __init__(self, own: Parameters):
+        self.__own = own
+        self.__written: dict[str, Mapping[str, Section]] = {}  # content of the files made from dicts
+
+    def write(self, context: LaunchContext, section: str) -> list[str]:
+        """Words to append to the command line. ``section`` is the node's full name, or ``/**``."""
+        words = [word for pair in _global_words(context) for word in pair]
+        for item in evaluate_parameters(context, self.__own):
+            words += self.__own_words(context, section, item)
+        return words
+
+    def __own_words(self, context: LaunchContext, section: str, item: Any) -> Sequence[str]:
+        if isinstance(item, Parameter):
+            name, value = item.evaluate(context)
+            return ("-p", f"{name}:={yaml_text.dump(value)}")
+        if isinstance(item, pathlib.Path):
+            path = str(item)
+            if context.host.parameter_file(path) is None and not os.path.isfile(path):
+                context.host.warn(parameter_file_missing(path))
+                return ()
+            return ("--params-file", path)
+        return ("--params-file", self.__write_file(context, section, item))
+
+    def __write_file(self, context: LaunchContext, section: str, values: Mapping[str, Any]) -> str:
+        quoted = context.host.release.has(Feature.QUOTED_TEXT_PARAMETERS)
+        write = yaml_text.quoted_parameter_file if quoted else yaml_text.parameter_file
+        path = context.host.write_parameter_file(write(section, values))
+        read = _as_written if quoted else as_rcl_reads
+        self.__written[path] = {section: {name: read(value) for name, value in values.items()}}
+        return path
+
+    def resolve(
+        self, name_tokens: Sequence[str | None], sources: Sequence[ParameterFile | ParameterRule]
+    ) -> dict[str, ParameterValue]:
+        """What the node sees after rcl has merged everything on its command line."""
+        return resolve_parameters(name_tokens, sources, self.__written.get)
+
+    def written_files(self, context: LaunchContext) -> dict[str, str]:
+        """Path to text of the files that were generated for this node."""
+        return {path: context.host.parameter_file(path) or "" for path in self.__written}
+
+
+def _as_written(value: Any) -> ParameterValue:
+    return tuple(value) if isinstance(value, list) else value
+
+
+def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
+    """``-p`` with Python's ``str`` of the value, as launch does. ``AssertionError`` for a missing file."""
+    for item in context.launch_configurations.get("global_params") or ():
+        if isinstance(item, tuple):
+            yield "-p", f"{item[0]}:={item[1]}"
+            continue
+        path = os.path.abspath(item)
+        if not os.path.isfile(path):
+            raise AssertionError(f"the file of set_parameters_from_file does not exist: {path}")
+        yield "--params-file", path

@@ -1,0 +1,132 @@
+"""Modules under upstream's names, made from the table ``upstream_paths``.
+
+Each name is looked up in our module when it is first asked for, so that a launch file loads only what it mentions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from importlib import import_module
+from types import ModuleType
+from typing import Any, NamedTuple
+
+from enclave_launch.description.upstream_paths import GATES, PATHS
+
+_OURS = "enclave_launch.description."
+
+
+class Row(NamedTuple):
+    """One module of upstream's: where its names are, and which of them its package has as well."""
+
+    module: str
+    shared: tuple[str, ...]
+    own: tuple[str, ...]
+
+    def names(self) -> tuple[str, ...]:
+        return (*self.shared, *self.own)
+
+
+def exists(name: str) -> bool:
+    """Is ``name`` (``launch.actions.node``) a module of the table?"""
+    package, _, leaf = name.rpartition(".")
+    return name in PATHS or leaf in PATHS.get(package, ())
+
+
+@cache
+def public_module(name: str) -> ModuleType:
+    """The module of that name; always the same object."""
+    module = ModuleType(name, f"API of upstream's ``{name}``; see ``enclave_launch.description``.")
+    names = _names_of(name)
+    below = _modules_below(name)
+
+    def get(attribute: str) -> Any:
+        if attribute == "__all__":
+            return _available(names)
+        if attribute in names and _is_available(attribute, name):
+            value = getattr(import_module(_OURS + names[attribute]), attribute)
+            if attribute not in GATES:
+                setattr(module, attribute, value)
+            return value
+        if attribute in below:
+            return public_module(f"{name}.{attribute}")
+        if name not in PATHS and attribute in _unambiguous_names():
+            return getattr(import_module(_OURS + _unambiguous_names()[attribute]), attribute)
+        raise AttributeError(f"module {name!r} has no attribute {attribute!r}")
+
+    module.__dict__.update(
+        __getattr__=get, __dir__=lambda: sorted({*_available(names), *below}), __file__=__file__
+    )
+    if name in PATHS:
+        module.__path__ = []
+    return module
+
+
+def hidden_modules(name: str) -> Iterable[str]:
+    """The modules below package ``name`` that a name of the package hides.
+
+    Importing one later would bind it in its package, over the function (``launch_ros.utilities.evaluate_parameters``).
+    """
+    names = _names_of(name) if name in PATHS else {}
+    return [f"{name}.{leaf}" for leaf in PATHS.get(name, ()) if leaf in names]
+
+
+def _names_of(name: str) -> dict[str, str]:
+    """Each name of the module and the module of ours that has it."""
+    if name in PATHS:
+        rows = [_row(text) for text in PATHS[name].values()]
+        names = {shared: row.module for row in rows for shared in row.shared}
+        own = PATHS[name].get("")
+        return {**names, **dict.fromkeys(_row(own).names(), _row(own).module)} if own else names
+    package, _, leaf = name.rpartition(".")
+    row = _row(PATHS[package][leaf])
+    return dict.fromkeys(row.names(), row.module)
+
+
+@cache
+def _unambiguous_names() -> dict[str, str]:
+    """What packages have, where only one module of ours has the name: a module of upstream's has imported names as
+    well, and launch files take them from there (``launch.actions.execute_process.ExecuteLocal``)."""
+    found: dict[str, set[str]] = {}
+    for package in PATHS:
+        for name, module in _names_of(package).items():
+            found.setdefault(name, set()).add(module)
+    return {name: min(modules) for name, modules in found.items() if len(modules) == 1}
+
+
+def _row(text: str) -> Row:
+    module, _, names = text.partition(": ")
+    shared, _, own = names.partition("|")
+    if own.strip() == "*":
+        own = " ".join(name for name in dir(import_module(_OURS + module)) if not name.startswith("_"))
+    return Row(module, tuple(shared.split()), tuple(own.split()))
+
+
+def _modules_below(name: str) -> set[str]:
+    prefix = f"{name}."
+    packages = {package.removeprefix(prefix) for package in PATHS if package.startswith(prefix)}
+    return {leaf for leaf in (*PATHS.get(name, ()), *packages) if leaf and "." not in leaf}
+
+
+def _available(names: Iterable[str]) -> list[str]:
+    return [name for name in names if _is_available(name, "")]
+
+
+def _is_available(name: str, module: str) -> bool:
+    """Gated names are missing from a package of older releases; the module below it has them always."""
+    gate = GATES.get(name)
+    if gate is None or (module and module not in PATHS):
+        return True
+    from enclave_launch.host.current import current_release
+
+    return current_release().has(gate)
+
+
+def upstream_name(module: str, name: str) -> str:
+    """Upstream's dotted name of ``name`` in our ``module``; our own where upstream has none."""
+    for package, rows in PATHS.items():
+        for leaf, text in rows.items():
+            row = _row(text)
+            if leaf and _OURS + row.module == module and name in row.names():
+                return f"{package}.{leaf}.{name}"
+    return f"{module}.{name}"

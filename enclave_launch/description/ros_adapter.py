@@ -1,0 +1,85 @@
+"""API of ``launch_ros.ros_adapters``: launch's own ROS node.
+
+A real one needs rclpy; it is made only when something asks for it while processes really run. A dry run
+never does: what would be asked of the node is recorded as a ``LauncherCall`` instead.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from enclave_launch.description.launch_context import LaunchContext
+
+
+class ROSAdapter:
+    """Holds an rclpy context and a node ``launch_ros_<pid>``, spun by a thread of its own."""
+
+    def __init__(self, *, argv: list[str] | None = None, autostart: bool = True):
+        self.__argv = argv or []  # never None: rclpy would take sys.argv
+        self.__context: Any = None
+        self.__node: Any = None
+        self.__executor: Any = None
+        self.__thread: Any = None
+        if autostart:
+            self.start()
+
+    def start(self) -> None:
+        """Raises ``RuntimeError`` when already started, ``ImportError`` without rclpy."""
+        if self.__node is not None:
+            raise RuntimeError("Cannot start a ROS adapter that is already running")
+        import threading
+
+        import rclpy
+        from rclpy.executors import SingleThreadedExecutor
+
+        self.__context = rclpy.Context()
+        rclpy.init(args=self.__argv, context=self.__context)
+        self.__node = rclpy.create_node(f"launch_ros_{os.getpid()}", context=self.__context)
+        self.__executor = SingleThreadedExecutor(context=self.__context)
+        self.__executor.add_node(self.__node)
+        self.__thread = threading.Thread(target=self.__executor.spin, daemon=True)
+        self.__thread.start()
+
+    def shutdown(self) -> None:
+        """Raises ``RuntimeError`` when not started."""
+        if self.__node is None:
+            raise RuntimeError("Cannot shutdown a ROS adapter that is not running")
+        self.__executor.shutdown()
+        self.__thread.join()
+        self.__node.destroy_node()
+        self.__context.try_shutdown()
+        self.__node = None
+
+    @property
+    def argv(self) -> list[str]:
+        return self.__argv
+
+    @property
+    def ros_context(self) -> Any:
+        return self.__context
+
+    @property
+    def ros_node(self) -> Any:
+        return self.__node
+
+    @property
+    def ros_executor(self) -> Any:
+        return self.__executor
+
+
+def get_ros_adapter(context: LaunchContext) -> ROSAdapter:
+    """The adapter of this launch, made on first use and shut down with it."""
+    adapter: ROSAdapter | None = getattr(context.locals, "ros_adapter", None)
+    if adapter is None:
+        from enclave_launch.description.events.handlers import OnShutdown
+
+        adapter = started = ROSAdapter()
+        context.extend_globals({"ros_adapter": adapter})
+        context.register_event_handler(OnShutdown(on_shutdown=lambda *_: started.shutdown()))
+    return adapter
+
+
+def get_ros_node(context: LaunchContext) -> Any:
+    """The rclpy node of this launch."""
+    return get_ros_adapter(context).ros_node

@@ -1,0 +1,96 @@
+"""Substitutions: what stands for a text that is only known when it is performed."""
+
+from __future__ import annotations
+
+import collections.abc
+from collections.abc import Iterable
+from typing import TYPE_CHECKING
+
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    import pathlib
+
+    from enclave_launch.description.launch_context import LaunchContext
+
+
+class Substitution:
+    """Performed against a context, gives text. Third parties subclass it; only ``perform`` is required."""
+
+    def describe(self) -> str:
+        return repr(self)
+
+    def perform(self, context: LaunchContext) -> str:
+        raise NotImplementedError("perform() not implemented for Substitution base class.")
+
+
+class TextSubstitution(Substitution):
+    """Stands for itself."""
+
+    def __init__(self, *, text: str) -> None:
+        if not isinstance(text, str):
+            raise TypeError(f"TextSubstitution expected Text object got '{type(text)}' instead.")
+        self.__text = text
+
+    @property
+    def text(self) -> str:
+        return self.__text
+
+    def describe(self) -> str:
+        return f"'{self.__text}'"
+
+    def perform(self, context: LaunchContext) -> str:
+        return self.__text
+
+
+class SubstitutionFailure(RuntimeError):
+    """The message says why."""
+
+
+# What an action accepts where text is expected: text, a substitution, or a sequence of both to concatenate.
+
+SomeSubstitutionsType = str | Substitution | collections.abc.Iterable[str | Substitution]
+SomeSubstitutionsType_types_tuple = (str, Substitution, collections.abc.Iterable)
+
+
+def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution]) -> str:
+    """Perform each and concatenate. Raises ``TypeError`` where one does not give text."""
+    if type(subs) is list and len(subs) == 1:
+        text = subs[0].perform(context)
+        return text if type(text) is str else "".join((text,))
+    return "".join([sub.perform(context) for sub in subs])
+
+
+def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Path) -> list[Substitution]:
+    """Text becomes a ``TextSubstitution``, one substitution a list. Raises ``TypeError`` for anything else."""
+    if isinstance(subs, str):
+        return [TextSubstitution(text=subs)]
+    if type(subs) is list:
+        return [item if isinstance(item, Substitution) else _normalize(item) for item in subs]
+    if _is_substitution(subs):
+        return [subs]  # type: ignore[list-item]
+    if _is_path(subs):
+        return [TextSubstitution(text=str(subs))]
+    return [_normalize(item) for item in subs]  # type: ignore[union-attr]
+
+
+def _normalize(item: object) -> Substitution:
+    if isinstance(item, Substitution):
+        return item
+    if isinstance(item, str) or _is_path(item):
+        return TextSubstitution(text=str(item))
+    raise TypeError(
+        f"Failed to normalize given item of type '{type(item)}', when only "
+        "'str' or 'launch.Substitution' were expected."
+    )
+
+
+def _is_path(value: object) -> bool:
+    """Is it a ``pathlib`` path, on a distribution that takes one for text?"""
+    return hasattr(value, "joinpath") and current_release().has(Feature.PATHLIB_IS_TEXT)
+
+
+def _is_substitution(value: object) -> bool:
+    """Is it a substitution, or a class of substitutions, which upstream takes as well?"""
+    return isinstance(value, Substitution) or (isinstance(value, type) and issubclass(value, Substitution))

@@ -1,0 +1,1 @@
+"""Substitutions, by where their value comes from."""

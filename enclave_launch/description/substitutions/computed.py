@@ -1,0 +1,247 @@
+"""Substitutions that compute: ``command``, ``eval``, ``file-content``, ``find-exec``, ``string-join``."""
+
+from __future__ import annotations
+
+import importlib
+import math
+import shlex
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.markup.expose import expose_substitution
+from enclave_launch.description.substitution import (
+    Substitution,
+    SubstitutionFailure,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.diagnostics import command_stderr
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.substitution import SomeSubstitutionsType
+    from enclave_launch.host.protocol import CommandResult
+
+
+_MODES = ("fail", "ignore", "warn", "capture")
+
+
+@expose_substitution("command")
+class Command(Substitution):
+    """What a command writes to stdout, unstripped. Run without a shell, each time it is performed.
+
+    ``on_stderr``: ``fail`` when it writes there, ``warn``, ``ignore``, or ``capture`` it with stdout.
+    """
+
+    def __init__(self, command: SomeSubstitutionsType, *, on_stderr: SomeSubstitutionsType = "fail") -> None:
+        self.__command = normalize_to_list_of_substitutions(command)
+        self.__on_stderr = normalize_to_list_of_substitutions(on_stderr)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if not 1 <= len(data) <= 2:
+            raise ValueError("command substitution expects 1 or 2 arguments")
+        return cls, dict(zip(("command", "on_stderr"), data, strict=False))
+
+    @property
+    def command(self) -> list[Substitution]:
+        return self.__command
+
+    @property
+    def on_stderr(self) -> list[Substitution]:
+        return self.__on_stderr
+
+    def describe(self) -> str:
+        return f"Command({' + '.join(sub.describe() for sub in self.__command)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        text = perform_substitutions(context, self.__command)
+        words = shlex.split(text)
+        mode = perform_substitutions(context, self.__on_stderr)
+        if mode not in _MODES:
+            raise SubstitutionFailure(
+                "expected 'on_stderr' to be one of: 'fail', 'ignore', 'warn' or 'capture'"
+            )
+        try:
+            result = context.host.run_command(words, merge_stderr=mode == "capture")
+        except FileNotFoundError as error:
+            raise SubstitutionFailure(f"file not found: {error}") from error
+        _check(context, text, mode, result)
+        return result.stdout
+
+
+def _check(context: LaunchContext, text: str, mode: str, result: CommandResult) -> None:
+    if result.returncode != 0:
+        captured = f"\nCaptured stderr output: {result.stderr}" if result.stderr else ""
+        raise SubstitutionFailure(f"executed command failed. Command: {text}{captured}")
+    if not result.stderr:
+        return
+    message = (
+        f"executed command showed stderr output. Command: {text}\nCaptured stderr output:\n{result.stderr}"
+    )
+    if mode == "fail":
+        raise SubstitutionFailure(message)
+    if mode == "warn":
+        context.host.warn(command_stderr(message, text))
+
+
+_DEFAULT_MODULES = ("math",)
+
+
+@expose_substitution("eval")
+class PythonExpression(Substitution):
+    """The value of a Python expression, as text. It sees the builtins and the modules given.
+
+    Names are those of the modules, and what module ``math`` holds; humble knows only the latter.
+    """
+
+    def __init__(
+        self, expression: SomeSubstitutionsType, python_modules: SomeSubstitutionsType = _DEFAULT_MODULES
+    ) -> None:
+        if python_modules is not _DEFAULT_MODULES and not current_release().has(Feature.EVAL_MODULES):
+            raise TypeError("PythonExpression.__init__() got an unexpected keyword argument 'python_modules'")
+        self.__expression = normalize_to_list_of_substitutions(expression)
+        self.__python_modules = normalize_to_list_of_substitutions(python_modules)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if not current_release().has(Feature.EVAL_MODULES):
+            if len(data) != 1:
+                raise TypeError("eval substitution expects 1 argument")
+        elif not 1 <= len(data) <= 2:
+            raise TypeError("eval substitution expects 1 or 2 arguments")
+        if len(data) == 1:
+            return cls, {"expression": data[0]}
+        return cls, {"expression": data[0], "python_modules": _literal_names(data[1])}
+
+    @property
+    def expression(self) -> list[Substitution]:
+        return self.__expression
+
+    @property
+    def python_modules(self) -> list[Substitution]:
+        return self.__python_modules
+
+    def describe(self) -> str:
+        expression = " + ".join(sub.describe() for sub in self.__expression)
+        return f"PythonExpr({expression}, [{', '.join(sub.describe() for sub in self.__python_modules)}])"
+
+    def perform(self, context: LaunchContext) -> str:
+        if context.host.release.has(Feature.EVAL_MODULES):
+            names = _names([sub.perform(context) for sub in self.__python_modules])
+        else:
+            names = dict(math.__dict__)
+        # A launch file may compute anything here: that is the substitution's purpose.
+        return str(eval(perform_substitutions(context, self.__expression), {}, names))
+
+
+def _literal_names(modules: Any) -> list[str]:
+    """The comma-separated names; only literal text counts."""
+    parts = list(modules)
+    if not parts:
+        return []
+    return [name.strip() for name in parts[0].perform(None).split(",")]
+
+
+def _names(modules: list[str]) -> dict[str, Any]:
+    names: dict[str, Any] = {}
+    for module in map(importlib.import_module, modules):
+        if module.__name__ == "math":
+            names.update(vars(module))
+        names[module.__name__] = module
+    return names
+
+
+@expose_substitution("file-content", feature=Feature.FILE_CONTENT)
+class FileContent(Substitution):
+    """The text of a file, unstripped."""
+
+    def __init__(self, path: SomeSubstitutionsType) -> None:
+        self.__path = normalize_to_list_of_substitutions(path)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) != 1:
+            raise AttributeError("file content substitutions expect 1 argument")
+        return cls, {"path": data[0]}
+
+    @property
+    def path(self) -> list[Substitution]:
+        return self.__path
+
+    def describe(self) -> str:
+        return f"FileContent({', '.join(sub.describe() for sub in self.__path)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        path = perform_substitutions(context, self.__path)
+        try:
+            with open(path) as file:
+                return file.read()
+        except FileNotFoundError:
+            raise SubstitutionFailure(f"File not found: {path}") from None
+
+
+@expose_substitution("find-exec")
+class FindExecutable(Substitution):
+    """The path of a program on the ``PATH``."""
+
+    def __init__(self, *, name: SomeSubstitutionsType) -> None:
+        self.__name = normalize_to_list_of_substitutions(name)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) != 1:
+            raise AttributeError("find-exec substitution expects 1 argument")
+        return cls, {"name": data[0]}
+
+    @property
+    def name(self) -> list[Substitution]:
+        return self.__name
+
+    def describe(self) -> str:
+        return f"FindExec({' + '.join(sub.describe() for sub in self.__name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self.__name)
+        path = context.host.find_program(name)
+        if path is None:
+            raise SubstitutionFailure(f"executable '{name}' not found on the PATH")
+        return path
+
+
+@expose_substitution("string-join", feature=Feature.JOIN_IN_FRONTENDS)
+class StringJoinSubstitution(Substitution):
+    """Concatenates each component, then joins them with the delimiter."""
+
+    def __init__(
+        self, substitutions: Iterable[SomeSubstitutionsType], delimiter: SomeSubstitutionsType = ""
+    ) -> None:
+        self.__substitutions = [normalize_to_list_of_substitutions(component) for component in substitutions]
+        self.__delimiter = normalize_to_list_of_substitutions(delimiter)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) < 2:
+            raise TypeError(
+                "string-join substitution expects at least 2 arguments: 1 delimiter + at least 1 component"
+            )
+        return cls, {"delimiter": data[0], "substitutions": data[1:]}
+
+    @property
+    def substitutions(self) -> list[list[Substitution]]:
+        return self.__substitutions
+
+    @property
+    def delimiter(self) -> list[Substitution]:
+        return self.__delimiter
+
+    def describe(self) -> str:
+        components = [" + ".join(sub.describe() for sub in component) for component in self.__substitutions]
+        delimiter = " + ".join(sub.describe() for sub in self.__delimiter)
+        return f"StringJoinSubstitution([{', '.join(components)}], delimiter={delimiter})"
+
+    def perform(self, context: LaunchContext) -> str:
+        components = [perform_substitutions(context, component) for component in self.__substitutions]
+        return perform_substitutions(context, self.__delimiter).join(components)

@@ -1,0 +1,153 @@
+"""Substitutions that give a path: ``path-join``, ``dirname``, ``filename``, ``log_dir``."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.markup.expose import expose_substitution
+from enclave_launch.description.substitution import (
+    Substitution,
+    SubstitutionFailure,
+    normalize_to_list_of_substitutions,
+)
+from enclave_launch.host.current import current_release
+from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.substitution import SomeSubstitutionsType
+
+
+class PathOperator:
+    """Mixed into such a substitution: ``directory / "launch"`` is a ``PathJoinSubstitution``."""
+
+    def __truediv__(self, other: SomeSubstitutionsType) -> PathJoinSubstitution:
+
+        return PathJoinSubstitution([self, other])
+
+
+@expose_substitution("path-join", feature=Feature.JOIN_IN_FRONTENDS)
+class PathJoinSubstitution(Substitution):
+    """Joins its parts as ``os.path.join`` does: an absolute part discards what is before it.
+
+    Since launch 3.8.1 a part may be a sequence, which is concatenated first.
+    """
+
+    def __init__(self, substitutions: Iterable[Any]) -> None:
+        self.__parts = [_part(item) for item in _items(substitutions)]
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) < 1:
+            raise TypeError("path-join substitution expects at least 1 argument")
+        return cls, {"substitutions": data}
+
+    @property
+    def substitutions(self) -> list[Any]:
+        return [part[0] if len(part) == 1 else part for part in self.__parts]
+
+    def describe(self) -> str:
+        parts = (" + ".join(sub.describe() for sub in part) for part in self.__parts)
+        return f"PathJoin('{' + '.join(parts)}')"
+
+    def perform(self, context: LaunchContext) -> str:
+        return os.path.join(*("".join([sub.perform(context) for sub in part]) for part in self.__parts))
+
+    def __truediv__(self, other: SomeSubstitutionsType) -> PathJoinSubstitution:
+        return PathJoinSubstitution([*self.substitutions, other])
+
+
+def _items(substitutions: Any) -> Iterable[Any]:
+    if isinstance(substitutions, (str, Substitution)):
+        return [substitutions]
+    return substitutions  # type: ignore[no-any-return]
+
+
+def _part(item: Any) -> list[Substitution]:
+    if isinstance(item, (str, Substitution)) or current_release().has(Feature.NESTED_PATH_JOIN):
+        return normalize_to_list_of_substitutions(item)
+    return normalize_to_list_of_substitutions([item])
+
+
+class PathSubstitution(PathOperator, Substitution):
+    """A ``pathlib.Path`` as a substitution, or anything that gives a path, with the operator ``/``."""
+
+    def __init__(self, path: object) -> None:
+        from enclave_launch.description.substitution import normalize_to_list_of_substitutions
+
+        self.__path = path
+        text = str(path) if isinstance(path, Path) else path
+        self.__parts = normalize_to_list_of_substitutions(text)  # type: ignore[arg-type]
+
+    @property
+    def path(self) -> object:
+        return self.__path
+
+    def describe(self) -> str:
+        return f"'{self.__path}'"
+
+    def perform(self, context: LaunchContext) -> str:
+        return "".join([sub.perform(context) for sub in self.__parts])
+
+
+@expose_substitution("filename")
+class ThisLaunchFile(Substitution):
+    """The path of the launch file being visited; an include leaves its own behind."""
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) != 0:
+            raise TypeError("filename substitution doesn't expect arguments")
+        return cls, {}
+
+    def describe(self) -> str:
+        return "ThisLaunchFile()"
+
+    def perform(self, context: LaunchContext) -> str:
+        path: str | None = context.get_locals_as_dict().get("current_launch_file_path")
+        if path is None:
+            raise SubstitutionFailure("ThisLaunchFile used outside of a launch file (in a script)")
+        return path
+
+
+@expose_substitution("dirname")
+class ThisLaunchFileDir(PathOperator, Substitution):
+    """The directory of the launch file being visited; an include leaves its own behind."""
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) != 0:
+            raise TypeError("dirname substitution doesn't expect arguments")
+        return cls, {}
+
+    def describe(self) -> str:
+        return "ThisLaunchFileDir()"
+
+    def perform(self, context: LaunchContext) -> str:
+        path: str | None = context.get_locals_as_dict().get("current_launch_file_directory")
+        if path is None:
+            raise SubstitutionFailure("ThisLaunchFileDir used outside of a launch file (in a script)")
+        return path
+
+
+@expose_substitution("launch_log_dir", feature=Feature.LAUNCH_LOG_DIR)
+@expose_substitution("log_dir")
+class LaunchLogDir(Substitution):
+    """The directory of this run's log files."""
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) != 0:
+            raise TypeError("launch_log_dir/log_dir substitution doesn't expect arguments")
+        return cls, {}
+
+    def describe(self) -> str:
+        return "LaunchLogDir()"
+
+    def perform(self, context: LaunchContext) -> str:
+        return context.host.log_directory()

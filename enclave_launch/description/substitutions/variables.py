@@ -1,0 +1,212 @@
+"""Substitutions that look a value up: ``var``, ``env``, ``for-var``, ``index``, ``anon`` and locals."""
+
+from __future__ import annotations
+
+import collections.abc
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.description.argument_types import ensure_argument_type
+from enclave_launch.description.markup.expose import expose_substitution
+from enclave_launch.description.substitution import (
+    Substitution,
+    SubstitutionFailure,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
+from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.substitution import SomeSubstitutionsType
+
+
+@expose_substitution("var")
+class LaunchConfiguration(Substitution):
+    """The value of a launch configuration; the default, turned to text, is performed only if it is not set."""
+
+    def __init__(self, variable_name: SomeSubstitutionsType, *, default: Any = None) -> None:
+        self.__variable_name = normalize_to_list_of_substitutions(variable_name)
+        self.__default = None if default is None else _as_text(default)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if not 1 <= len(data) <= 2:
+            raise TypeError("var substitution expects 1 or 2 arguments")
+        return cls, dict(zip(("variable_name", "default"), data, strict=False))
+
+    @property
+    def variable_name(self) -> list[Substitution]:
+        return self.__variable_name
+
+    def describe(self) -> str:
+        return f"LaunchConfig({' + '.join(sub.describe() for sub in self.__variable_name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self.__variable_name)
+        configurations = context.launch_configurations
+        if name in configurations:
+            value: str = configurations[name]
+            return value
+        if self.__default is None:
+            raise SubstitutionFailure(f"launch configuration '{name}' does not exist")
+        return perform_substitutions(context, self.__default)
+
+
+def _as_text(default: Any) -> list[Substitution]:
+    items = default if isinstance(default, collections.abc.Iterable) else (default,)
+    return normalize_to_list_of_substitutions(
+        [item if isinstance(item, (str, Substitution)) else str(item) for item in items]
+    )
+
+
+@expose_substitution("env")
+class EnvironmentVariable(Substitution):
+    """The value of an environment variable. The default is performed in any case."""
+
+    def __init__(
+        self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None
+    ) -> None:
+        self.__name = normalize_to_list_of_substitutions(name)
+        self.__default_value = (
+            None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        )
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if not 1 <= len(data) <= 2:
+            raise TypeError("env substitution expects 1 or 2 arguments")
+        return cls, dict(zip(("name", "default_value"), data, strict=False))
+
+    @property
+    def name(self) -> list[Substitution]:
+        return self.__name
+
+    @property
+    def default_value(self) -> list[Substitution] | None:
+        return self.__default_value
+
+    def describe(self) -> str:
+        return f"EnvVar({' + '.join(sub.describe() for sub in self.__name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        default = (
+            None if self.__default_value is None else perform_substitutions(context, self.__default_value)
+        )
+        name = perform_substitutions(context, self.__name)
+        value = context.environment.get(name, default)
+        if value is None:
+            raise SubstitutionFailure(f"environment variable '{name}' does not exist")
+        return value
+
+
+class LocalSubstitution(Substitution):
+    """A Python expression on the locals of the context: ``event.process_name``."""
+
+    def __init__(self, expression: str, description: str | None = None) -> None:
+        ensure_argument_type(expression, str, "expression", "LocalSubstitution")
+        self.__expression = expression
+        self.__description = description
+
+    @property
+    def expression(self) -> str:
+        return self.__expression
+
+    @property
+    def description(self) -> str | None:
+        return self.__description
+
+    def describe(self) -> str:
+        return f"LocalVar('{self.__expression if self.__description is None else self.__description}')"
+
+    def perform(self, context: LaunchContext) -> str:
+        # Only Python launch files, which are code themselves, can make one of these.
+        value: str = eval(f"context.locals.{self.__expression}", {"context": context})
+        return value
+
+
+def local_name(name: str) -> str:
+    """The local that carries the value of loop variable ``name``."""
+    return f"ForEachVar__{name}"
+
+
+@expose_substitution("for-var", feature=Feature.FOR_EACH)
+class ForEachVar(Substitution):
+    """A value of the round of ``for_each`` that is being visited."""
+
+    def __init__(
+        self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None
+    ) -> None:
+        self._name = normalize_to_list_of_substitutions(name)
+        self._default_value = (
+            None if default_value is None else normalize_to_list_of_substitutions(default_value)
+        )
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if not 1 <= len(data) <= 2:
+            raise ValueError(f"{cls.__name__} substitution expects 1 or 2 arguments")
+        return cls, dict(zip(("name", "default_value"), data, strict=False))
+
+    @property
+    def name(self) -> list[Substitution]:
+        return self._name
+
+    @property
+    def default_value(self) -> list[Substitution] | None:
+        return self._default_value
+
+    def describe(self) -> str:
+        return f"{type(self).__name__}(name={' + '.join(sub.describe() for sub in self._name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self._name)
+        value: str | None = context.get_locals_as_dict().get(local_name(name))
+        if value is not None:
+            return value
+        if self._default_value is None:
+            raise RuntimeError(
+                f"No value available for {type(self).__name__} '{name}' and no default value provided"
+            )
+        return perform_substitutions(context, self._default_value)
+
+
+@expose_substitution("index", feature=Feature.FOR_LOOP)
+class ForLoopIndex(ForEachVar):
+    """The number of the round of ``for`` that is being visited."""
+
+    def __init__(self, name: SomeSubstitutionsType, **_: Any) -> None:
+        super().__init__(name)
+
+
+@expose_substitution("anon")
+class AnonName(Substitution):
+    """A unique name; the same for the same argument within one scope of launch configurations."""
+
+    def __init__(self, name: SomeSubstitutionsType) -> None:
+        self.__name = normalize_to_list_of_substitutions(name)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) != 1:
+            raise TypeError("anon substitution expects 1 argument")
+        return cls, {"name": data[0]}
+
+    @property
+    def name(self) -> list[Substitution]:
+        return self.__name
+
+    def describe(self) -> str:
+        return f"AnonName({' + '.join(sub.describe() for sub in self.__name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        name = perform_substitutions(context, self.__name)
+        configurations = context.launch_configurations
+        if context.host.release.has(Feature.FLAT_ANONYMOUS_NAMES):
+            known, key = configurations, f"anon{name}"
+        else:
+            known, key = configurations.setdefault("anon", {}), name
+        if key not in known:
+            known[key] = context.host.anonymous_name(name)
+        value: str = known[key]
+        return value
