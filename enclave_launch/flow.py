@@ -117,15 +117,19 @@ def run(
 ) -> int:
     """Start what was planned and stay until all has ended; handles SIGINT and SIGTERM. Gives the exit status.
 
-    Before anything is started raises ``RuntimeFailure`` when something it needs is not there, and ``LaunchFileError``
-    for a program that cannot be executed.
+    Before anything is started raises ``RuntimeFailure`` when something it needs is not there, and, for a provisioned
+    launch, ``LaunchFileError`` for a program that cannot be executed. An unsecured launch starts the others, as launch
+    does, and gives 1 in the end.
     """
     from enclave_launch.runtime.warden_process import WardenProcess
 
-    with WardenProcess() as warden:  # starts up while we import what drives it
+    settings = options or RunSettings()
+    with WardenProcess(
+        interactive=not settings.noninteractive
+    ) as warden:  # starts up while we import what drives it
         from enclave_launch.running import run_launched
 
-        return run_launched(launch, options or RunSettings(), warden)
+        return run_launched(launch, settings, warden)
 
 
 async def run_async(

@@ -70,9 +70,11 @@ class SecurityOptions:
 
 @dataclass(frozen=True, slots=True)
 class RunSettings:
-    """How to run. ``secrets``: environment variables that no process of the launch sees."""
+    """How to run. ``secrets``: environment variables that no process of the launch sees; ``log_limit``: bytes after
+    which a log file becomes ``<name>.1`` and a new one is begun, ``None`` for never."""
 
     noninteractive: bool = False
     debug: bool = False
     allow_late: bool = False
     secrets: frozenset[str] = frozenset()
+    log_limit: int | None = None

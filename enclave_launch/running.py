@@ -26,12 +26,12 @@ Launch = Union[EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
 
 
 def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -> int:
-    """Block until all is over. Before anything was started raises ``RuntimeFailure``, and ``LaunchFileError``
-    for a program that is not there."""
+    """Block until all is over. Before anything was started raises ``RuntimeFailure``, and, for a provisioned launch,
+    ``LaunchFileError`` for a program that is not there."""
     source = _evaluated(launch).source
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
-        check_programs(_evaluated(launch).evaluation.processes)
+        _check_programs(launch)
         return run_launch(source.launch_file, source.arguments, gate=gate, options=options, warden=warden)
 
 
@@ -40,8 +40,14 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     source = _evaluated(launch).source
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
-        check_programs(_evaluated(launch).evaluation.processes)
+        _check_programs(launch)
         return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
+
+
+def _check_programs(launch: Launch) -> None:
+    """Secured, all starts or nothing; unsecured, what can be executed is started, as launch does."""
+    if not isinstance(launch, (EvaluatedLaunch, LaunchPlan)):
+        check_programs(launch.plan.evaluation.processes)
 
 
 def _evaluated(launch: Launch) -> EvaluatedLaunch:
@@ -73,6 +79,7 @@ def _options(launch: Launch, settings: RunSettings) -> RunOptions:
         noninteractive=settings.noninteractive,
         debug=settings.debug,
         secrets=settings.secrets | own,
+        log_limit=settings.log_limit,
         needs_ros_services=bool(evaluated.evaluation.launcher_calls),
         launch_configurations=evaluated.source.launch_configurations,
         host_options=dict(evaluated.source.host_options),

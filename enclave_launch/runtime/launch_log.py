@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from enclave_launch.boundary.terminal import printable, printable_lines
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
@@ -21,21 +21,35 @@ LEVELS: dict[Level, int] = {"DEBUG": 10, "INFO": 20, "WARNING": 30, "ERROR": 40,
 Format = Callable[[Level, str, str], str]
 
 
+class Writers(NamedTuple):
+    """A thread each, since a screen can stand still."""
+
+    screen: SinkWriter
+    files: SinkWriter
+
+
 class LaunchLog:
-    """Sinks of one run. ``directory`` is where launch.log and the processes' own logs are."""
+    """Sinks of one run. ``directory`` is where launch.log and the processes' own logs are.
+
+    ``limit``: bytes after which a log file is begun anew, ``None`` for never.
+    """
 
     def __init__(
         self,
         directory: Path,
         screen: ScreenSink,
-        writer: SinkWriter,
+        writers: Writers,
         environment: Mapping[str, str],
         debug: bool = False,
+        limit: int | None = None,
     ) -> None:
         self.directory = directory
         self.screen: Sink = screen
-        self.launch_file = FileSink(directory / "launch.log")
-        self.writer = writer
+        self._limit = limit
+        self._writers = writers
+        self._shows_less = False
+        self._not_shown = 0  # lines
+        self.launch_file = self._file_sink("launch.log")
         self.debug = debug
         self._files: dict[str, FileSink] = {"launch.log": self.launch_file}
         self._on_screen = _format_from(environment.get("OVERRIDE_LAUNCH_SCREEN_FORMAT"), _plain)
@@ -46,14 +60,46 @@ class LaunchLog:
             return
         for sink, render in ((self.screen, self._on_screen), (self.launch_file, self._in_file)):
             line = render(level, printable(name), printable_lines(message))
-            self.writer.write(sink, (line + "\n").encode(errors="replace"))
+            self.write(sink, (line + "\n").encode(errors="replace"), kept=True)
+
+    def write(self, sink: Sink, lines: bytes, *, kept: bool) -> None:
+        """Queue whole lines. ``kept``: a file gets them too, so a screen that cannot follow may do without."""
+        if sink is not self.screen:
+            self._writers.files.write(sink, lines)
+        elif self._shows_less and kept:
+            self._not_shown += lines.count(b"\n")
+        else:
+            self._writers.screen.write(sink, lines)
+
+    def show_less(self, less: bool) -> None:
+        """From now on the screen gets only what goes nowhere else; or everything again, and how much it lacks."""
+        self._shows_less = less
+        if not less and self._not_shown:
+            missing, self._not_shown = self._not_shown, 0
+            self.log(
+                "WARNING",
+                "launch",
+                f"{missing} lines are not shown here, the screen was too slow; the logs have them",
+            )
 
     def file(self, name: str) -> FileSink:
-        """The one sink for ``name`` in the log directory."""
-        return self._files.setdefault(name, FileSink(self.directory / name))
+        """The one sink for ``name`` in the log directory. Slashes (a node called by its full name) become ``_``."""
+        name = name.replace("/", "_")
+        if name not in self._files:
+            self._files[name] = self._file_sink(name)
+        return self._files[name]
+
+    def _file_sink(self, name: str) -> FileSink:
+        return FileSink(self.directory / name, self._tell_on_screen, self._limit)
+
+    def _tell_on_screen(self, text: str) -> None:
+        """In the files' thread, of trouble with a file: there is no other place to say it."""
+        self._writers.screen.write(self.screen, (self._on_screen("ERROR", "launch", text) + "\n").encode())
 
     def close(self) -> None:
-        self.writer.close()
+        self.show_less(False)
+        self._writers.files.close()
+        self._writers.screen.close()
         for sink in self._files.values():
             sink.close()
 

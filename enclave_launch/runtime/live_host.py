@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.host.base_host import BaseHost
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
 from enclave_launch.runtime.gate import EnclaveGate, Grant
@@ -147,6 +147,10 @@ class LiveHost(BaseHost):
                 self.failed.append(live.process.process_name)
         except EnclaveLaunchError as error:
             self._fail(error)
+        except (
+            Exception
+        ) as error:  # whatever it is: a process that did not run must not pass for one that did
+            self._fail(RuntimeFailure(f"{live.process.process_name}: {type(error).__name__}: {error}"))
         finally:
             self.processes.remove(live)
             if not completed.done():

@@ -6,7 +6,7 @@ launch addresses to processes (shutdown, signal, stdin) become calls on it.
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from signal import Signals
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +26,7 @@ from enclave_launch.description.events.process import (
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.launch_log import LaunchLog, Level
-from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree, Stream
+from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, Stream
 from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter, OutputSetting, output_routes
 from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
 
@@ -38,7 +38,7 @@ Prepare = Callable[[ResolvedProcess], Awaitable[ProcessSpec]]
 
 
 class LiveProcess:
-    """:raises ValueError: an output setting or ``emulate_tty`` value that launch does not know."""
+    """:raises ValueError: an output setting, ``emulate_tty`` value or ``output_format`` that launch cannot use."""
 
     def __init__(
         self,
@@ -90,6 +90,10 @@ class LiveProcess:
 
     # Watcher
 
+    @property
+    def waits_for(self) -> Mapping[Stream, frozenset[Hold]]:
+        return self._router.waits_for
+
     def on_started(self, pid: int) -> None:
         self._details["pid"] = pid
         self._context.emit_event_sync(ProcessStarted(**self._details))
@@ -121,7 +125,7 @@ class LiveProcess:
         ]
 
     def _on_signal(self, event: Any) -> None:
-        self._supervised.signal(Signals[event.signal_name])
+        self._supervised.signal(Signals[event.signal_name], whole_group=False)
 
     def _on_stdin(self, event: Any) -> None:
         child = self._supervised.child
@@ -171,6 +175,15 @@ def _emulate_tty(action: ExecuteLocal, context: LaunchContext) -> bool:
 
 
 def _line_renderer(action: ExecuteLocal) -> Callable[[str], str] | None:
-    if action.output_format == DEFAULT_FORMAT:
+    """How a line is shown, ``None`` for launch's default; tried once, so that no output is lost to a format error."""
+    output_format = action.output_format
+    if output_format == DEFAULT_FORMAT:
         return None
-    return lambda line: action.output_format.format(line=line, this=action)
+    try:
+        output_format.format(line="", this=action)
+    except (LookupError, ValueError, AttributeError, TypeError) as error:
+        reason = f"{type(error).__name__}: {error}"
+        raise ValueError(
+            f"output_format {output_format!r} cannot be used ({reason}); it may name {{line}} and {{this}}"
+        ) from error
+    return lambda line: output_format.format(line=line, this=action)

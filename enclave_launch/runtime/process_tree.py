@@ -12,15 +12,20 @@ import errno
 import os
 import signal
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.runtime.survivors import Survivors
 from enclave_launch.runtime.warden_channel import Message, WardenChannel
 from enclave_launch.runtime.warden_process import WardenProcess
 
 Stream = Literal["stdout", "stderr"]
+Hold = Literal["files", "screen", "screen only"]  # why a stream may have to wait (back_pressure)
 OnOutput = Callable[[Stream, bytes], None]
 
+NO_HOLDS: Mapping[Stream, frozenset[Hold]] = MappingProxyType({})
 CHUNK = 1 << 16  # bytes; what a Linux pipe holds by default
 
 
@@ -39,13 +44,51 @@ class ProcessSpec(NamedTuple):
     def argv(self) -> tuple[str, ...]:
         return ("/bin/sh", "-c", " ".join(self.cmd)) if self.shell else self.cmd
 
+    def encoded(self) -> tuple[list[bytes], dict[bytes, bytes], bytes]:
+        """Command line, environment and working directory as the kernel takes them.
+
+        :raises OSError: EINVAL, with the text that no process can be started with: a NUL character, an environment
+            variable without a name or with ``=`` in it, a character that the locale's encoding does not have.
+        """
+        for name in self.environment:
+            if not name or "=" in name:
+                raise OSError(errno.EINVAL, "the name of an environment variable is empty or holds '='", name)
+        return (
+            [_encoded(word, f"argument {number}") for number, word in enumerate(self.argv)],
+            {
+                _encoded(name, "an environment variable's name"): _encoded(
+                    value, f"environment variable {name}"
+                )
+                for name, value in self.environment.items()
+            },
+            _encoded(self.cwd or os.getcwd(), "the working directory"),
+        )
+
+
+def _encoded(text: str, what: str) -> bytes:
+    if "\0" in text:
+        raise OSError(errno.EINVAL, f"{what} holds a NUL character", text)
+    try:
+        return os.fsencode(text)
+    except UnicodeEncodeError as error:
+        reason = f"{what} does not fit the locale's encoding ({error.encoding}); set LC_ALL to a UTF-8 locale"
+        raise OSError(errno.EINVAL, reason, text) from None
+
 
 class OutputPump:
-    """Reads one stream of a child whenever there is something, unless paused; ``closed`` at its end."""
+    """Reads one stream of a child whenever there is something, unless paused; ``closed`` at its end.
+
+    ``waits_for``: the holds that pause it.
+    """
 
     def __init__(
-        self, descriptor: int, receive: Callable[[bytes], None], loop: asyncio.AbstractEventLoop
+        self,
+        descriptor: int,
+        receive: Callable[[bytes], None],
+        loop: asyncio.AbstractEventLoop,
+        waits_for: frozenset[Hold] = frozenset(),
     ) -> None:
+        self.waits_for = waits_for
         os.set_blocking(descriptor, False)
         self._descriptor = descriptor
         self._receive = receive
@@ -111,10 +154,10 @@ class Child:
     def running(self) -> bool:
         return self.started.done() and not self.exited.done()
 
-    def signal(self, number: int) -> None:
-        """To the whole process group. Nothing happens once the process has ended."""
+    def signal(self, number: int, *, whole_group: bool = True) -> None:
+        """To its whole process group, or to it alone. Nothing happens once the process has ended."""
         if self.running:
-            self._tree.send("signal", self.identifier, int(number))
+            self._tree.send("signal" if whole_group else "signal_one", self.identifier, int(number))
 
     def write_stdin(self, data: bytes) -> None:
         """As much as the pipe takes; a process that does not read its stdin must not block the launch."""
@@ -159,11 +202,15 @@ class ProcessTree:
     def __init__(self, warden: WardenProcess | None = None) -> None:
         started = warden or WardenProcess()
         self._process = started.process
+        self._survivors = Survivors(started.process.pid)
         self._channel = WardenChannel(started.connection, self._on_message, self._on_lost)
         self._children: dict[int, Child] = {}
         self._count = 0
-        self._paused = False
+        self._holds: set[Hold] = set()
         self.lost: asyncio.Future[None] | None = None
+        self.on_interrupt: Callable[[], None] = lambda: (
+            None
+        )  # Ctrl-C, given to the child that had the terminal
 
     async def __aenter__(self) -> ProcessTree:
         self.lost = asyncio.get_running_loop().create_future()
@@ -177,55 +224,56 @@ class ProcessTree:
     def warden_pid(self) -> int:
         return self._process.pid
 
-    async def spawn(self, spec: ProcessSpec, on_output: OnOutput) -> Child:
-        """Start a process; returns once it has been executed.
+    async def spawn(
+        self, spec: ProcessSpec, on_output: OnOutput, waits_for: Mapping[Stream, frozenset[Hold]] = NO_HOLDS
+    ) -> Child:
+        """Start a process; returns once it has been executed. ``waits_for``: what pauses the reading of its streams.
 
-        :raises OSError: as ``exec`` would: missing file, no permission, no such directory.
+        :raises OSError: as ``exec`` would: missing file, no permission, no such directory; and as
+            ``ProcessSpec.encoded``.
         """
         loop = asyncio.get_running_loop()
+        argv, environment, cwd = spec.encoded()
         stdin, stdin_ours = os.pipe()
         os.set_blocking(stdin_ours, False)
         opened = [_open_output(spec.emulate_tty) for _ in range(2)]
         names: tuple[Stream, Stream] = ("stdout", "stderr")
         pumps = tuple(
-            OutputPump(ours, lambda data, name=name: on_output(name, data), loop)  # type: ignore[misc]
+            OutputPump(ours, partial(on_output, name), loop, waits_for.get(name, frozenset()))
             for name, (ours, _) in zip(names, opened, strict=True)
         )
         self._count += 1
         child = Child(self, self._count, stdin_ours, pumps)
         self._children[self._count] = child
         theirs = [stdin, *(descriptor for _, descriptor in opened)]
-        environment = {os.fsencode(name): os.fsencode(value) for name, value in spec.environment.items()}
-        argv = [os.fsencode(word) for word in spec.argv]
-        self.send(
-            "spawn", self._count, argv, environment, os.fsencode(spec.cwd or os.getcwd()), descriptors=theirs
-        )
+        self.send("spawn", self._count, argv, environment, cwd, descriptors=theirs)
         try:
             await asyncio.shield(child.started)
         except BaseException:  # cancelled: whatever may have started has no owner
             self.send("signal", child.identifier, int(signal.SIGKILL))
             child.release()
             raise
-        if not self._paused:
-            for pump in pumps:
+        for pump in pumps:
+            if not pump.waits_for & self._holds:
                 pump.resume()
         return child
 
     def send(self, *message: Message, descriptors: Sequence[int] = ()) -> None:
         self._channel.send(*message, descriptors=descriptors)
 
-    def pause_output(self) -> None:
-        """Read nothing more from any child, present or coming, until ``resume_output``."""
-        self._paused = True
+    def hold_output(self, hold: Hold) -> None:
+        """Read nothing more from streams that wait for it, of present and coming children, until it is released."""
+        self._holds.add(hold)
         for child in self._children.values():
             for pump in child.pumps:
-                pump.pause()
+                if hold in pump.waits_for:
+                    pump.pause()
 
-    def resume_output(self) -> None:
-        self._paused = False
+    def release_output(self, *holds: Hold) -> None:
+        self._holds.difference_update(holds)
         for child in self._children.values():
-            if child.started.done():
-                for pump in child.pumps:
+            for pump in child.pumps:
+                if child.started.done() and not pump.waits_for & self._holds:
                     pump.resume()
 
     def forget(self, identifier: int) -> None:
@@ -236,12 +284,15 @@ class ProcessTree:
         self._channel.close()
         loop = asyncio.get_running_loop()
         await asyncio.shield(loop.run_in_executor(None, self._process.wait))
+        self._survivors.close()
         for child in list(self._children.values()):
             child.release()
             if not child.exited.done():
                 child.exited.cancel()
 
     def _on_message(self, kind: str, identifier: int, rest: list[object]) -> None:
+        if kind == "interrupted":
+            self.on_interrupt()
         child = self._children.get(identifier)
         if child is None:
             return  # given up in the meantime
@@ -255,7 +306,7 @@ class ProcessTree:
             child.exited.set_result(int(str(rest[0])))
 
     def _on_lost(self) -> None:
-        """The warden was killed. Its children died with it; end what they had started in their groups."""
+        """The warden was killed. Its children died with it; end what they had started."""
         for child in list(self._children.values()):
             if child.running:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -263,6 +314,7 @@ class ProcessTree:
                 child.exited.set_result(-signal.SIGKILL)
             elif not child.started.done():
                 child.started.set_exception(RuntimeFailure("the warden process was killed"))
+        self._survivors.end()
         if self.lost is not None and not self.lost.done():
             self.lost.set_result(None)
 

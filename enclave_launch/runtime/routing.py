@@ -8,12 +8,12 @@ rendered by the chunk, not one by one: tens of megabytes a second pass without a
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Literal
 
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.runtime.launch_log import LaunchLog
-from enclave_launch.runtime.process_tree import Stream
+from enclave_launch.runtime.process_tree import Hold, Stream
 from enclave_launch.runtime.sinks import Sink
 
 Source = Literal["stdout", "stderr", "both"]
@@ -96,6 +96,13 @@ class OutputRouter:
         self._buffers: dict[Stream, LineBuffer] = {"stdout": LineBuffer(), "stderr": LineBuffer()}
         self._sinks = {stream: tuple(_sinks_of(log, name, stream, routes)) for stream in self._buffers}
 
+    @property
+    def waits_for(self) -> Mapping[Stream, frozenset[Hold]]:
+        """What may pause each stream: a full queue of the files, or of the screen."""
+        return {
+            stream: _holds(self._log, [sink for sink, _ in sinks]) for stream, sinks in self._sinks.items()
+        }
+
     def feed(self, stream: Stream, data: bytes) -> None:
         self._emit(stream, self._buffers[stream].feed(data))
 
@@ -110,7 +117,8 @@ class OutputRouter:
         if not lines.isascii():
             lines = lines.decode(errors="replace").encode()
         for sink, timed in self._sinks[stream]:
-            self._log.writer.write(sink, self._render(lines, f"{time.time():.7f} " if timed else ""))
+            text = self._render(lines, f"{time.time():.7f} " if timed else "")
+            self._log.write(sink, text, kept=len(self._sinks[stream]) > 1)
 
     def _render(self, lines: bytes, time_stamp: str) -> bytes:
         if self._render_line is None:
@@ -122,6 +130,12 @@ class OutputRouter:
 def prefixed(lines: bytes, prefix: bytes) -> bytes:
     """``lines``, which ends with a line end, with ``prefix`` before each."""
     return prefix + lines[:-1].replace(b"\n", b"\n" + prefix) + b"\n"
+
+
+def _holds(log: LaunchLog, sinks: Sequence[Sink]) -> frozenset[Hold]:
+    if log.screen not in sinks:
+        return frozenset({"files"} if sinks else set())
+    return frozenset({"screen", "screen only"}) if len(sinks) == 1 else frozenset({"screen", "files"})
 
 
 def _sinks_of(log: LaunchLog, name: str, stream: Stream, routes: Routes) -> Iterable[tuple[Sink, bool]]:

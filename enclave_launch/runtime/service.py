@@ -24,14 +24,15 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, TextIO
 
 from enclave_launch.description.events.dispatch import handle_next
-from enclave_launch.description.events.event import IncludeLaunchDescription, Shutdown
+from enclave_launch.description.events.event import Event, IncludeLaunchDescription, Shutdown
 from enclave_launch.description.events.handlers import OnIncludeLaunchDescription, OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.location import place_of
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.evaluation.evaluate import Arguments, evaluation_surroundings, top_description
+from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.gate import EnclaveGate
-from enclave_launch.runtime.launch_log import LaunchLog, Level, captured_logging
+from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging
 from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
 from enclave_launch.runtime.process_tree import ProcessTree
@@ -43,8 +44,9 @@ from enclave_launch.runtime.warden_process import WardenProcess
 class RunOptions(NamedTuple):
     """How to run; what to run is decided elsewhere.
 
-    ``host_options`` go to the evaluation's host (distribution, seed of anonymous names, ...), the same as the
-    plan's. ``secrets``: environment variables no child may see. ``notices`` are said once, at the start.
+    ``log_limit``: bytes after which a log file is begun anew. ``host_options`` go to the evaluation's host
+    (distribution, seed of anonymous names, ...), the same as the plan's. ``secrets``: environment variables no child
+    may see. ``notices`` are said once, at the start.
     """
 
     noninteractive: bool = False
@@ -55,6 +57,7 @@ class RunOptions(NamedTuple):
     secrets: frozenset[str] = frozenset()
     notices: tuple[str, ...] = ()
     needs_ros_services: bool = False
+    log_limit: int | None = None
     host_options: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -74,11 +77,11 @@ def run_launch(
         main thread.
     """
     _require_signals()
+    chosen = options or RunOptions()
+    started = warden or WardenProcess(interactive=not chosen.noninteractive)
 
     async def main() -> int:
-        service = LaunchService(
-            launch_file, arguments, gate=gate, options=options or RunOptions(), warden=warden
-        )
+        service = LaunchService(launch_file, arguments, gate=gate, options=chosen, warden=started)
         with _signals_to(service):
             return await service.run()
 
@@ -137,6 +140,7 @@ class LaunchService:
         async with AsyncExitStack() as stack:
             stack.callback(_running.release)
             tree = ProcessTree(self._warden)  # first: the warden starts up while we go on
+            tree.on_interrupt = lambda: self.on_signal(SIGINT)
             await stack.enter_async_context(tree)
             stack.enter_context(_many_descriptors())
             self._services = self._ros_services()
@@ -218,6 +222,8 @@ class LaunchService:
         """Handle one event, or wait for something to happen. Raises ``_Over`` when there is nothing more."""
         queue = self._context._event_queue
         if not queue.empty():
+            if self._options.debug:
+                self._say_event(queue.next)
             self._futures += [future for _, future in handle_next(self._context, lambda *_: None)]
             await asyncio.sleep(0)
             return
@@ -228,6 +234,11 @@ class LaunchService:
             self.shut_down("idle")
             return
         await self._wait_for(pending)
+
+    def _say_event(self, event: Event) -> None:
+        """With --debug, as launch does: each event when its turn comes."""
+        name = getattr(event, "process_name", None)
+        self._say("DEBUG", f"processing event: {event.name}{f' of {name}' if name else ''}")
 
     def _pending(self) -> list[asyncio.Future[Any]]:
         self._futures += self._context._completion_futures
@@ -294,18 +305,18 @@ class LaunchService:
         self._say(level, message)
 
     def _open_log(self, tree: ProcessTree) -> LaunchLog:
-        loop = asyncio.get_running_loop()
         directory = make_log_directory(
             log_base_directory(os.environ), datetime.now(), socket.gethostname(), os.getpid()
         )
-
-        def resume() -> None:
-            loop.call_soon_threadsafe(tree.resume_output)
-
-        writer = SinkWriter(tree.pause_output, resume)
-        return LaunchLog(
-            directory, ScreenSink(self._options.screen or sys.stdout), writer, os.environ, self._options.debug
+        pressure = BackPressure(tree)
+        writers = Writers(
+            screen=SinkWriter(pressure.on_screen_full, pressure.on_screen_drained),
+            files=SinkWriter(pressure.on_files_full, pressure.on_files_drained),
         )
+        screen = ScreenSink(self._options.screen or sys.stdout)
+        log = LaunchLog(directory, screen, writers, os.environ, self._options.debug, self._options.log_limit)
+        pressure.attach(log)
+        return log
 
     def _say(self, level: Level, message: str) -> None:
         self._log.log(level, "launch", message)

@@ -1,13 +1,13 @@
-"""Where lines end up: the screen and files, written by one thread so that a slow terminal stalls nobody.
+"""Where lines end up: the screen and files, each written by a thread of its own, so that a stopped terminal holds up
+neither the robot nor its logs.
 
-``SinkWriter.write`` only queues. Above ``HIGH_WATER`` queued bytes it asks the pumps of all children to
-pause and below ``LOW_WATER`` to go on: nothing is lost, memory stays bounded, and the event loop never
-waits for a reader. Touches the world: writes.
+``SinkWriter.write`` only queues. Above ``HIGH_WATER`` queued bytes it says so (``on_full``) and below ``LOW_WATER``
+again; who writes then waits or leaves out, so memory stays bounded and the event loop never waits for a reader.
+Touches the world: writes.
 """
 
 from __future__ import annotations
 
-import contextlib
 import os
 import select
 import threading
@@ -49,22 +49,49 @@ class ScreenSink:
 
 
 class FileSink:
-    """Appends to a file, opened on first use and again after something (logrotate) moved it away."""
+    """Appends to a file, opened on first use and again after something (logrotate) moved it away.
 
-    def __init__(self, path: Path) -> None:
+    ``tell`` gets one line when it cannot be written and one when it can again. At ``limit`` bytes the file becomes
+    ``<name>.1``, in place of an older one, and a new one is begun; ``None``: no limit.
+    """
+
+    def __init__(
+        self, path: Path, tell: Callable[[str], None] = lambda text: None, limit: int | None = None
+    ) -> None:
         self.path = path
+        self._tell = tell
+        self._limit = limit
         self._descriptor = -1
         self._identity: tuple[int, int] | None = None
+        self._broken = False
 
     def write(self, data: bytes) -> None:
-        with contextlib.suppress(OSError):  # a full disk must not end the launch
+        try:
             self._reopen_if_moved()
+            if self._limit is not None:
+                self._begin_anew_at(self._limit - len(data))
             _write_all(self._descriptor, data)
+        except OSError as error:  # a full disk must not end the launch
+            if not self._broken:
+                self._tell(
+                    f"cannot write {self.path}: {error.strerror}; what belongs there is lost until it can be"
+                )
+            self._broken = True
+            return
+        if self._broken:
+            self._tell(f"{self.path} can be written again; it lacks what came in between")
+        self._broken = False
 
     def close(self) -> None:
         if self._descriptor >= 0:
             os.close(self._descriptor)
             self._descriptor, self._identity = -1, None
+
+    def _begin_anew_at(self, size: int) -> None:
+        present = os.fstat(self._descriptor).st_size
+        if present and present > size:
+            self.path.replace(self.path.with_name(f"{self.path.name}.1"))
+            self._reopen_if_moved()
 
     def _reopen_if_moved(self) -> None:
         try:
@@ -81,7 +108,7 @@ class FileSink:
 
 
 class SinkWriter:
-    """``on_full`` is called in the caller's thread, ``on_drained`` in the writer's."""
+    """One thread and its queue. ``on_full`` is called in the caller's thread, ``on_drained`` in the writer's."""
 
     def __init__(self, on_full: Callable[[], None], on_drained: Callable[[], None]) -> None:
         self._on_full, self._on_drained = on_full, on_drained
@@ -102,6 +129,10 @@ class SinkWriter:
             self._changed.notify()
         if became_full:
             self._on_full()
+
+    @property
+    def full(self) -> bool:
+        return self._full
 
     def close(self) -> None:
         """Write what is queued, at most for ``FLUSH_TIMEOUT``: a terminal stopped with Ctrl-S must not

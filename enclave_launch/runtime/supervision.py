@@ -2,22 +2,34 @@
 insistence.
 
 Takes what evaluation decided and a ``ProcessTree``; reports to ``Watcher``, which is the launch's event
-queue. Semantics and messages of launch/actions/execute_local.py. Two things are stricter than there:
-signals reach the whole process group, and a successor never meets what its predecessor left running.
+queue. Semantics and messages of launch/actions/execute_local.py. Three things are stricter than there: the end
+reaches the whole process group, a successor never meets what its predecessor left running, and a process that
+ends as soon as it starts, again and again, is started at growing distances.
 """
 
 from __future__ import annotations
 
 import asyncio
 import contextlib
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from signal import SIGINT, SIGKILL, SIGTERM, Signals
 from typing import NamedTuple, Protocol
 
 from enclave_launch.runtime.launch_log import Level
-from enclave_launch.runtime.process_tree import Child, ProcessSpec, ProcessTree, Stream
+from enclave_launch.runtime.process_tree import Child, Hold, ProcessSpec, ProcessTree, Stream
 
 Log = Callable[[Level, str], None]
+
+
+SHORT_LIFE = 1.0  # seconds
+TOLERATED = 5  # short lives in a row that are answered at once, as launch does
+LONGEST_PAUSE = 5.0  # seconds
+
+
+def pause_after(short_lives: int) -> float:
+    """Seconds to wait before the next start after so many lives below ``SHORT_LIFE`` in a row."""
+    over = short_lives - TOLERATED
+    return 0.0 if over <= 0 else min(LONGEST_PAUSE, 0.1 * 2.0 ** min(over - 1, 10))
 
 
 class LifeRules(NamedTuple):
@@ -36,7 +48,10 @@ class Patience(NamedTuple):
 
 
 class Watcher(Protocol):
-    """Told in the event loop, in the order things happen."""
+    """Told in the event loop, in the order things happen. ``waits_for``: what may pause the reading of its output."""
+
+    @property
+    def waits_for(self) -> Mapping[Stream, frozenset[Hold]]: ...
 
     def on_started(self, pid: int) -> None: ...
 
@@ -85,13 +100,16 @@ class SupervisedProcess:
 
     async def run(self) -> Outcome:
         """From the first start to the last exit."""
-        retries = 0
+        retries = short_lives = 0
+        clock = asyncio.get_running_loop().time
         try:
             while True:
+                began = clock()
                 returncode = await self._run_once()
                 if returncode is None or not self._may_respawn(retries):
                     break
-                if await self._ending_within(self._rules.respawn_delay):
+                short_lives = short_lives + 1 if clock() - began < SHORT_LIFE else 0
+                if await self._ending_within(self._delay(short_lives)):
                     break
                 self._clear_away()
                 retries += 1
@@ -111,12 +129,13 @@ class SupervisedProcess:
         else:
             self._begin_escalation(patience, quiet)
 
-    def signal(self, number: Signals, *, quiet: bool = False) -> None:
+    def signal(self, number: Signals, *, quiet: bool = False, whole_group: bool = True) -> None:
+        """``whole_group``: to what it started, too; else to the process alone, as a launch file's ``SignalProcess``."""
         if self._child is None or not self._child.running:
             return
         if not quiet:
             self._log("INFO", f"sending signal '{number.name}' to process[{self.name}]")
-        self._child.signal(number)
+        self._child.signal(number, whole_group=whole_group)
 
     async def _run_once(self) -> int | None:
         if self._ending.is_set():
@@ -125,7 +144,7 @@ class SupervisedProcess:
             spec = await self._prepare()
             if self._ending.is_set():
                 return None
-            child = await self._tree.spawn(spec, self._watcher.on_output)
+            child = await self._tree.spawn(spec, self._watcher.on_output, self._watcher.waits_for)
         except OSError as error:
             self._log("ERROR", f"cannot start process: {error.strerror}: {error.filename!r}")
             return None
@@ -158,6 +177,17 @@ class SupervisedProcess:
     def _may_respawn(self, retries: int) -> bool:
         limit = self._rules.max_retries
         return self._rules.respawn and (limit < 0 or retries < limit)
+
+    def _delay(self, short_lives: int) -> float:
+        pause = pause_after(short_lives)
+        if pause <= self._rules.respawn_delay:
+            return self._rules.respawn_delay
+        self._log(
+            "WARNING",
+            f"process ended within {SHORT_LIFE:g} s of its start {short_lives} times in a row; "
+            f"the next start is in {pause:g} s",
+        )
+        return pause
 
     async def _ending_within(self, seconds: float) -> bool:
         if seconds > 0:

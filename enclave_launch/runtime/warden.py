@@ -1,7 +1,7 @@
 """The warden: a small single-threaded process between the launcher and everything it starts.
 
-Runs as a script of its own (``python -I -S warden.py FD``), imports nothing of this project, and talks over
-one Unix stream socket, its descriptor ``FD``. Touches the world: forks, executes, signals, reaps.
+Runs as a script of its own (``python -I -S warden.py FD [TERMINAL]``), imports nothing of this project, and talks
+over one Unix stream socket, its descriptor ``FD``. Touches the world: forks, executes, signals, reaps.
 
 Why it exists. No orphan may survive the launcher, even when that is killed with SIGKILL and cannot clean up:
 
@@ -10,12 +10,20 @@ Why it exists. No orphan may survive the launcher, even when that is killed with
 * the warden is a child subreaper (``PR_SET_CHILD_SUBREAPER``): grandchildren that lose their parent, daemons
   included, become its own children and are found and reaped, so there are no zombies either;
 * when the launcher's end of the socket closes, for whatever reason, the warden ends the whole tree and then
-  itself.
+  itself;
+* it is the last process that a kernel short of memory should kill (``oom_score_adj``, where allowed). If it is killed
+  all the same, the launcher clears away what it leaves (``survivors``).
+
+Sessions and the terminal. A child leads a session of its own, so that its group can be signalled as a whole. In an
+interactive launch (``TERMINAL``, a descriptor of the controlling terminal) it leads a process group in the launcher's
+session instead and may use the terminal: when the kernel stops it for reading a password from there (SIGTTIN,
+SIGTTOU), the warden makes its group the foreground one, as a shell does for ``fg``, until it ends.
 
 Messages are marshalled tuples behind a four-byte length. ``id`` is the launcher's number for a child.
 
     launcher -> warden   ("spawn", id, argv, env, cwd)   with three descriptors: stdin, stdout, stderr
                          ("signal", id, number)          to the process group of the child
+                         ("signal_one", id, number)      to the child alone
                          ("sweep", id, pid)              SIGKILL to what it left running when it ended
     warden -> launcher   ("started", id, pid) | ("failed", id, errno, file) | ("exited", id, returncode)
 """
@@ -42,7 +50,11 @@ if TYPE_CHECKING:
 HEADER = struct.Struct("!I")
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PR_SET_CHILD_SUBREAPER = 36
-IGNORED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGPIPE)
+IGNORED = (
+    *(signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGPIPE),
+    *(signal.SIGTTIN, signal.SIGTTOU),  # else handing the terminal over would stop us
+)
+SAFE_FROM_OOM = -900  # oom_score_adj: -1000 is never, 0 is as everybody
 # What Python itself ignores or we ignore above must be default again in a child; nohup's SIGHUP stays
 # ignored.
 RESTORED = {*IGNORED, signal.SIGXFSZ, signal.SIGCHLD}
@@ -68,9 +80,46 @@ def load_libc() -> Any:
 LIBC: Any = None
 
 
+class Terminal:
+    """The controlling terminal of an interactive launch, lent to one process group at a time."""
+
+    def __init__(self, descriptor: int) -> None:
+        self.descriptor = descriptor
+        self.owner = os.tcgetpgrp(descriptor)  # the launcher's group
+        self.holder = 0
+        self.waiting: list[int] = []
+
+    def lend(self, group: int) -> None:
+        """To ``group`` now, or once the present holder has ended."""
+        if self.holder not in (0, group):
+            self.waiting.append(group)
+            return
+        self.holder = group
+        self._bring_forward(group)
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            os.killpg(group, signal.SIGCONT)
+
+    def ended(self, group: int) -> bool:
+        """Was it the holder's? Then the next one gets the terminal, else the launcher has it back."""
+        self.waiting = [other for other in self.waiting if other != group]
+        if self.holder != group:
+            return False
+        self.holder = 0
+        if self.waiting:
+            self.lend(self.waiting.pop(0))
+        else:
+            self._bring_forward(self.owner)
+        return True
+
+    def _bring_forward(self, group: int) -> None:
+        with contextlib.suppress(OSError):  # the terminal is gone
+            os.tcsetpgrp(self.descriptor, group)
+
+
 class Warden:
-    def __init__(self, connection: socket.socket) -> None:
+    def __init__(self, connection: socket.socket, terminal: Terminal | None) -> None:
         self.connection = connection
+        self.terminal = terminal
         self.buffer = b""
         self.descriptors: list[int] = []
         self.pids: dict[int, int] = {}  # id -> pid, of children that have not been reaped
@@ -135,6 +184,8 @@ class Warden:
                     os.close(descriptor)
         elif kind == "signal":
             self.signal_group(identifier, rest[0])
+        elif kind == "signal_one":
+            self.signal_one(identifier, rest[0])
         elif kind == "sweep":
             self.sweep(rest[0])
 
@@ -152,7 +203,7 @@ class Warden:
             try:
                 pid = os.fork()
                 if pid == 0:
-                    become(argv, env, cwd, streams, report_writer, parent)
+                    become(argv, env, cwd, streams, report_writer, parent, own_session=self.terminal is None)
             finally:
                 os.close(report_writer)
             failure = reader.read()
@@ -174,24 +225,42 @@ class Warden:
         if number == signal.SIGKILL:
             kill_all(descendants(pid), number)
 
-    def sweep(self, session: int) -> None:
-        """SIGKILL to what a child left running in its session when it ended."""
-        if session not in self.identifiers:
-            kill_all({pid for pid in descendants(os.getpid()) if session_of(pid) == session}, signal.SIGKILL)
+    def signal_one(self, identifier: int, number: int) -> None:
+        pid = self.pids.get(identifier)
+        if pid is not None:
+            kill_all({pid}, number)
+
+    def sweep(self, leader: int) -> None:
+        """SIGKILL to what a child left running in its session, or group, when it ended."""
+        if leader not in self.identifiers:
+            belongs = session_of if self.terminal is None else group_of
+            kill_all({pid for pid in descendants(os.getpid()) if belongs(pid) == leader}, signal.SIGKILL)
 
     def reap(self) -> bool:
         """Collect all that ended. False when nothing is left to wait for."""
         while True:
             try:
-                pid, status = os.waitpid(-1, os.WNOHANG)
+                pid, status = os.waitpid(-1, os.WNOHANG | (os.WUNTRACED if self.terminal else 0))
             except ChildProcessError:
                 return False
             if pid == 0:
                 return True
+            if os.WIFSTOPPED(status):
+                self.on_stopped(pid, os.WSTOPSIG(status))
+                continue
+            held_terminal = self.terminal is not None and self.terminal.ended(pid)
             identifier = self.identifiers.pop(pid, None)
             if identifier is not None:  # else an orphan of one of our children
                 del self.pids[identifier]
-                self.send("exited", identifier, os.waitstatus_to_exitcode(status))
+                code = os.waitstatus_to_exitcode(status)
+                self.send("exited", identifier, code)
+                if held_terminal and code == -signal.SIGINT:  # Ctrl-C was meant for the launch, too
+                    self.send("interrupted", identifier)
+
+    def on_stopped(self, pid: int, number: int) -> None:
+        """It asks for the terminal, or somebody stopped it for reasons of his own."""
+        if self.terminal is not None and number in (signal.SIGTTIN, signal.SIGTTOU):
+            self.terminal.lend(pid)
 
     def end_everything(self) -> None:
         # What children left behind when they ended has no use for SIGINT, and shells make it ignore that.
@@ -215,12 +284,23 @@ class Warden:
 
 
 def become(
-    argv: list[bytes], env: dict[bytes, bytes], cwd: bytes, streams: list[int], report: int, parent: int
+    argv: list[bytes],
+    env: dict[bytes, bytes],
+    cwd: bytes,
+    streams: list[int],
+    report: int,
+    parent: int,
+    *,
+    own_session: bool,
 ) -> None:
     """In the forked child: turn into the program; on failure tell why through ``report`` and end."""
     path = argv[0]
     try:
-        os.setsid()
+        if own_session:
+            os.setsid()
+        else:
+            os.setpgid(0, 0)
+        set_oom_score(OOM_SCORE)
         prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
         if os.getppid() != parent:  # the warden died before the line above took effect
             os._exit(1)
@@ -235,6 +315,10 @@ def become(
         os.execvpe(argv[0], argv, env)
     except OSError as error:
         os.write(report, marshal.dumps((error.errno or errno.EIO, path)))
+    except (
+        ValueError
+    ):  # the launcher looks for what no exec takes; whatever it missed must not pass for a start
+        os.write(report, marshal.dumps((errno.EINVAL, path)))
     finally:
         os._exit(127)
 
@@ -254,33 +338,63 @@ def session_of(pid: int) -> int:
         return -1
 
 
+def group_of(pid: int) -> int:
+    try:
+        return os.getpgid(pid)
+    except ProcessLookupError:
+        return -1
+
+
 def kill_all(pids: set[int], number: int) -> None:
     for pid in pids:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(pid, number)
 
 
-def descendants(root: int) -> set[int]:
-    """All live processes below ``root``, from /proc; empty where there is none."""
-    children: dict[int, list[int]] = {}
+def children_by_parent() -> dict[int, set[int]]:
+    """Every live process of the machine below its parent, from /proc; empty where there is none."""
+    children: dict[int, set[int]] = {}
     try:
         entries = os.listdir("/proc")
     except OSError:
-        return set()
+        return children
     for entry in entries:
         if entry.isdigit():
             with contextlib.suppress(OSError):
                 with open(f"/proc/{entry}/stat", "rb") as stat:
                     # "pid (name) state ppid": the name may hold spaces and parentheses
                     fields = stat.read().rpartition(b")")[2].split()
-                children.setdefault(int(fields[1]), []).append(int(entry))
+                children.setdefault(int(fields[1]), set()).add(int(entry))
+    return children
+
+
+def descendants(root: int) -> set[int]:
+    """All live processes below ``root``."""
+    children = children_by_parent()
     found: set[int] = set()
     waiting = [root]
     while waiting:
-        below = children.get(waiting.pop(), [])
+        below = children.get(waiting.pop(), set())
         found.update(below)
         waiting.extend(below)
     return found
+
+
+def set_oom_score(score: str) -> None:
+    """Raising one's own score is always allowed, lowering it takes a privilege (proc(5), oom_score_adj)."""
+    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w", encoding="ascii") as file:
+        file.write(score)
+
+
+def own_oom_score() -> str:
+    try:
+        with open("/proc/self/oom_score_adj", encoding="ascii") as file:
+            return file.read().strip()
+    except OSError:
+        return "0"
+
+
+OOM_SCORE = own_oom_score()  # what children get back
 
 
 def main() -> None:
@@ -291,9 +405,16 @@ def main() -> None:
         signal.signal(number, signal.SIG_IGN)
     LIBC = load_libc()
     prctl(PR_SET_CHILD_SUBREAPER, 1)
+    if int(OOM_SCORE) > SAFE_FROM_OOM:
+        set_oom_score(str(SAFE_FROM_OOM))
     connection = socket.socket(fileno=int(sys.argv[1]))
     connection.set_inheritable(False)
-    warden = Warden(connection)
+    terminal = None
+    if len(sys.argv) > 2:
+        os.setpgid(0, 0)
+        os.set_inheritable(int(sys.argv[2]), False)
+        terminal = Terminal(int(sys.argv[2]))
+    warden = Warden(connection, terminal)
     try:
         warden.run()
     finally:

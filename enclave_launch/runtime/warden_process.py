@@ -5,10 +5,12 @@ Apart from the tree and without ``asyncio``, so that it starts up while the laun
 
 from __future__ import annotations
 
+import contextlib
 import os
 import socket
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from enclave_launch.errors import RuntimeFailure
@@ -17,21 +19,23 @@ from enclave_launch.errors import RuntimeFailure
 class WardenProcess:
     """Started when made. Leaving it as a context, or closing ``connection``, ends it and all it started.
 
+    ``interactive``: its children may use the terminal that this program is in the foreground of, if it has one.
+
     :raises RuntimeFailure: it cannot be started.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, *, interactive: bool = False) -> None:
         _occupy_standard_descriptors()
         self.connection, theirs = socket.socketpair()
-        with theirs:
-            os.set_inheritable(theirs.fileno(), True)
+        with theirs, _terminal(interactive) as terminal:
+            handed = [theirs.fileno(), *terminal]
             try:
                 self.process = subprocess.Popen(
-                    [sys.executable, "-I", "-S", _script(), str(theirs.fileno())],
-                    pass_fds=[theirs.fileno()],
+                    [sys.executable, "-I", "-S", _script(), *map(str, handed)],
+                    pass_fds=handed,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
-                    start_new_session=True,
+                    start_new_session=not terminal,
                     env={},
                 )
             except OSError as error:
@@ -46,6 +50,21 @@ class WardenProcess:
     def __exit__(self, *_: object) -> None:
         self.connection.close()
         self.process.wait()
+
+
+@contextlib.contextmanager
+def _terminal(interactive: bool) -> Iterator[list[int]]:
+    """A descriptor of our controlling terminal, if we are interactive and in its foreground."""
+    try:
+        descriptor = os.open("/dev/tty", os.O_RDWR) if interactive else -1
+    except OSError:  # started without one: a service, a test runner
+        descriptor = -1
+    try:
+        in_foreground = descriptor >= 0 and os.tcgetpgrp(descriptor) == os.getpgrp()
+        yield [descriptor] if in_foreground else []
+    finally:
+        if descriptor >= 0:
+            os.close(descriptor)
 
 
 def _occupy_standard_descriptors() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 from pathlib import Path
 
 from enclave_launch.ros_rules.distro import Distro
@@ -190,9 +191,24 @@ def _add_evaluation(group: argparse._ArgumentGroup) -> None:
     )
 
 
+def size_in_bytes(text: str) -> int:
+    """``100M`` and the like. :raises argparse.ArgumentTypeError: anything else, or less than 4 KiB."""
+    found = re.fullmatch(r"(\d+)([kKmMgG]?)", text)
+    size = int(found[1]) << {"": 0, "k": 10, "m": 20, "g": 30}[found[2].lower()] if found else 0
+    if size < 4096:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size such as 500K, 100M or 2G (4K at least)")
+    return size
+
+
 def _add_running(group: argparse._ArgumentGroup) -> None:
     group.add_argument("-n", "--noninteractive", action="store_true", help="the launch has no terminal")
     group.add_argument("-d", "--debug", action="store_true", help="more output from the launcher itself")
+    group.add_argument(
+        "--log-limit",
+        metavar="SIZE",
+        type=size_in_bytes,
+        help="begin a log file anew at this size (such as 100M; the one before stays as <name>.1); default: no limit",
+    )
     group.add_argument(
         "-a",
         "--show-all-subprocesses-output",

@@ -251,6 +251,7 @@ def _run_settings(options: argparse.Namespace) -> RunSettings:
         debug=options.debug,
         allow_late=options.allow_late,
         secrets=secrets,
+        log_limit=options.log_limit,
     )
 
 

@@ -190,7 +190,7 @@ def test_bad_options_are_refused(case: str, secure_launch: SecureLaunch, tmp_pat
     assert files_below(tmp_path / "other") == {"file"}
 
 
-def test_a_program_that_is_not_there_is_known_before_anything_starts(
+def test_a_program_that_is_not_there_is_known_before_anything_secured_starts(
     secure_launch: SecureLaunch, write: Write, tmp_path: Path
 ) -> None:
     started = tmp_path / "started"
@@ -198,11 +198,21 @@ def test_a_program_that_is_not_there_is_known_before_anything_starts(
     place = f"{file}:3: <executable> program 'no_such_program' cannot be executed"
     looked = secure_launch("--dry-run", file)
     assert (looked.returncode, f"warning: {place}" in looked.stdout) == (0, True)
-    run = secure_launch(file)
+    run = secure_launch("--secure", "--keystore", tmp_path / "ks", file)
     assert run.returncode == 1
     assert place in run.stderr
     assert "nothing was started" in run.stderr
     assert not started.exists()
+
+
+def test_a_program_that_is_not_there_stops_an_unsecured_launch_as_little_as_it_stops_ros2_launch(
+    secure_launch: SecureLaunch, write: Write, tmp_path: Path
+) -> None:
+    started = tmp_path / "started"
+    run = secure_launch(write(f'<executable cmd="no_such_program"/>\n<executable cmd="touch {started}"/>'))
+    assert run.returncode == 1
+    assert "cannot start process: No such file or directory: 'no_such_program'" in run.stdout
+    assert started.exists()
 
 
 def test_secure_refuses_to_start_anything_when_one_node_has_no_manifest(

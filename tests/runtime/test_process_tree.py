@@ -14,6 +14,8 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.runtime.process_tree import Child, ProcessSpec, ProcessTree, Stream
+from enclave_launch.runtime.survivors import own_cgroup
+from enclave_launch.runtime.warden import children_by_parent
 from tests.runtime.conftest import alive, descriptors, eventually, read_pid
 
 Body = Callable[[ProcessTree], Awaitable[None]]
@@ -175,6 +177,19 @@ def test_a_signal_reaches_the_whole_process_group(tmp_path: Path) -> None:
     in_tree(body)
 
 
+def test_a_signal_for_the_process_alone_leaves_what_it_started(tmp_path: Path) -> None:
+    async def body(tree: ProcessTree) -> None:
+        script = f"sleep 60 & echo $! > {tmp_path}/pid; trap 'exit 7' USR1; while true; do sleep 0.05; done"
+        child = await tree.spawn(shell(script), Recorder())
+        inner = await asyncio.to_thread(read_pid, tmp_path / "pid")
+        await asyncio.sleep(0.2)
+        child.signal(signal.SIGUSR1, whole_group=False)
+        assert await child.wait() == 7
+        assert alive(inner)
+
+    in_tree(body)
+
+
 def test_all_output_arrives_before_the_exit_is_told_even_from_a_paused_reader() -> None:
     async def body(tree: ProcessTree) -> None:
         recorder = Recorder()
@@ -297,3 +312,102 @@ def _descriptors_of(pid: int) -> int:
 
 def _children_of(pid: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+
+
+DAEMON = "setsid sh -c 'echo $$ > {pid}; exec sleep 60' >/dev/null 2>&1 & sleep 60"
+
+
+async def _lose_the_warden(tree: ProcessTree) -> None:
+    assert tree.lost is not None
+    os.kill(tree.warden_pid, signal.SIGKILL)
+    await asyncio.wait_for(tree.lost, 10)
+
+
+def test_a_killed_warden_takes_its_children_and_even_their_daemons_with_it(tmp_path: Path) -> None:
+    async def body(tree: ProcessTree) -> None:
+        child = await tree.spawn(shell(DAEMON.format(pid=tmp_path / "pid")), Recorder())
+        daemon = await asyncio.to_thread(read_pid, tmp_path / "pid")
+        await _lose_the_warden(tree)
+        assert await asyncio.to_thread(eventually, lambda: not alive(daemon) and not alive(child.pid))
+
+    in_tree(body)
+
+
+def test_children_that_the_program_had_before_survive_a_killed_warden(tmp_path: Path) -> None:
+    own = subprocess.Popen(["sleep", "60"], start_new_session=True)
+    try:
+
+        async def body(tree: ProcessTree) -> None:
+            await tree.spawn(shell("sleep 60"), Recorder())
+            await _lose_the_warden(tree)
+
+        in_tree(body)
+        assert own.poll() is None
+    finally:
+        own.kill()
+        own.wait()
+
+
+def test_a_program_is_a_subreaper_only_while_its_launch_runs(tmp_path: Path) -> None:
+    async def body(tree: ProcessTree) -> None:
+        await finished(tree, shell("true"))
+
+    before = children_by_parent().get(os.getpid(), set())
+    in_tree(body)
+    subprocess.run(
+        ["sh", "-c", f"setsid sh -c 'echo $$ > {tmp_path}/pid; exec sleep 60' >/dev/null 2>&1 &"], check=True
+    )
+    orphan = read_pid(tmp_path / "pid")
+    try:
+        assert children_by_parent().get(os.getpid(), set()) <= before
+    finally:
+        os.kill(orphan, signal.SIGKILL)
+
+
+IN_A_CGROUP = """
+import asyncio, os, sys
+from pathlib import Path
+from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
+
+async def main():
+    async with ProcessTree() as tree:
+        spec = ProcessSpec(("cat", "/proc/self/cgroup"), dict(os.environ))
+        child = await tree.spawn(spec, lambda _, data: sys.stdout.write(data.decode()))
+        await child.wait()
+
+asyncio.run(main())
+print(sorted(path.name for path in Path("{delegated}").glob("enclave-launch-*")))
+"""
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may mark a cgroup as delegated here")
+def test_in_a_delegated_cgroup_the_launch_has_one_of_its_own_and_leaves_none(tmp_path: Path) -> None:
+    """Run by a shell in a cgroup that is marked as systemd marks it."""
+    ours = own_cgroup()
+    if ours is None:
+        pytest.skip("this machine has no version 2 hierarchy of cgroups")
+    delegated = ours / f"delegated-{os.getpid()}"
+    delegated.mkdir()
+    try:
+        os.setxattr(delegated, "user.delegate", b"1")
+        program = tmp_path / "program.py"
+        program.write_text(IN_A_CGROUP.format(delegated=delegated))
+        script = f"echo $$ > {delegated}/cgroup.procs; exec {sys.executable} {program}"
+        result = subprocess.run(["sh", "-c", script], capture_output=True, text=True)
+        assert f"/{delegated.name}/enclave-launch-" in result.stdout, result
+        assert result.stdout.splitlines()[-1] == "[]"
+    finally:
+        delegated.rmdir()
+
+
+def test_children_keep_the_oom_score_that_we_were_started_with() -> None:
+    async def body(tree: ProcessTree) -> None:
+        own = Path("/proc/self/oom_score_adj").read_bytes()
+        assert (await finished(tree, shell("cat /proc/self/oom_score_adj")))[1]["stdout"] == own
+        allowed = subprocess.run(
+            ["sh", "-c", "echo -900 > /proc/self/oom_score_adj"], stderr=subprocess.DEVNULL
+        )
+        expected = b"-900\n" if allowed.returncode == 0 else own
+        assert Path(f"/proc/{tree.warden_pid}/oom_score_adj").read_bytes() == expected
+
+    in_tree(body)

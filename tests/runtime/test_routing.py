@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.runtime.launch_log import LaunchLog
+from enclave_launch.runtime.launch_log import LaunchLog, Writers
 from enclave_launch.runtime.routing import (
     LONGEST_LINE,
     LineBuffer,
@@ -29,8 +29,10 @@ class Outputs:
     ) -> None:
         self.directory = directory
         self.stream = io.StringIO()
-        writer = SinkWriter(lambda: None, lambda: None)
-        self.log = LaunchLog(directory, ScreenSink(self.stream), writer, environment or {}, debug)
+        writers = Writers(
+            screen=SinkWriter(lambda: None, lambda: None), files=SinkWriter(lambda: None, lambda: None)
+        )
+        self.log = LaunchLog(directory, ScreenSink(self.stream), writers, environment or {}, debug)
 
     def close(self) -> dict[str, str]:
         """What is where; times in launch.log are shown as T."""

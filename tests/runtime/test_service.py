@@ -407,6 +407,8 @@ def test_two_hundred_processes_in_one_launch(tmp_path: Path) -> None:
 def test_two_hundred_respawns_leak_neither_descriptors_nor_memory_nor_handlers(tmp_path: Path) -> None:
     prelude = """
         import os, sys
+        from enclave_launch.runtime import supervision
+        supervision.TOLERATED = 1000  # short lives in a row, before starts are put off
         def measure(context):
             pages = int(open("/proc/self/statm").read().split()[1])
             handlers = len(context._event_handlers.all())
@@ -431,3 +433,173 @@ def test_fifty_megabytes_to_the_screen_and_the_log_without_loss(tmp_path: Path) 
     assert screen.count(b"\n[a-1] ") == 6_500_000
     assert b"\n[a-1] 6500000\n[INFO] [a-1]: process has finished cleanly" in screen
     assert (launch.logs / "latest" / "launch.log").read_bytes().count(b" [a-1] ") == 6_500_000
+
+
+def in_a_terminal(tmp_path: Path, actions: str, *, noninteractive: bool = False) -> tuple[int, int]:
+    """A launch in the foreground of a terminal of its own: its pid and the terminal's other end."""
+    file = tmp_path / "test.launch.py"
+    file.write_text(
+        f"{PRELUDE}\ndef generate_launch_description():\n    return LaunchDescription([{actions}])\n"
+    )
+    program = PROGRAM.format(noninteractive=noninteractive, debug=False)
+    pid, terminal = pty.fork()
+    if pid == 0:
+        os.environ["ROS_LOG_DIR"] = str(tmp_path / "log")
+        os.execv(sys.executable, [sys.executable, "-c", program, str(file)])
+    return pid, terminal
+
+
+ASKS = "import getpass; print('got', getpass.getpass('secret? '), flush=True)"
+
+
+def test_a_child_of_an_interactive_launch_can_ask_for_a_password(tmp_path: Path) -> None:
+    """As sudo, ssh and gdb do: through the controlling terminal, whatever its streams are."""
+    pid, terminal = in_a_terminal(tmp_path, f'py("{ASKS}")')
+    try:
+        seen = read_until(terminal, b"secret? ")
+        time.sleep(0.2)  # it turns the echo off, which discards what was typed before
+        os.write(terminal, b"open sesame\n")
+        seen += read_until(terminal, None)
+    finally:
+        os.close(terminal)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0, seen
+    assert b"[a-1] got open sesame" in seen
+
+
+def test_children_of_a_launch_without_a_terminal_have_none(tmp_path: Path) -> None:
+    pid, terminal = in_a_terminal(
+        tmp_path, """sh("(: < /dev/tty) 2>/dev/null && echo one || echo none")""", noninteractive=True
+    )
+    try:
+        seen = read_until(terminal, None)
+    finally:
+        os.close(terminal)
+    os.waitpid(pid, 0)
+    assert b"[a-1] none" in seen
+
+
+def test_two_children_that_ask_get_the_terminal_one_after_the_other(tmp_path: Path) -> None:
+    pid, terminal = in_a_terminal(tmp_path, f'py("{ASKS}"), py("{ASKS}", name="b")')
+    try:
+        seen = b""
+        for number in (1, 2):
+            while seen.count(b"secret? ") < number:
+                seen += os.read(terminal, 1 << 16)
+            time.sleep(0.2)
+            os.write(terminal, b"open sesame\n")
+        seen += read_until(terminal, None)
+    finally:
+        os.close(terminal)
+    assert os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1]) == 0, seen
+    assert b"[a-1] got open sesame" in seen
+    assert b"[b-2] got open sesame" in seen
+
+
+def test_ctrl_c_at_a_childs_prompt_ends_the_launch(tmp_path: Path) -> None:
+    prompt = (
+        "import getpass, signal; signal.signal(signal.SIGINT, signal.SIG_DFL); getpass.getpass('secret? ')"
+    )
+    pid, terminal = in_a_terminal(tmp_path, f'py("{prompt}"), sh("exec sleep 60", name="b")')
+    try:
+        seen = read_until(terminal, b"secret? ")
+        time.sleep(0.2)
+        os.write(terminal, b"\x03")
+        seen += read_until(terminal, None)
+    finally:
+        os.close(terminal)
+    os.waitpid(pid, 0)
+    assert b"user interrupted with ctrl-c (SIGINT)" in seen
+
+
+@pytest.mark.parametrize(
+    ("output_format", "why"),
+    [
+        ("{nothing} {line}", "KeyError"),
+        ("{line", "ValueError"),
+        ("{0}", "IndexError"),
+        ("{this.x}", "AttributeError"),
+    ],
+)
+def test_an_output_format_that_cannot_be_used_is_told_and_shows_in_the_exit_status(
+    output_format: str, why: str, tmp_path: Path
+) -> None:
+    status, lines = finished(tmp_path, f'sh("echo hello", output_format="{output_format}")')
+    assert status == 1
+    assert any("output_format" in line and why in line for line in lines), lines
+    assert "[a-1] hello" not in lines
+
+
+def test_a_custom_output_format_is_used(tmp_path: Path) -> None:
+    status, lines = finished(tmp_path, """sh("echo hello", output_format="<{this.name}> {line}")""")
+    assert (status, lines[1]) == (0, "<a-1> hello")
+
+
+def test_an_argument_that_the_locale_cannot_encode_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"}.items():
+        monkeypatch.setenv(name, value)
+    status, lines = finished(
+        tmp_path, 'ExecuteProcess(cmd=["echo", "gr\\u00fc\\u00df"]), sh("echo other", name="b")'
+    )
+    assert status == 1
+    assert any(
+        "does not fit the locale's encoding (ascii); set LC_ALL to a UTF-8 locale" in line for line in lines
+    ), lines
+    assert "[b-2] other" in lines
+
+
+def test_own_log_of_a_process_that_is_called_by_a_full_name(tmp_path: Path) -> None:
+    launch = Launch(tmp_path, 'sh("echo hello", name="/robot/talker", output="own_log")')
+    assert launch.wait() == 0
+    logs = {path.name: path.read_text() for path in (launch.logs / "latest").iterdir()}
+    assert logs["_robot_talker-1.log"] == "[/robot/talker-1] hello\n"
+    assert not any("cannot write" in line for line in launch.lines())
+
+
+def test_a_launch_files_signal_goes_to_the_process_and_not_to_what_it_started(tmp_path: Path) -> None:
+    script = f"sleep 60 & echo $! > {tmp_path}/pid; trap 'exit 7' USR1; while true; do sleep 0.05; done"
+    actions = f"""
+        shell := sh("{script}", on_exit=[OpaqueFunction(function=is_alive)]),
+        TimerAction(period=0.5, actions=[EmitEvent(event=SignalProcess(
+            signal_number="SIGUSR1", process_matcher=lambda action: action is shell))]),
+    """
+    prelude = f"""
+        import os
+        def is_alive(context):
+            os.kill(int(open("{tmp_path}/pid").read()), 0)
+            print("still there", flush=True)
+    """
+    _, lines = finished(tmp_path, f"*({actions})", prelude=prelude)
+    assert any("exit code 7" in line for line in lines)
+    assert "still there" in lines
+
+
+def test_debug_shows_the_events(tmp_path: Path) -> None:
+    _, lines = finished(tmp_path, 'sh("true")', debug=True)
+    events = [line.removeprefix("[DEBUG] [launch]: processing event: launch.events.") for line in lines]
+    assert "process.ProcessStarted of a-1" in events
+    assert "process.ProcessExited of a-1" in events
+
+
+def test_a_stopped_screen_holds_up_neither_the_processes_nor_their_logs(tmp_path: Path) -> None:
+    """As Ctrl-S does it: nobody reads what the launcher shows."""
+    file = tmp_path / "test.launch.py"
+    file.write_text(
+        f"{PRELUDE}\nfrom enclave_launch.runtime import back_pressure\nback_pressure.PATIENCE = 0.2\n"
+        "def generate_launch_description():\n    return LaunchDescription(["
+        f"sh('seq 1 4000000; touch {tmp_path}/both', output='both'), "
+        f"sh('seq 1 4000000; touch {tmp_path}/log', output='log', name='b')])\n"
+    )
+    environment = {**os.environ, "ROS_LOG_DIR": str(tmp_path / "log_directory")}
+    program = [sys.executable, "-c", PROGRAM.format(noninteractive=True, debug=False), str(file)]
+    with subprocess.Popen(program, stdout=subprocess.PIPE, env=environment) as launch:
+        assert launch.stdout is not None
+        assert eventually(lambda: (tmp_path / "both").exists() and (tmp_path / "log").exists(), 60)
+        screen = launch.stdout.read()
+        assert launch.wait() == 0
+    log = (tmp_path / "log_directory" / "latest" / "launch.log").read_bytes()
+    assert log.count(b" [a-1] ") == log.count(b" [b-2] ") == 4_000_000
+    missing = re.search(rb"(\d+) lines are not shown here, the screen was too slow", screen)
+    assert missing is not None
+    assert screen.count(b"[a-1] ") >= 4_000_000 - int(missing[1])

@@ -67,10 +67,44 @@ def test_a_file_moved_away_is_opened_anew(tmp_path: Path) -> None:
     assert (tmp_path / "launch.log").read_bytes() == b"after\n"
 
 
-def test_a_full_disk_costs_the_log_and_nothing_else() -> None:
-    sink = FileSink(Path("/dev/full"))
+def test_a_full_disk_costs_the_log_and_is_said_once() -> None:
+    said: list[str] = []
+    sink = FileSink(Path("/dev/full"), said.append)
     sink.write(b"lost")
+    sink.write(b"lost too")
     sink.close()
+    assert said == [
+        "cannot write /dev/full: No space left on device; what belongs there is lost until it can be"
+    ]
+
+
+def test_a_log_that_can_be_written_again_says_what_it_lacks(tmp_path: Path) -> None:
+    said: list[str] = []
+    path = tmp_path / "missing" / "launch.log"
+    sink = FileSink(path, said.append)
+    sink.write(b"lost\n")
+    path.parent.mkdir()
+    sink.write(b"kept\n")
+    sink.write(b"kept\n")
+    sink.close()
+    assert path.read_bytes() == b"kept\nkept\n"
+    assert [text.split(";")[0] for text in said] == [
+        f"cannot write {path}: No such file or directory",
+        f"{path} can be written again",
+    ]
+
+
+def test_a_log_with_a_limit_keeps_one_older_file_and_one_without_grows(tmp_path: Path) -> None:
+    limited = FileSink(tmp_path / "limited.log", limit=10)
+    unlimited = FileSink(tmp_path / "unlimited.log")
+    for number in range(5):
+        for sink in (limited, unlimited):
+            sink.write(f"line{number}\n".encode())
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == {
+        "limited.log": "line4\n",
+        "limited.log.1": "line3\n",
+        "unlimited.log": "line0\nline1\nline2\nline3\nline4\n",
+    }
 
 
 def test_a_non_blocking_standard_output_still_gets_everything() -> None:

@@ -7,15 +7,23 @@ import os
 import re
 import signal
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
+from types import MappingProxyType
 
 import pytest
 
 from enclave_launch.errors import ProvisionError
 from enclave_launch.runtime.launch_log import Level
-from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree, Stream
-from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
+from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, Stream
+from enclave_launch.runtime.supervision import (
+    TOLERATED,
+    LifeRules,
+    Outcome,
+    Patience,
+    SupervisedProcess,
+    pause_after,
+)
 from tests.runtime.conftest import alive, eventually, read_pid
 
 STUBBORN = "trap '' INT TERM; echo ready; while true; do sleep 0.05; done"
@@ -30,6 +38,8 @@ class Story:
         self.exits: list[int] = []
         self.output = b""
         self.lines: list[tuple[Level, str]] = []
+
+    waits_for: Mapping[Stream, frozenset[Hold]] = MappingProxyType({})
 
     def on_started(self, pid: int) -> None:
         self.pids.append(pid)
@@ -206,3 +216,41 @@ def test_a_refusal_to_prepare_starts_nothing_and_reaches_the_caller() -> None:
     with pytest.raises(ProvisionError, match="read-only"):
         asyncio.run(main())
     assert story.pids == []
+
+
+def test_the_first_short_lives_are_answered_at_once_and_then_the_pauses_grow_to_five_seconds() -> None:
+    assert [pause_after(lives) for lives in range(TOLERATED + 1)] == [0.0] * (TOLERATED + 1)
+    assert [pause_after(TOLERATED + n) for n in range(1, 9)] == [0.1, 0.2, 0.4, 0.8, 1.6, 3.2, 5.0, 5.0]
+    assert pause_after(10**9) == 5.0
+
+
+def test_a_process_that_ends_at_once_again_and_again_is_started_at_growing_distances_and_that_is_said() -> (
+    None
+):
+    _, story = lived("exit 1", LifeRules(respawn=True, max_retries=TOLERATED + 1))
+    put_off = [text for level, text in story.lines if level == "WARNING"]
+    assert put_off == [
+        f"process ended within 1 s of its start {TOLERATED + 1} times in a row; the next start is in 0.1 s"
+    ]
+    assert len(story.exits) == TOLERATED + 2
+
+
+def test_a_respawn_delay_of_the_launch_file_that_is_longer_stands() -> None:
+    _, story = lived("exit 1", LifeRules(respawn=True, respawn_delay=0.12, max_retries=TOLERATED + 1))
+    assert [text for level, text in story.lines if level == "WARNING"] == []
+
+
+@pytest.mark.parametrize("cmd", [("echo", "a\0b"), ("ec\0ho",)], ids=["argument", "program"])
+def test_a_nul_character_is_told_and_never_taken_for_a_start(cmd: tuple[str, ...]) -> None:
+    story = Story()
+
+    async def prepare() -> ProcessSpec:
+        return ProcessSpec(cmd, dict(os.environ))
+
+    async def main() -> Outcome:
+        async with ProcessTree() as tree:
+            return await SupervisedProcess("a-1", prepare, tree, LifeRules(), story, story.say).run()
+
+    assert asyncio.run(main()) == Outcome(returncode=None, asked_to_end=False)
+    assert story.pids == []
+    assert "holds a NUL character" in story.lines[0][1]

@@ -38,6 +38,11 @@ class EventQueue:
     def empty(self) -> bool:
         return not self._events
 
+    @property
+    def next(self) -> Event:
+        """The event that ``get_nowait`` would take."""
+        return self._events[0][0]
+
     def save(self) -> deque[QueuedEvent]:
         return self._events.copy()
 

@@ -1,0 +1,135 @@
+"""What is left when the warden itself is killed: found and ended by the launcher. Touches the world.
+
+Children of a warden die with it. What they had moved into sessions of their own (daemons) does not, and would go to
+init. Two things keep it in reach: the launcher is a second child subreaper (prctl(2)), so that such processes become
+its children; and where a cgroup was delegated to us (systemd's ``Delegate=``), everything is started in one below it,
+which the kernel empties at one word.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import time
+from pathlib import Path
+
+from enclave_launch.runtime.warden import (
+    PR_SET_CHILD_SUBREAPER,
+    children_by_parent,
+    descendants,
+    kill_all,
+    load_libc,
+    session_of,
+)
+
+PR_GET_CHILD_SUBREAPER = 37  # linux/prctl.h
+CLEARING = 5.0  # seconds until what cannot be killed (uninterruptible sleep) is left to the kernel
+DELEGATED = ("user.delegate", "trusted.delegate")  # systemd.resource-control(5): extended attributes, "1"
+
+
+class Survivors:
+    """Ready from its making until ``close``; ``end`` is for the day on which the warden was killed."""
+
+    def __init__(self, warden: int) -> None:
+        self._libc = load_libc()
+        self._was_subreaper = self._subreaper()
+        self._set_subreaper(1)
+        self._own = children_by_parent().get(os.getpid(), set())
+        self._cgroup = Cgroup.below_ours()
+        if self._cgroup is not None:
+            self._cgroup.take(warden)
+
+    def end(self) -> None:
+        """Kill all that the launch left, until nothing more turns up.
+
+        Left alone are the children that this program had before the launch, and what runs in its own session.
+        """
+        if self._cgroup is not None:
+            self._cgroup.kill()
+        deadline = time.monotonic() + CLEARING
+        while time.monotonic() < deadline and (adopted := self._adopted()):
+            kill_all({pid for one in adopted for pid in (one, *descendants(one))}, signal.SIGKILL)
+            time.sleep(0.005)
+            for pid in adopted:
+                with contextlib.suppress(ChildProcessError):
+                    os.waitpid(pid, os.WNOHANG)
+
+    def close(self) -> None:
+        """Once nothing of the launch is left."""
+        if not self._was_subreaper:
+            self._set_subreaper(0)
+        if self._cgroup is not None:
+            self._cgroup.remove()
+
+    def _adopted(self) -> set[int]:
+        children = children_by_parent().get(os.getpid(), set()) - self._own
+        return {pid for pid in children if session_of(pid) not in (os.getsid(0), -1)}
+
+    def _subreaper(self) -> bool:
+        if self._libc is None:
+            return False
+        import ctypes
+
+        value = ctypes.c_int()
+        self._libc.prctl(PR_GET_CHILD_SUBREAPER, ctypes.byref(value), 0, 0, 0)
+        return bool(value.value)
+
+    def _set_subreaper(self, value: int) -> None:
+        if self._libc is not None:
+            self._libc.prctl(PR_SET_CHILD_SUBREAPER, value, 0, 0, 0)
+
+
+class Cgroup:
+    """A cgroup (version 2) of this launch's processes."""
+
+    def __init__(self, directory: Path) -> None:
+        self._directory = directory
+
+    @classmethod
+    def below_ours(cls) -> Cgroup | None:
+        """A new one below the cgroup of this process; ``None`` unless that was delegated to us."""
+        ours = own_cgroup()
+        if ours is None or not is_delegated(ours):
+            return None
+        directory = ours / f"enclave-launch-{os.getpid()}"
+        try:
+            directory.mkdir()
+        except OSError:
+            return None
+        return cls(directory)
+
+    def take(self, pid: int) -> None:
+        with contextlib.suppress(OSError):  # it has ended
+            (self._directory / "cgroup.procs").write_text(str(pid))
+
+    def kill(self) -> None:
+        """Kill everything in it (cgroup.kill, Linux 5.14)."""
+        with contextlib.suppress(OSError):
+            (self._directory / "cgroup.kill").write_text("1")
+
+    def remove(self) -> None:
+        """It is empty, but for processes that the kernel has not finished with."""
+        with contextlib.suppress(OSError):
+            self._directory.rmdir()
+
+
+def own_cgroup() -> Path | None:
+    """The folder of this process's cgroup in the version 2 hierarchy; ``None`` where there is none."""
+    try:
+        places = Path("/proc/self/cgroup").read_text().splitlines()
+        mounts = Path("/proc/self/mountinfo").read_text().splitlines()
+    except OSError:
+        return None
+    place = next((line[len("0::/") :] for line in places if line.startswith("0::/")), None)
+    mounted = (fields for fields in map(str.split, mounts) if fields[fields.index("-") + 1] == "cgroup2")
+    root = next(mounted, None)
+    return None if place is None or root is None else Path(root[4], place)
+
+
+def is_delegated(cgroup: Path) -> bool:
+    for name in DELEGATED:
+        with contextlib.suppress(OSError):
+            if os.getxattr(cgroup, name) == b"1":
+                return os.access(cgroup, os.W_OK)
+    return False
