@@ -18,7 +18,7 @@ VERSION = "0.1.0"
 REQUIRES = ["lxml>=4.9", "pyyaml>=6.0", "cryptography>=42", "pydantic>=2.5"]
 PACKAGE_DATA = {
     "enclave_launch": ["py.typed", "recording/recorder.c"],
-    "nodl": ["py.typed", "schemas/*"],
+    "nodl": ["py.typed", "schemas/*", "library/documents/*", "library/documents/*/*"],
     "keystore": ["py.typed", "schemas/*"],
 }
 ENTRY_POINTS = {

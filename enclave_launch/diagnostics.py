@@ -32,6 +32,7 @@ class Code(str, Enum):
     # of interfaces and permissions
     ACTION_REMAP_IDLE = "action-remap-idle", "A remap rule for an action has no effect in this distribution"
     INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not (wholly) known"
+    LIBRARY_VERSION = "library-version", "A document of the library was written for another version"
     NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"
     NO_MANIFEST = "no-manifest", "Nothing says what a node or component does"
     NODE_NAME_IMPOSSIBLE = "node-name-impossible", "No node can run under the name it is given"
@@ -139,6 +140,11 @@ IN_MANIFEST = (
     "describe it in a manifest (secure-nodl infer makes a first one from the source), installed with the package or "
     "named with --nodl"
 )
+
+
+def library_version(program: str, doubt: str, location: SourceLocation) -> Diagnostic:
+    remedy = "compare them (secure-nodl library show), and keep a corrected copy in a folder for --library"
+    return Diagnostic(Code.LIBRARY_VERSION, program, f"library document {doubt}", location, remedy)
 
 
 def action_remap_idle(node: str, rule: str, action: str, distro: str, place: SourceLocation) -> Diagnostic:

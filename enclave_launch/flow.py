@@ -43,7 +43,7 @@ def resolve(
     chosen = options or ResolveOptions()
     evaluated = evaluate_launch(launch_file, arguments, options=chosen)
     with ament_prefixes(evaluated.source.prefixes):
-        finder = InterfaceFinder(search_prefixes(), chosen.manifests, chosen.infer)
+        finder = InterfaceFinder(search_prefixes(), chosen, evaluated.evaluation.distro)
         plan = Planner(evaluated.source, finder, chosen.plan_options()).plan(evaluated.evaluation)
     return plan._replace(warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)))
 

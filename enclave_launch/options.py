@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 @dataclass(frozen=True, slots=True)
 class ResolveOptions:
     """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
-    else the newest; ``manifests`` win where NoDL definitions conflict."""
+    else the newest; ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their
+    sources be analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first."""
 
     prefixes: tuple[Path, ...] = ()
     manifests: tuple[Path, ...] = ()
@@ -30,6 +31,8 @@ class ResolveOptions:
     distro: str | None = None
     enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
     infer: bool = True
+    library: bool = True
+    library_folders: tuple[Path, ...] = ()
     accept_patterns: bool = False
     allow_missing_packages: bool = False
     no_python: bool = False

@@ -9,6 +9,7 @@ What could not be found out is a value with a reason: a ``problem`` stops ``--se
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from enum import Enum
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ from enclave_launch.diagnostics import (
     enclave_attribute_unused,
     enclave_shared_with_launcher,
     executable_without_enclave,
+    library_version,
     no_manifest,
     not_foreseeable,
 )
@@ -31,14 +33,28 @@ from enclave_launch.process import (
     ResolvedComponent,
     ResolvedProcess,
 )
-from nodl.node_interface import NodeInterface
+from nodl.node_interface import RANDOM_ENDING, NodeInterface
+
+
+class InterfaceOrigin(str, Enum):
+    """Where the interfaces of a node come from; the first that knows it decides, in this order."""
+
+    NAMED = "--nodl"
+    PACKAGE = "manifest of the package"
+    RECORDED = "recorded"
+    ANALYSIS = "inferred"
+    LIBRARY = "library"
+
+    def __str__(self) -> str:
+        return self.value
 
 
 class Found(NamedTuple):
-    """The nodes of one executable or component. ``inferred``: from its source, for want of a manifest."""
+    """The nodes of one executable or component. ``doubt``: what they were described for is another version."""
 
     interfaces: tuple[NodeInterface, ...]
-    inferred: bool = False
+    origin: InterfaceOrigin = InterfaceOrigin.PACKAGE
+    doubt: str = ""
 
 
 class Missing(NamedTuple):
@@ -48,20 +64,24 @@ class Missing(NamedTuple):
     why: str
 
 
-InterfaceLookup = Callable[["ResolvedProcess | ResolvedComponent"], "Found | Missing"]
+InterfaceLookup = Callable[
+    ["ResolvedProcess | ResolvedComponent", "ResolvedProcess | None"], "Found | Missing"
+]
+"""Asked with what launch starts and, for a component, its container where that is known."""
 
 
 class PlannedProcess(NamedTuple):
     """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes.
 
-    ``inferred``: their interfaces come from the program's source, for want of a manifest.
+    ``origin``: where their interfaces come from; ``doubt``: why they may not be those of the installed version.
     """
 
     process: ResolvedProcess
     enclave: EnclaveAssignment | None
     nodes: tuple[RunningNode, ...]
     missing: Missing | None = None
-    inferred: bool = False
+    origin: InterfaceOrigin | None = None
+    doubt: str = ""
 
     @property
     def name(self) -> str | None:
@@ -85,6 +105,8 @@ class PlannedComponent(NamedTuple):
     container: PlannedProcess | None
     nodes: tuple[RunningNode, ...]
     missing: Missing | None = None
+    origin: InterfaceOrigin | None = None
+    doubt: str = ""
 
     @property
     def enclave(self) -> str | None:
@@ -206,16 +228,20 @@ def _nodes(
 def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: EnclaveScope) -> PlannedProcess:
     if process.kind == "executable":
         return PlannedProcess(process, assign_enclave(process, scope), ())
-    found = lookup(process)
+    found = lookup(process, None)
     if isinstance(found, Missing):
         unnamed = scope is EnclaveScope.NODE and process.name == UNSPECIFIED_NODE_NAME
         enclave = None if unnamed else assign_enclave(process, scope)
         return PlannedProcess(process, enclave, (), found)
-    enclave = assign_enclave(process, scope, found.interfaces[0].name if found.interfaces else None)
+    name = found.interfaces[0].name if found.interfaces else None
+    enclave = assign_enclave(process, scope, name and name.removesuffix(RANDOM_ENDING))
     path = enclave.path if enclave else "/"
     role = _role(process)
-    nodes = tuple(node_of_process(process, interface, path, role) for interface in found.interfaces)
-    return PlannedProcess(process, enclave, nodes, inferred=found.inferred)
+    nodes = tuple(
+        node_of_process(process, interface, path, "node" if interface.own_rules else role)
+        for interface in found.interfaces
+    )
+    return PlannedProcess(process, enclave, nodes, origin=found.origin, doubt=found.doubt)
 
 
 def _role(process: ResolvedProcess) -> Role:
@@ -228,16 +254,16 @@ def _plan_component(
     component: ResolvedComponent, containers: Mapping[str, PlannedProcess], lookup: InterfaceLookup
 ) -> PlannedComponent:
     container = containers.get("/" + component.container.lstrip("/"))
-    found = lookup(component)
+    found = lookup(component, container.process if container else None)
     if isinstance(found, Missing):
         return PlannedComponent(component, container, (), found)
     if container is None or container.enclave is None:
-        return PlannedComponent(component, container, ())
+        return PlannedComponent(component, container, (), origin=found.origin, doubt=found.doubt)
     nodes = tuple(
         node_of_component(component, container.process, interface, container.enclave.path)
         for interface in found.interfaces
     )
-    return PlannedComponent(component, container, nodes)
+    return PlannedComponent(component, container, nodes, origin=found.origin, doubt=found.doubt)
 
 
 def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess]:
@@ -277,6 +303,7 @@ def _notes(
         if component.container is None:
             target, place = component.component.container, component.component.location
             yield container_elsewhere(component.fqn, target, _alike(target, processes), place)
+    yield from _library_versions(processes, components)
     for item in processes:
         process, attribute = item.process, item.process.enclave.attribute
         if item.enclave and process.enclave.argument is not None and attribute is not None:
@@ -285,6 +312,19 @@ def _notes(
             )
     if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
         yield enclave_shared_with_launcher(launcher.enclave)
+
+
+def _library_versions(
+    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
+) -> Iterator[Diagnostic]:
+    for item in processes:
+        if item.doubt:
+            program = f"{item.process.package}/{item.process.executable}"
+            yield library_version(program, item.doubt, item.process.location)
+    for component in components:
+        if component.doubt:
+            program = f"{component.component.package}/{component.component.plugin}"
+            yield library_version(program, component.doubt, component.component.location)
 
 
 def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:

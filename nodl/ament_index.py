@@ -21,6 +21,7 @@ from enclave_launch.boundary.files import read_text
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
+_PACKAGE_VERSION = re.compile(r"<version\b[^>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
 _PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
 
 
@@ -99,6 +100,17 @@ def package_prefix(package: str, prefixes: Sequence[str]) -> str:
 def package_share_directory(package: str, prefixes: Sequence[str]) -> str:
     """``<prefix>/share/<package>``, which need not exist. Raises as ``package_prefix``."""
     return os.path.join(package_prefix(package, prefixes), "share", package)
+
+
+def package_version(package: str, prefixes: Sequence[str]) -> str | None:
+    """What the installed ``package.xml`` says; ``None`` when the package or its version is not known."""
+    try:
+        share = package_share_directory(package, prefixes)
+        with open(os.path.join(share, "package.xml"), encoding="utf-8") as file:
+            found = _PACKAGE_VERSION.search(file.read())
+    except (PackageNotFoundError, ValueError, OSError):
+        return None
+    return found[1] if found else None
 
 
 def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> str:

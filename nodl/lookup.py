@@ -27,10 +27,12 @@ from nodl.node_interface import NodeInterface
 
 
 class Lookup(NamedTuple):
-    """``found`` is empty when no document describes the executable; ``searched`` says where we looked."""
+    """``found`` is empty when no document describes the executable; ``searched`` says where we looked. ``named``: the
+    user named the document."""
 
     found: tuple[NodeInterface, ...]
     searched: tuple[str, ...]
+    named: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.found)
@@ -54,7 +56,7 @@ class ManifestLookup:
         subject = f"{package}/{executable or plugin}"
         chosen = [node for node in self._chosen_nodes() if fits(node) and _same_package(node, package)]
         if chosen:
-            return Lookup(_agreed(subject, chosen), self._manifests)
+            return Lookup(_agreed(subject, chosen), self._manifests, named=True)
         installed = self._package(package)
         found = [node for node in installed.nodes if fits(node)]
         return Lookup(_agreed(subject, found), (*self._manifests, *installed.searched))

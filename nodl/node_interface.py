@@ -8,10 +8,13 @@ whoever derives permissions from them no longer asks where they came from, but c
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.name_template import NameTemplate
 from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.dependence import Dependence
 
 
 class EndpointKind(str, Enum):
@@ -48,6 +51,7 @@ class Endpoint(NamedTuple):
     certainty: Certainty = Certainty.EXACT
     written: str = ""  # the text in the source where a reader took it for another name, else empty
     introspected: bool = False  # a service whose calls are published below its name (service introspection)
+    note: str = ""  # what else a reader should know: the parameter or plugin that the name comes from
 
 
 class Gap(NamedTuple):
@@ -65,11 +69,17 @@ class ClientLibrary(str, Enum):
     UNKNOWN = "unknown"
 
 
+RANDOM_ENDING = "_*"
+"""Of a node's own name whose end the program makes up at each start; launch can give it another."""
+
+
 class NodeInterface(NamedTuple):
     """One node of an executable or component.
 
     ``name`` and ``namespace`` are the program's own defaults (what applies when launch gives none);
     ``None`` when unknown. ``executable`` or ``plugin`` is the key under which launch starts the node.
+    ``own_rules``: remap rules in the options with which a program makes a further node beside its main one; such a node
+    obeys them before the process's, and the process's even in a container. ``depends``: what varies with its start.
     """
 
     package: str | None
@@ -83,3 +93,5 @@ class NodeInterface(NamedTuple):
     lifecycle: bool = False
     parameters: tuple[str, ...] = ()
     gaps: tuple[Gap, ...] = ()
+    own_rules: tuple[str, ...] = ()
+    depends: Dependence | None = None

@@ -128,7 +128,7 @@ class _Collection:
     def add(self, found: NodePermissions, policy_file: PolicyDocument | None) -> None:
         node = found.node
         self.nodes.setdefault(node.enclave, []).append(node)
-        reasons = self.profiles.setdefault(node.enclave, {}).setdefault((node.namespace, node.name), {})
+        reasons = self.profiles.setdefault(node.enclave, {}).setdefault((node.namespace, node.fixed_name), {})
         for operation, name, reason in found.permissions:
             reasons.setdefault(Rule(operation, Qualifier.ALLOW, name), []).append(reason)
         self.warnings.extend(found.warnings)

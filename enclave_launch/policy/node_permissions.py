@@ -106,7 +106,7 @@ class _Collector:
 
     def collect(self) -> NodePermissions:
         try:
-            validate_node_name(self._node.name)
+            validate_node_name(self._node.fixed_name)
             validate_namespace(self._node.namespace)
         except InvalidNameError as error:
             self._impossible(error)
@@ -121,9 +121,14 @@ class _Collector:
     def _endpoint(self, endpoint: Endpoint) -> None:
         template = endpoint.name
         if template.is_literal:
-            note = f"{endpoint.written} is taken as the private name {template}" if endpoint.written else ""
+            note = endpoint.note
+            if endpoint.written:
+                note = f"{endpoint.written} is taken as the private name {template}"
             if endpoint.certainty is Certainty.FROM_DEFAULT:
-                note = "from a default value in the source"
+                note = note or "from a default value in the source"
+            if endpoint.certainty is Certainty.PATTERN:
+                self._stated_pattern(endpoint)
+                return
             self._name(endpoint, template, note)
             return
         note = _parameter_note(template, self._node)
@@ -228,6 +233,17 @@ class _Collector:
         self._result.warnings.append(
             pattern_accepted(self._fqn, operation.value, name, note, SourceLocation.read(place))
         )
+
+    def _stated_pattern(self, endpoint: Endpoint) -> None:
+        """A whole name with ``*``, which a description states itself: the program makes it up anew at each start."""
+        operation, place, text = _OPERATIONS[endpoint.kind], str(endpoint.source), endpoint.name.text
+        try:
+            name = _expand_pattern(self._names, text)
+        except InvalidNameError as error:
+            self._unresolved(operation, place, str(error))
+            return
+        reason = Reason(self._fqn, "declared", place, text, (), endpoint.note)
+        self._result.permissions.append(Permission(operation, name, reason))
 
     def _impossible(self, error: InvalidNameError) -> None:
         impossible = node_name_impossible(self._fqn, str(error), self._node.location)

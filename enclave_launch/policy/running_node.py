@@ -20,7 +20,7 @@ from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
-from nodl.node_interface import NodeInterface
+from nodl.node_interface import RANDOM_ENDING, NodeInterface
 from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
 
 Role = Literal["node", "lifecycle_node", "container", "component", "launcher"]
@@ -44,13 +44,20 @@ class RunningNode(NamedTuple):
     def fqn(self) -> str:
         return join(self.namespace, self.name)
 
+    @property
+    def fixed_name(self) -> str:
+        """The name, less what the program makes up at each start, for which ``*`` stands."""
+        own = self.name == self.interface.name
+        return self.name.removesuffix(RANDOM_ENDING) if own else self.name
+
 
 def node_of_process(
     process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role
 ) -> RunningNode:
     """One node of ``process``. Raises ``LaunchFileError`` for a remap rule that would make rcl refuse to start."""
     rules = RemapRules(
-        process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location)
+        local=_own_rules(interface),
+        process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location),
     )
     inputs = program_inputs(process)
     return _named(interface, rules, process.parameters, enclave, process.location, role, inputs)
@@ -59,18 +66,25 @@ def node_of_process(
 def node_of_component(
     component: ResolvedComponent, container: ResolvedProcess | None, interface: NodeInterface, enclave: str
 ) -> RunningNode:
-    """The node that ``component`` becomes. Raises ``LaunchFileError`` as ``node_of_process``."""
+    """A node of ``component``: its main one obeys the load request, a further one (with rules of its own) the
+    container's command line. Raises ``LaunchFileError`` as ``node_of_process``."""
     texts = [f"{rule.source}:={rule.target}" for rule in component.remaps]
     if component.name:
         texts.append(f"__node:={component.name}")
     if component.namespace:
         texts.append(f"__ns:={component.namespace}")
     forwarded: tuple[ParsedRule, ...] = ()
-    if container is not None and component.extra_arguments.get("forward_global_arguments") is True:
+    forwards = component.extra_arguments.get("forward_global_arguments") is True
+    if container is not None and (forwards or interface.own_rules):
         forwarded = _parse(parse_ros_arguments(container.cmd).remaps, container.remaps, container.location)
-    rules = RemapRules(local=_parse(texts, component.remaps, component.location), process=forwarded)
+    local = _own_rules(interface) or _parse(texts, component.remaps, component.location)
+    rules = RemapRules(local=local, process=forwarded)
     inputs = ProgramInputs()
     return _named(interface, rules, component.parameters, enclave, component.location, "component", inputs)
+
+
+def _own_rules(interface: NodeInterface) -> tuple[ParsedRule, ...]:
+    return tuple(parse_rule(text, str(interface.source)) for text in interface.own_rules)
 
 
 def _named(

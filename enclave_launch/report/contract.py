@@ -35,6 +35,10 @@ class Process(_Strict):
     remaps: list[tuple[str, str]] = Field(description="from, to; global rules before the node's own")
     parameters: dict[str, JsonParameter] = Field(description="as the node will see them")
     enclave: str | None
+    interfaces: str | None = Field(
+        default=None,
+        description="where they come from: --nodl, manifest of the package, recorded, inferred, library",
+    )
     environment: dict[str, str] = Field(
         description="variables added or changed, values as the process sees them"
     )
@@ -56,6 +60,10 @@ class Component(_Strict):
     parameters: dict[str, JsonParameter]
     enclave: str | None = Field(
         description="the container's; null when the container is not part of this launch"
+    )
+    interfaces: str | None = Field(
+        default=None,
+        description="where they come from: --nodl, manifest of the package, recorded, inferred, library",
     )
     launch_file: str
     line: int

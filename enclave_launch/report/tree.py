@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from enclave_launch.boundary.terminal import printable
-from enclave_launch.plan import LaunchPlan, PlannedProcess
+from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.plan_json import allowed_names
 from keystore.formats.policy import EnclavePolicy
@@ -52,7 +52,7 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     names = " ".join(dict.fromkeys(node.fqn for node in item.nodes)) or item.fqn or ""
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
-    source = ", inferred from its source" if item.inferred else ""
+    source = f", {_origin(item)}" if item.origin not in (None, InterfaceOrigin.PACKAGE) else ""
     place = (
         f"line {process.location.line}"
         if process.location.file == plan.launch_file
@@ -65,6 +65,16 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
         if component.container is item
     ]
     return head, loaded
+
+
+def _origin(item: PlannedProcess | PlannedComponent) -> str:
+    """Where its interfaces come from, with the document of the library."""
+    if item.origin is InterfaceOrigin.LIBRARY and item.nodes:
+        file = item.nodes[0].interface.source.file
+        return f"library {'/'.join(file.split('/')[-2:]).removesuffix('.nodl.yaml')}"
+    if item.origin is InterfaceOrigin.ANALYSIS:
+        return "inferred from its source"
+    return str(item.origin)
 
 
 def _permissions(plan: LaunchPlan, enclave: EnclavePolicy) -> Iterator[Branch]:

@@ -48,7 +48,7 @@ def secured(
     options = resolve_options or ResolveOptions()
     check_installed()
     release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes())
-    finder = InterfaceFinder(search_prefixes(), options.manifests, options.infer)
+    finder = InterfaceFinder(search_prefixes(), options, release.distro.value)
     planner = Planner(LaunchSource("<program>"), finder, options.plan_options())
     nothing_yet = Evaluation((), (), distro=release.distro.value)
     launch = flow.provision(planner.plan(nothing_yet), keystore, options=security_options)

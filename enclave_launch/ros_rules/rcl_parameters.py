@@ -132,13 +132,22 @@ def _parse_value(text: str) -> ParameterValue | None:
 
 @lru_cache(maxsize=256)
 def _read_cached(path: str, _modified: int, _size: int) -> Mapping[str, Section]:
+    try:
+        return parameters_of_text(read_text(path))
+    except (OSError, UnicodeDecodeError):
+        return {}
+
+
+@lru_cache(maxsize=256)
+def parameters_of_text(text: str) -> Mapping[str, Section]:
+    """The sections of a parameter file; none where it is no YAML."""
     import yaml
 
     from enclave_launch.boundary.yaml_nodes import compose
 
     try:
-        document = compose(read_text(path))
-    except (OSError, UnicodeDecodeError, yaml.YAMLError):
+        document = compose(text)
+    except yaml.YAMLError:
         return {}
     sections: dict[str, dict[str, ParameterValue]] = {}
     if document is not None:

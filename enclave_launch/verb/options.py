@@ -116,9 +116,18 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--missing-nodl",
-        choices=("infer", "error"),
+        choices=("infer", "analysis", "library", "error"),
         default="infer",
-        help="nodes without a manifest: infer from their Python source (default), or an error",
+        help="nodes without a manifest: infer from their source, else ask the library (default), only one of the two, "
+        "or an error",
+    )
+    group.add_argument(
+        "--library",
+        metavar="DIR",
+        action="append",
+        type=Path,
+        default=[],
+        help="documents of your own that add to or correct the library (repeatable; docs/library.md)",
     )
     group.add_argument(
         "--accept-patterns",

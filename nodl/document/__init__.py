@@ -5,13 +5,25 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_bytes
 from nodl.document.manifest_node import ManifestNode
 from nodl.errors import InvalidNoDLError
 from nodl.source_ref import SourceRef
 
-__all__ = ["RESOURCE_TYPE", "V1_SUFFIX", "V2_SUFFIXES", "ManifestNode", "read_document", "resource_key"]
+if TYPE_CHECKING:
+    from nodl.document.yaml_text import YamlMap
+
+__all__ = [
+    "RESOURCE_TYPE",
+    "V1_SUFFIX",
+    "V2_SUFFIXES",
+    "ManifestNode",
+    "read_document",
+    "read_root",
+    "resource_key",
+]
 
 V1_SUFFIX = ".nodl.xml"
 V2_SUFFIXES = (".nodl.yaml", ".nodl.yml", ".nodl.json", ".yaml", ".yml", ".json")
@@ -36,6 +48,14 @@ def read_document(
     from nodl.document.v2 import parse_v2
 
     return (parse_v2(text, file, package=package, name=name or _stem(file), prefixes=prefixes),)
+
+
+def read_root(path: str | Path) -> YamlMap:
+    """A v2 document as it is written, checked. Raises ``InvalidNoDLError`` as ``read_document``."""
+    from nodl.document.v2_schema import check_document
+    from nodl.document.yaml_text import parse_yaml
+
+    return check_document(parse_yaml(_read(str(path)), str(path)))
 
 
 def resource_key(package: str, name: str) -> str:

@@ -9,6 +9,7 @@ of the opaque ``codegen`` tells, which other tools ignore:
                        library: rclcpp, lifecycle: false}
 
 What was learnt from runs stands there too (``v2_learnt``).
+The same section may say what of the listed names depends on parameters and arguments: ``v2_section``.
 Rules of includes, merging and collisions: ros-tooling/nodl, ``nodl_schema``.
 """
 
@@ -20,7 +21,8 @@ from dataclasses import dataclass
 from nodl.document.manifest_node import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_names, logger_services
-from nodl.document.v2_schema import IDENTITY_KEY, check_document
+from nodl.document.v2_schema import check_document
+from nodl.document.v2_section import CATEGORIES, dependence_of, section_of
 from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
 from nodl.name_template import NameTemplate
@@ -29,15 +31,6 @@ from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInter
 from nodl.source_ref import SourceRef
 
 VERSION = 2
-
-CATEGORIES: dict[str, EndpointKind] = {
-    "publishers": EndpointKind.PUBLISHER,
-    "subscriptions": EndpointKind.SUBSCRIPTION,
-    "service_servers": EndpointKind.SERVICE_SERVER,
-    "service_clients": EndpointKind.SERVICE_CLIENT,
-    "action_servers": EndpointKind.ACTION_SERVER,
-    "action_clients": EndpointKind.ACTION_CLIENT,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +52,15 @@ def parse_v2(
 
     Reads the included files. Raises ``InvalidNoDLError`` with file:line.
     """
-    root = check_document(parse_yaml(text, file))
+    return parse_root(
+        check_document(parse_yaml(text, file)), file, package=package, name=name, prefixes=prefixes
+    )
+
+
+def parse_root(
+    root: YamlMap, file: str, *, package: str | None, name: str, prefixes: Sequence[str] = ()
+) -> ManifestNode:
+    """``parse_v2`` for a document that was read and checked."""
     documents = (Included(file, root), *follow_includes(root, file, prefixes))
     identity = _identity(root, name)
     endpoints = (*_endpoints(documents, learnt_names(root)), *logger_services(root))
@@ -75,15 +76,15 @@ def parse_v2(
         library=identity.library,
         lifecycle=identity.lifecycle,
         parameters=tuple(parameters),
+        depends=dependence_of(root),
     )
     included = tuple(document.file for document in documents[1:])
     return ManifestNode(interface, VERSION, parameters, identity.explicit, included)
 
 
 def _identity(root: YamlMap, name: str) -> _Identity:
-    section = root.items.get("codegen")
-    ours = section.items.get(IDENTITY_KEY) if isinstance(section, YamlMap) else None
-    given = ours.items if isinstance(ours, YamlMap) else {}
+    ours = section_of(root)
+    given = ours.items if ours else {}
     fields = {key: value.value for key, value in given.items() if isinstance(value, YamlScalar)}
     executable, plugin = _text(fields, "executable"), _text(fields, "plugin")
     if executable is None and plugin is None:

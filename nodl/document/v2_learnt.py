@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from nodl.document.v2_schema import IDENTITY_KEY
+from nodl.document.v2_section import IDENTITY_KEY
 from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 from nodl.errors import InvalidElementError
 from nodl.name_template import NameTemplate, ParameterPart

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from html import escape
 
 from nodl.document.manifest_node import ManifestNode
-from nodl.document.v2 import CATEGORIES
-from nodl.document.v2_schema import IDENTITY_KEY, NAME_PATTERN, PARAMETER_TYPES, TYPE_PATTERN
+from nodl.document.v2_schema import NAME_PATTERN, PARAMETER_TYPES, TYPE_PATTERN
+from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.errors import InvalidNoDLDocumentError
 from nodl.names import shown
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface

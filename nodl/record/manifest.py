@@ -11,8 +11,8 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from nodl.document.v2 import CATEGORIES
-from nodl.document.v2_schema import IDENTITY_KEY, NAME_PATTERN
+from nodl.document.v2_schema import NAME_PATTERN
+from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.learning import Entry, LearntNode
 

@@ -12,7 +12,7 @@ from importlib import import_module
 
 from enclave_launch.boundary.terminal import safe_output
 
-VERBS = ("check_record", "convert", "infer", "show", "validate")
+VERBS = ("check_record", "convert", "infer", "library", "show", "validate")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

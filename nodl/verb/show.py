@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.format == "json":
         print(json_text([_plain(node) for node in nodes], indent=2))
     elif nodes:
-        print("\n".join(printable(line) for node in nodes for line in _lines(node)))
+        print("\n".join(printable(line) for node in nodes for line in description_lines(node)))
     for text in missing:
         print(text, file=sys.stderr)
     return 1 if missing or not nodes else 0
@@ -77,7 +77,7 @@ def _listing(places: Iterable[str]) -> str:
     return ", ".join(places)
 
 
-def _lines(node: NodeInterface) -> Iterator[str]:
+def description_lines(node: NodeInterface) -> Iterator[str]:
     program = node.executable or node.plugin or "?"
     where = f"{node.package}/{program}" if node.package else program
     namespace = f" in {node.namespace}" if node.namespace else ""

@@ -150,7 +150,7 @@ BROKEN = {
     ),
     "read_only as text": (doc("parameters:\n  a: {type: int, read_only: 'yes'}"), "true or false", 3),
     "codegen of a scalar": (doc("codegen: {cpp: 1}"), "must be a mapping", 2),
-    "unknown identity": (doc("codegen: {enclave_launch: {nodes: a}}"), "no key 'nodes'", 2),
+    "unknown identity": (doc("codegen: {enclave_launch: {nodess: a}}"), "no key 'nodess'", 2),
     "bad node name": (doc("codegen: {enclave_launch: {node: a b}}"), "invalid node name", 2),
     "include without ref": (doc("include: [{file: a}]"), "needs the key 'ref'", 2),
     "include without scheme": (doc("include: [{ref: a/b}]"), "is not a reference", 2),

@@ -1,0 +1,138 @@
+"""Where the interfaces of a node come from: its manifest, else (unless forbidden) its source, else the library.
+
+Takes a process or component that launch starts; gives ``Found`` or ``Missing`` with what to do next. Reads the
+ament index, manifests, sources and documents of the library; next is the plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from enclave_launch.errors import ManifestError
+from enclave_launch.interfaces.library_access import LibraryAccess
+from enclave_launch.options import ResolveOptions
+from enclave_launch.plan import Found, InterfaceOrigin, Missing
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from nodl.errors import NoDLError
+from nodl.lookup import Lookup, ManifestLookup
+from nodl.name_template import UnknownPart
+from nodl.node_interface import ClientLibrary, NodeInterface
+from nodl.source_ref import SourceRef
+
+CONTAINER_PACKAGE = "rclcpp_components"
+"""Its executables (``component_container``, ``_mt``, ``_isolated``) are containers and nothing else."""
+
+_CONTAINER_NODE_NAME = (
+    "ComponentManager"  # rclcpp_components/src/component_manager.hpp, the constructor's default
+)
+
+
+class _Subject(NamedTuple):
+    """What is asked for: an executable or a plugin of a package."""
+
+    package: str | None
+    executable: str | None = None
+    plugin: str | None = None
+
+    def __str__(self) -> str:
+        return f"{self.package or '(no package)'}/{self.executable or self.plugin}"
+
+
+class InterfaceFinder:
+    """Answers for one launch, by the rules of ``distro``; what can be said without knowing the start is kept."""
+
+    def __init__(
+        self, prefixes: Sequence[str], options: ResolveOptions | None = None, distro: str = "rolling"
+    ) -> None:
+        """Raises ``UsageError`` for a folder of documents that is not there."""
+        self._options = options or ResolveOptions()
+        self._prefixes = prefixes
+        self._distro = distro
+        self._lookup = ManifestLookup(prefixes, self._options.manifests)
+        self._library = LibraryAccess(prefixes, self._options, distro)
+        self._known: dict[_Subject, Found | Missing] = {}
+
+    def __call__(
+        self, started: ResolvedProcess | ResolvedComponent, container: ResolvedProcess | None = None
+    ) -> Found | Missing:
+        """``container``: that of a component. Raises ``ManifestError`` for manifests that are broken or contradict
+        each other, ``LaunchFileError`` for a remap rule at which the process would end."""
+        if isinstance(started, ResolvedProcess):
+            subject = _Subject(started.package, executable=_executable_name(started))
+        else:
+            subject = _Subject(started.package, plugin=started.plugin)
+        if subject not in self._known:
+            self._known[subject] = self._find(subject)
+        found = self._known[subject]
+        if isinstance(found, Missing) or not any(each.depends for each in found.interfaces):
+            return found
+        try:
+            return found._replace(interfaces=self._library.complete(found.interfaces, started, container))
+        except NoDLError as error:
+            raise ManifestError(str(error)) from error
+
+    def _find(self, subject: _Subject) -> Found | Missing:
+        try:
+            manifest = self._lookup.find(
+                subject.package or "", executable=subject.executable, plugin=subject.plugin
+            )
+            if manifest:
+                origin = InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
+                return Found(manifest.found, origin)
+            if subject.package == CONTAINER_PACKAGE and subject.executable:
+                return Found((_container(subject),))
+            return self._without_manifest(subject, manifest)
+        except NoDLError as error:
+            raise ManifestError(str(error)) from error
+
+    def _without_manifest(self, subject: _Subject, manifest: Lookup) -> Found | Missing:
+        """The analysis where it leaves nothing open, else the library, else what the analysis has."""
+        searched = ["looked at " + ", ".join(manifest.searched)]
+        inferred = self._inferred(subject, searched)
+        if inferred and all(map(_complete, inferred)):
+            return Found(inferred, InterfaceOrigin.ANALYSIS)
+        hit = self._library.find(subject.package, subject.executable or subject.plugin or "")
+        if hit:
+            return Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt)
+        if inferred:
+            return Found(inferred, InterfaceOrigin.ANALYSIS)
+        if self._options.library:
+            searched.append("the library has no document of it")
+        return Missing(str(subject), "; ".join(searched))
+
+    def _inferred(self, subject: _Subject, searched: list[str]) -> tuple[NodeInterface, ...]:
+        if not self._options.infer or subject.package is None:
+            return ()
+        from nodl.infer.executable import infer_executable
+
+        inferred = infer_executable(
+            subject.package, executable=subject.executable, plugin=subject.plugin, prefixes=self._prefixes
+        )
+        if not inferred.interfaces:
+            searched.append(inferred.why)
+        return inferred.interfaces
+
+
+def _complete(interface: NodeInterface) -> bool:
+    """Whether an analysis answered everything: no gap, and no name with an unknown part."""
+    parts = (part for endpoint in interface.endpoints for part in endpoint.name.parts)
+    return not interface.gaps and not any(isinstance(part, UnknownPart) for part in parts)
+
+
+def _executable_name(process: ResolvedProcess) -> str:
+    """Without a package launch takes ``exec`` as a path: manifests speak of its last part."""
+    return process.executable if process.package else process.executable.rpartition("/")[2]
+
+
+def _container(subject: _Subject) -> NodeInterface:
+    return NodeInterface(
+        package=subject.package,
+        executable=subject.executable,
+        plugin=None,
+        name=_CONTAINER_NODE_NAME,
+        namespace=None,
+        endpoints=(),
+        source=SourceRef("rclcpp_components, a container"),
+        library=ClientLibrary.RCLCPP,
+    )

@@ -1,0 +1,116 @@
+"""The library of manifests as one launch sees it: which document holds here, and what it says of one start.
+
+Takes what launch starts and descriptions that depend on the start; gives interfaces that no longer do. Reads the ament
+index, documents of the library and the configuration files that launch names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from enclave_launch.errors import UsageError
+from enclave_launch.options import ResolveOptions
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from nodl.ament_index import list_resources, package_version
+from nodl.node_interface import NodeInterface
+
+if TYPE_CHECKING:
+    from nodl.dependence import Situation
+    from nodl.library import Hit, Library
+
+_FURTHER = 32
+
+
+class LibraryAccess:
+    """Opens nothing until a node has no manifest, or one that depends on its start."""
+
+    def __init__(self, prefixes: Sequence[str], options: ResolveOptions, distro: str):
+        """Raises ``UsageError`` for a folder of documents that is not there."""
+        self._prefixes = prefixes
+        self._distro = distro
+        self._enabled = options.library
+        self._folders = options.library_folders
+        for folder in self._folders:
+            if not folder.is_dir():
+                raise UsageError(f"--library {folder}: no such directory")
+
+    @cached_property
+    def _library(self) -> Library:
+        from nodl.library import SHIPPED, Library
+
+        return Library(self._folders, SHIPPED if self._enabled else None)
+
+    @cached_property
+    def _installed(self) -> frozenset[str]:
+        return frozenset(list_resources("packages", self._prefixes))
+
+    def find(self, package: str | None, name: str) -> Hit | None:
+        """Raises ``InvalidNoDLError`` for a broken document."""
+        if package is None or not (self._enabled or self._folders):
+            return None
+        version = package_version(package, self._prefixes)
+        return self._library.find(package, name, distro=self._distro, version=version)
+
+    def complete(
+        self,
+        interfaces: Sequence[NodeInterface],
+        started: ResolvedProcess | ResolvedComponent,
+        container: ResolvedProcess | None,
+    ) -> tuple[NodeInterface, ...]:
+        """The nodes of one start, those that they bring along included. Raises ``InvalidNoDLError`` and, for a remap
+        rule at which the process would end, ``LaunchFileError``."""
+        found = [node for each in interfaces for node in self._complete(each, started, container)]
+        return tuple(found)
+
+    def _complete(
+        self,
+        interface: NodeInterface,
+        started: ResolvedProcess | ResolvedComponent,
+        container: ResolvedProcess | None,
+        depth: int = 0,
+    ) -> Iterator[NodeInterface]:
+        from nodl.dependence.apply import applied
+
+        named = self._named(interface, started)
+        done = applied(named, self._situation(named, started, container), self)
+        yield done.interface
+        for further in done.further if depth < _FURTHER else ():
+            yield from self._complete(further, started, container, depth + 1)
+
+    def _named(self, interface: NodeInterface, started: ResolvedProcess | ResolvedComponent) -> NodeInterface:
+        """A program that makes its node's name from its command line has it before launch's rules apply."""
+        if interface.depends is None or not (interface.depends.node_name or interface.depends.random_name):
+            return interface
+        from enclave_launch.policy.program_inputs import own_words
+        from nodl.dependence import Situation
+        from nodl.dependence.apply import own_name
+
+        words = tuple(own_words(started)) if isinstance(started, ResolvedProcess) else ()
+        name = own_name(interface, Situation(self._distro, "", "", started.parameters, words))
+        return interface._replace(name=name)
+
+    def _situation(
+        self,
+        interface: NodeInterface,
+        started: ResolvedProcess | ResolvedComponent,
+        container: ResolvedProcess | None,
+    ) -> Situation:
+        from enclave_launch.interfaces.situation import situation_of_component, situation_of_process
+
+        installed = self._installed if (started.package or "") in self._installed else None
+        if isinstance(started, ResolvedProcess):
+            return situation_of_process(started, interface, self._distro, installed)
+        return situation_of_component(started, container, interface, self._distro, installed)
+
+    def of_class(self, plugin_class: str) -> NodeInterface | None:
+        hit = self._library.of_class(plugin_class, distro=self._distro)
+        return hit.document.interface if hit else None
+
+    def named(self, name: str) -> NodeInterface | None:
+        hit = self._library.named(name, distro=self._distro)
+        return hit.document.interface if hit else None
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
+        return self._library.transports()

@@ -1,0 +1,74 @@
+"""How launch starts a node, as descriptions that depend on it need it: final names, parameters, words, packages.
+
+Takes a process or component of the evaluation, gives ``nodl.dependence.Situation``; next is the interface that a
+description has there. Reads the parameter files on the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from enclave_launch.policy.program_inputs import own_words
+from enclave_launch.policy.running_node import node_of_component, node_of_process
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_parameters
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+from nodl.dependence import Situation
+from nodl.node_interface import NodeInterface
+from nodl.remap import RemapRules, parse_rule
+
+
+def situation_of_process(
+    process: ResolvedProcess, interface: NodeInterface, distro: str, installed: frozenset[str] | None
+) -> Situation:
+    """Of one node of ``process``. Raises ``LaunchFileError`` for a remap rule at which the process would end."""
+    node = node_of_process(process, interface, "/", "node")
+    return Situation(
+        distro=distro,
+        node=node.name,
+        namespace=node.namespace,
+        parameters=_parameters(process, node.namespace, node.name),
+        words=tuple(own_words(process)),
+        installed=installed,
+        process_namespace=_process_namespace(process),
+    )
+
+
+def situation_of_component(
+    component: ResolvedComponent,
+    container: ResolvedProcess | None,
+    interface: NodeInterface,
+    distro: str,
+    installed: frozenset[str] | None,
+) -> Situation:
+    """Of one node of ``component``: its main node gets what the load request says, a further one what the container's
+    command line says. Raises ``LaunchFileError`` as ``situation_of_process``."""
+    node = node_of_component(component, container, interface, "/")
+    parameters: Mapping[str, ParameterValue] = component.parameters
+    if interface.own_rules:
+        parameters = _parameters(container, node.namespace, node.name) if container else {}
+    return Situation(
+        distro=distro,
+        node=node.name,
+        namespace=node.namespace,
+        parameters=parameters,
+        installed=installed,
+        process_namespace=_process_namespace(container) if container else "/",
+    )
+
+
+def _parameters(process: ResolvedProcess, namespace: str, name: str) -> Mapping[str, ParameterValue]:
+    """What the command line of ``process`` gives the node of this final name."""
+    tokens = [token for token in (*namespace.split("/"), name) if token]
+    written = process.parameter_files
+    return resolve_parameters(
+        tokens,
+        parse_ros_arguments(process.cmd).parameters,
+        lambda path: parameters_of_text(written[path]) if path in written else None,
+    )
+
+
+def _process_namespace(process: ResolvedProcess) -> str:
+    rules = tuple(parse_rule(text) for text in parse_ros_arguments(process.cmd).remaps)
+    return RemapRules(process=rules).namespace("/", "").name

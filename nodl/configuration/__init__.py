@@ -1,0 +1,56 @@
+"""Configuration files of tools that take any topic: what they name is what the tool needs, nothing else.
+
+``read_configuration`` gives endpoints with file and line, and a gap for each thing that cannot be told.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+from nodl.dependence import Situation
+from nodl.document.yaml_text import YamlValue, parse_yaml
+from nodl.errors import InvalidNoDLError
+from nodl.node_interface import Endpoint, Gap
+from nodl.source_ref import SourceRef
+
+
+class Configured(NamedTuple):
+    endpoints: tuple[Endpoint, ...] = ()
+    gaps: tuple[Gap, ...] = ()
+
+
+def read_configuration(kind: str, file: str, situation: Situation, place: SourceRef) -> Configured:
+    """What ``file`` (or the command line in ``situation``) asks for. ``place``: the document that says it is read."""
+    if kind == "ros_gz_bridge arguments":
+        from nodl.configuration.ros_gz_bridge import of_arguments
+
+        return of_arguments(situation.words, place)
+    if not file:
+        return Configured(
+            gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)
+        )
+    try:
+        root = _read(file)
+    except InvalidNoDLError as error:
+        return Configured(gaps=(Gap(SourceRef(file), f"{kind} file cannot be used: {error}"),))
+    if kind == "rviz":
+        from nodl.configuration.rviz import of_file
+
+        return of_file(root, situation.distro)
+    if kind == "ros_gz_bridge":
+        from nodl.configuration.ros_gz_bridge import of_configuration
+
+        return of_configuration(root)
+    return Configured(gaps=(Gap(place, f"nobody here can read a file of kind {kind!r}"),))
+
+
+def _read(file: str) -> YamlValue:
+    """Raises ``InvalidNoDLError``, also for a file that is not there."""
+    try:
+        if not os.path.isfile(file):
+            raise InvalidNoDLError.at(SourceRef(file), "there is no such file")
+        with open(file, "rb") as stream:
+            return parse_yaml(stream.read(), file)
+    except OSError as error:
+        raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None

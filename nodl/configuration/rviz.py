@@ -1,0 +1,211 @@
+"""An ``.rviz`` file: its displays and tools, enabled or not, and what each subscribes, publishes and calls.
+
+A display that is switched off counts too: the file offers it, one click of the user starts it. A class that is not in
+the table is a gap. Source: ros2/rviz jazzy, rviz_default_plugins (displays, tools).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from nodl.configuration import Configured
+from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.name_template import NameTemplate
+from nodl.names import InvalidNameError, shown, validate_written_name
+from nodl.node_interface import Endpoint, EndpointKind, Gap
+from nodl.source_ref import SourceRef
+
+_SUBSCRIBE, _PUBLISH = EndpointKind.SUBSCRIPTION, EndpointKind.PUBLISHER
+
+_DEFAULT = "rviz_default_plugins/"
+# Displays of one topic, the property "Topic", and its type.
+_DISPLAYS = {
+    "AccelStamped": "geometry_msgs/msg/AccelStamped",
+    "Camera": "sensor_msgs/msg/Image",
+    "CameraInfo": "sensor_msgs/msg/CameraInfo",
+    "Effort": "sensor_msgs/msg/JointState",
+    "FluidPressure": "sensor_msgs/msg/FluidPressure",
+    "GridCells": "nav_msgs/msg/GridCells",
+    "Illuminance": "sensor_msgs/msg/Illuminance",
+    "Image": "sensor_msgs/msg/Image",
+    "LaserScan": "sensor_msgs/msg/LaserScan",
+    "Map": "nav_msgs/msg/OccupancyGrid",
+    "Marker": "visualization_msgs/msg/Marker",
+    "MarkerArray": "visualization_msgs/msg/MarkerArray",
+    "Odometry": "nav_msgs/msg/Odometry",
+    "Path": "nav_msgs/msg/Path",
+    "PointCloud": "sensor_msgs/msg/PointCloud",
+    "PointCloud2": "sensor_msgs/msg/PointCloud2",
+    "PointStamped": "geometry_msgs/msg/PointStamped",
+    "Polygon": "geometry_msgs/msg/PolygonStamped",
+    "Pose": "geometry_msgs/msg/PoseStamped",
+    "PoseArray": "geometry_msgs/msg/PoseArray",
+    "PoseWithCovariance": "geometry_msgs/msg/PoseWithCovarianceStamped",
+    "Range": "sensor_msgs/msg/Range",
+    "RelativeHumidity": "sensor_msgs/msg/RelativeHumidity",
+    "Temperature": "sensor_msgs/msg/Temperature",
+    "TwistStamped": "geometry_msgs/msg/TwistStamped",
+    "Wrench": "geometry_msgs/msg/WrenchStamped",
+}
+# Tools that publish, with the topic that they have when the file names none.
+_TOOLS = {
+    "PublishPoint": ("/clicked_point", "geometry_msgs/msg/PointStamped"),
+    "SetGoal": ("goal_pose", "geometry_msgs/msg/PoseStamped"),
+    "SetInitialPose": ("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped"),
+}
+_SILENT_DISPLAYS = ("Axes", "Grid", "TF")  # /tf is the listener's, which every rviz2 has
+_SILENT_TOOLS = ("FocusCamera", "Interact", "Measure", "MoveCamera", "Select")
+
+
+def of_file(root: YamlValue, distro: str) -> Configured:
+    """What rviz2 needs for the configuration ``root``."""
+    reading = _Reading(distro)
+    manager = _get(root, "Visualization Manager")
+    for display in _listed(manager, "Displays"):
+        reading.display(display)
+    for tool in _listed(manager, "Tools"):
+        reading.tool(tool)
+    for panel in _listed(root, "Panels"):
+        reading.panel(panel)
+    return Configured(tuple(dict.fromkeys(reading.endpoints)), tuple(reading.gaps))
+
+
+@dataclass(slots=True)
+class _Reading:
+    distro: str
+    endpoints: list[Endpoint] = field(default_factory=list)
+    gaps: list[Gap] = field(default_factory=list)
+
+    def display(self, display: YamlMap) -> None:
+        kind = _text(display, "Class")
+        short = kind.removeprefix(_DEFAULT)
+        if kind == "rviz_common/Group":
+            for inner in _listed(display, "Displays"):
+                self.display(inner)
+        elif short == kind or (
+            short not in _DISPLAYS and short not in _SPECIAL and short not in _SILENT_DISPLAYS
+        ):
+            self._unknown(display, f"display of class {shown(kind)}")
+        elif short in _SPECIAL:
+            _SPECIAL[short](self, display)
+        elif short in _DISPLAYS:
+            self._topic(_SUBSCRIBE, *_topic(display, "Topic"), _DISPLAYS[short], f"display {kind}")
+            if short in _MORE:
+                _MORE[short](self, display)
+
+    def tool(self, tool: YamlMap) -> None:
+        kind = _text(tool, "Class")
+        short = kind.removeprefix(_DEFAULT)
+        if short in _TOOLS and short != kind:
+            default, type_name = _TOOLS[short]
+            name, place = _topic(tool, "Topic")
+            self._topic(_PUBLISH, name or default, place, type_name, f"tool {kind}")
+        elif short == kind or short not in _SILENT_TOOLS:
+            self._unknown(tool, f"tool of class {shown(kind)}")
+
+    def panel(self, panel: YamlMap) -> None:
+        kind = _text(panel, "Class")
+        if not kind.startswith("rviz_common/"):
+            self._unknown(panel, f"panel of class {shown(kind)}")
+
+    def robot_model(self, display: YamlMap) -> None:
+        if _text(display, "Description Source") != "File":
+            name, place = _topic(display, "Description Topic")
+            self._topic(_SUBSCRIBE, name, place, "std_msgs/msg/String", "display of a robot model")
+
+    def depth_cloud(self, display: YamlMap) -> None:
+        name, place = _topic(display, "Depth Map Topic")
+        self._topic(_SUBSCRIBE, name, place, "sensor_msgs/msg/Image", "display of a depth cloud")
+        self._camera_info(name, place)
+        name, place = _topic(display, "Color Image Topic")
+        self._topic(_SUBSCRIBE, name, place, "sensor_msgs/msg/Image", "display of a depth cloud")
+
+    def interactive_markers(self, display: YamlMap) -> None:
+        name, place = _topic(display, "Interactive Markers Namespace")
+        if not name:
+            return
+        why = "display of interactive markers"
+        self._topic(
+            _SUBSCRIBE, f"{name}/update", place, "visualization_msgs/msg/InteractiveMarkerUpdate", why
+        )
+        self._topic(
+            _PUBLISH, f"{name}/feedback", place, "visualization_msgs/msg/InteractiveMarkerFeedback", why
+        )
+        type_name = "visualization_msgs/srv/GetInteractiveMarkers"
+        self._topic(EndpointKind.SERVICE_CLIENT, f"{name}/get_interactive_markers", place, type_name, why)
+
+    def camera(self, display: YamlMap) -> None:
+        self._camera_info(*_topic(display, "Topic"))
+
+    def map(self, display: YamlMap) -> None:
+        name, place = _topic(display, "Update Topic")
+        if not name:
+            name, place = _topic(display, "Topic")
+            name = name and f"{name}_updates"
+        self._topic(_SUBSCRIBE, name, place, "map_msgs/msg/OccupancyGridUpdate", "display of a map")
+
+    def marker(self, display: YamlMap) -> None:
+        name, place = _topic(display, "Topic")
+        type_name = "visualization_msgs/msg/MarkerArray"
+        self._topic(_SUBSCRIBE, name and f"{name}_array", place, type_name, "display of markers")
+
+    def effort(self, display: YamlMap) -> None:
+        name = _text(display, "Robot Description") or "robot_description"
+        self._topic(_SUBSCRIBE, name, display.source, "std_msgs/msg/String", "display of efforts")
+
+    def _camera_info(self, image: str, place: SourceRef) -> None:
+        """``image_transport::getCameraInfoTopic``: beside the image."""
+        if image:
+            beside = f"{image.rpartition('/')[0]}/camera_info" if "/" in image else "camera_info"
+            self._topic(_SUBSCRIBE, beside, place, "sensor_msgs/msg/CameraInfo", "camera of a display")
+
+    def _topic(self, kind: EndpointKind, name: str, place: SourceRef, type_name: str, why: str) -> None:
+        if not name:
+            return  # rviz asks for nothing until somebody chooses a topic
+        try:
+            validate_written_name(name)
+        except InvalidNameError as error:
+            self.gaps.append(Gap(place, str(error)))
+            return
+        self.endpoints.append(Endpoint(kind, NameTemplate.literal(name), type_name, place, note=why))
+
+    def _unknown(self, item: YamlMap, what: str) -> None:
+        self.gaps.append(Gap(item.source, f"what the {what} needs is not known"))
+
+
+_SPECIAL = {
+    "DepthCloud": _Reading.depth_cloud,
+    "InteractiveMarkers": _Reading.interactive_markers,
+    "RobotModel": _Reading.robot_model,
+}
+_MORE = {
+    "Camera": _Reading.camera,
+    "Effort": _Reading.effort,
+    "Map": _Reading.map,
+    "Marker": _Reading.marker,
+}
+
+
+def _get(value: YamlValue | None, key: str) -> YamlValue | None:
+    return value.items.get(key) if isinstance(value, YamlMap) else None
+
+
+def _text(value: YamlMap, key: str) -> str:
+    found = _get(value, key)
+    return found.value if isinstance(found, YamlScalar) and isinstance(found.value, str) else ""
+
+
+def _topic(display: YamlMap, key: str) -> tuple[str, SourceRef]:
+    """A topic property is a mapping with ``Value`` (and QoS); older files have the name itself."""
+    found = _get(display, key)
+    if isinstance(found, YamlMap):
+        return _text(found, "Value"), found.source
+    return _text(display, key), display.source
+
+
+def _listed(value: YamlValue | None, key: str) -> Iterator[YamlMap]:
+    found = _get(value, key)
+    for item in found.items if isinstance(found, YamlList) else ():
+        if isinstance(item, YamlMap):
+            yield item

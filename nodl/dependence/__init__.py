@@ -1,0 +1,138 @@
+"""What of a described node depends on how launch starts it: parameters, arguments, plugins, the distribution.
+
+A NoDL v2 document lists plain names. Our section of its ``codegen`` may say beside them which of them follow a
+parameter, exist only under a condition, or repeat for each entry of a list; which plugins and further nodes the program
+brings; which configuration files name the rest. ``document.v2_section`` reads it into these values, ``apply`` turns
+a description and a ``Situation`` into the interface that this one start has. docs/library.md shows the written form.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import NamedTuple
+
+from nodl.node_interface import EndpointKind
+
+
+class Test(NamedTuple):
+    """One demand on a parameter (or an option ``--name``); ``parameter`` is a template.
+
+    ``values``: it has one of them, or with ``contains`` it is a list with one of them. ``is_set``: it has some value
+    that is not empty. ``negated`` turns the answer round.
+    """
+
+    parameter: str
+    values: tuple[str, ...] = ()
+    contains: bool = False
+    is_set: bool = False
+    negated: bool = False
+
+
+class When(NamedTuple):
+    """``any_of`` groups of tests, each of which must hold as a whole; none at all: always.
+
+    ``since`` and ``until``: first and last distribution.
+    """
+
+    any_of: tuple[tuple[Test, ...], ...] = ()
+    since: str = ""
+    until: str = ""
+
+
+class Variation(NamedTuple):
+    """How one listed endpoint varies. ``name``: a template (empty: as listed). ``each``: a list parameter, or a pattern
+    of parameter names with one ``*``; the endpoint repeats for each entry, which the name calls ``$(item)``."""
+
+    name: str = ""
+    each: str = ""
+    when: When = When()
+
+
+class FurtherNode(NamedTuple):
+    """A node that the program makes beside its main one, with options of its own.
+
+    ``document``: ``package/name`` of its description. ``namespace`` is relative to the main node's unless absolute.
+    """
+
+    document: str
+    node: str
+    namespace: str
+    when: When = When()
+
+
+class PluginList(NamedTuple):
+    """Plugins that the node loads. ``parameter`` holds the names of the instances (a list, a text, or a pattern with
+    ``*``); the parameter ``type`` (a template with ``$(plugin)``) holds the class of each. ``types``: default classes.
+    """
+
+    parameter: str
+    default: tuple[str, ...] = ()
+    type: str = "$(plugin).plugin"
+    types: Mapping[str, str] = MappingProxyType({})
+    when: When = When()
+
+
+class Transport(NamedTuple):
+    """A base topic of image_transport: each installed transport adds names below it.
+
+    ``side`` is ``publishers`` or ``subscriptions``; a subscription uses one transport, that of ``parameter``.
+    """
+
+    side: str
+    base: str
+    parameter: str = ""
+    when: When = When()
+
+
+class Configuration(NamedTuple):
+    """A file (or command line) of a tool's own format that names what it needs; ``kind`` chooses the reader."""
+
+    kind: str
+    file: str = ""
+    when: When = When()
+
+
+class StatedGap(NamedTuple):
+    """What the document says it does not know."""
+
+    why: str
+    each: str = ""
+    when: When = When()
+
+
+class Dependence(NamedTuple):
+    """All of it for one document. ``defaults``: of the parameters. ``options``: command-line options that take a value,
+    by their name here. ``node_name``: a template for the node's own name; ``random_name``: the program appends ``_``
+    and something of its own making, unless launch names the node. ``own_node``: a plugin that is a node, named
+    as its instance. ``tf_listener``: it makes a ``TransformListener`` without a node, which then makes its own.
+    """
+
+    variations: Mapping[tuple[EndpointKind, str], Variation] = MappingProxyType({})
+    nodes: tuple[FurtherNode, ...] = ()
+    plugins: tuple[PluginList, ...] = ()
+    transports: tuple[Transport, ...] = ()
+    configurations: tuple[Configuration, ...] = ()
+    gaps: tuple[StatedGap, ...] = ()
+    defaults: Mapping[str, object] = MappingProxyType({})
+    options: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    node_name: str = ""
+    random_name: bool = False
+    own_node: bool = False
+    tf_listener: bool = False
+
+
+class Situation(NamedTuple):
+    """One start of a node. ``node`` and ``namespace`` are final; ``words``: of its command line, without ROS arguments.
+
+    ``installed``: the packages of the ament index, ``None`` when nothing can be said about them.
+    ``process_namespace``: what nodes get that the program makes without a namespace.
+    """
+
+    distro: str
+    node: str
+    namespace: str
+    parameters: Mapping[str, object] = MappingProxyType({})
+    words: tuple[str, ...] = ()
+    installed: frozenset[str] | None = None
+    process_namespace: str = "/"

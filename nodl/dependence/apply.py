@@ -1,0 +1,262 @@
+"""A described node and one situation of it give the interface that it has there, and the nodes it brings along.
+
+What cannot be told is a gap of the interface, never a name that was guessed. Reads configuration files that launch
+names, and asks ``Documents`` for plugins and further nodes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import NamedTuple, Protocol
+
+from nodl.dependence import (
+    Configuration,
+    Dependence,
+    FurtherNode,
+    PluginList,
+    Situation,
+    Transport,
+    Variation,
+)
+from nodl.dependence.scope import Filled, Scope
+from nodl.name_template import NameTemplate
+from nodl.names import join
+from nodl.node_interface import Certainty, Endpoint, EndpointKind, Gap, NodeInterface
+
+_NOTHING = Dependence()
+_DEPTH = 8
+
+
+class Documents(Protocol):
+    """Where the descriptions of plugins and further nodes are found; ``None``: nobody describes it."""
+
+    def of_class(self, plugin_class: str) -> NodeInterface | None: ...
+
+    def named(self, name: str) -> NodeInterface | None: ...
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]: ...
+
+
+class Applied(NamedTuple):
+    """``further``: nodes of the same process, to be applied in situations of their own."""
+
+    interface: NodeInterface
+    further: tuple[NodeInterface, ...] = ()
+
+
+def applied(interface: NodeInterface, situation: Situation, documents: Documents) -> Applied:
+    """``interface`` as it is in ``situation``; one that depends on nothing is returned as it is."""
+    if interface.depends is None:
+        return Applied(interface)
+    work = _Application(interface, situation, documents)
+    work.describe(interface, "", (), 0)
+    result = interface._replace(
+        endpoints=tuple(dict.fromkeys(work.endpoints)), gaps=tuple(dict.fromkeys(work.gaps)), depends=None
+    )
+    return Applied(result, tuple(work.further))
+
+
+def own_name(interface: NodeInterface, situation: Situation) -> str | None:
+    """The name that the program gives its node, where that follows the command line or is random (then with ``*``)."""
+    depends = interface.depends
+    if depends is None:
+        return interface.name
+    if depends.random_name:
+        return f"{interface.name}_*"
+    scope = Scope(situation, depends.defaults, depends.options)
+    return scope.fill(depends.node_name).text or interface.name
+
+
+class _Application:
+    def __init__(self, interface: NodeInterface, situation: Situation, documents: Documents):
+        self._main = interface
+        self._situation = situation
+        self._documents = documents
+        self.endpoints: list[Endpoint] = []
+        self.gaps: list[Gap] = [*interface.gaps]
+        self.further: list[NodeInterface] = []
+
+    def describe(self, interface: NodeInterface, plugin: str, notes: tuple[str, ...], depth: int) -> None:
+        """Add what ``interface``, the node itself or a plugin of it, has."""
+        depends = interface.depends or _NOTHING
+        scope = Scope(self._situation, depends.defaults, depends.options, plugin)
+        for endpoint in interface.endpoints:
+            variation = depends.variations.get((endpoint.kind, endpoint.name.text))
+            self.endpoints.extend(_varied(endpoint, variation or Variation(), scope, notes))
+        for gap in depends.gaps:
+            for item in _repeated(gap.each, scope):
+                if scope.holds(gap.when, item):
+                    why = scope.fill(gap.why, item).text or gap.why
+                    self.gaps.append(Gap(interface.source, "; ".join((why, *notes))))
+        for plugins in depends.plugins:
+            self._load(plugins, scope, interface, depth)
+        for transport in depends.transports:
+            self._transport(transport, scope, interface, notes)
+        for node in depends.nodes:
+            self._further(node, scope, interface)
+        for configuration in depends.configurations:
+            self._configured(configuration, scope, interface)
+        if depends.tf_listener:
+            self.endpoints.extend(_tf_listener(interface, self._situation))
+
+    def _load(self, plugins: PluginList, scope: Scope, by: NodeInterface, depth: int) -> None:
+        if not scope.holds(plugins.when):
+            return
+        if depth >= _DEPTH:
+            self.gaps.append(Gap(by.source, "plugins that load plugins are nested too deep"))
+            return
+        instances = list(scope.items(plugins.parameter))
+        if not instances and scope.value(plugins.parameter) is None:
+            instances = list(plugins.default)
+        for instance in dict.fromkeys(instances):
+            self._load_one(instance, plugins, scope, by, depth)
+
+    def _load_one(
+        self, instance: str, plugins: PluginList, scope: Scope, by: NodeInterface, depth: int
+    ) -> None:
+        inner = Scope(self._situation, {}, {}, instance)
+        class_parameter = inner.fill(
+            plugins.type.replace("$(outer)", scope.fill("$(plugin)").text or "")
+        ).text
+        value = scope.value(class_parameter or "", plugins.types.get(instance))
+        if value is None:
+            self.gaps.append(
+                Gap(by.source, f"the class of plugin '{instance}' is not known: {class_parameter} is not set")
+            )
+            return
+        described = self._documents.of_class(str(value.value))
+        if described is None:
+            self.gaps.append(
+                Gap(by.source, f"plugin '{instance}' is of class {value.value}, which no document describes")
+            )
+            return
+        if described.depends is not None and described.depends.own_node:
+            self.further.append(described._replace(name=instance, own_rules=(f"__node:={instance}",)))
+            return
+        self.describe(described, instance, (f"plugin {instance} of class {value.value}",), depth + 1)
+
+    def _transport(
+        self, transport: Transport, scope: Scope, by: NodeInterface, notes: tuple[str, ...]
+    ) -> None:
+        if not scope.holds(transport.when):
+            return
+        base = scope.fill(transport.base)
+        name = base.text
+        if not name:
+            return
+        wanted = scope.value(f"{name.lstrip('~/').replace('/', '.')}.enable_pub_plugins")
+        chosen = scope.value(transport.parameter) if transport.parameter else None
+        for short, package, described in self._documents.transports():
+            if transport.side == "publishers":
+                enabled = wanted is None or any(
+                    short in (entry.rpartition("/")[2], entry) for entry in map(str, _sequence(wanted.value))
+                )
+                if not enabled or not self._is_installed(package):
+                    continue
+            elif chosen is None or str(chosen.value) != short:
+                continue
+            kind = EndpointKind.PUBLISHER if transport.side == "publishers" else EndpointKind.SUBSCRIPTION
+            for endpoint in described.endpoints:
+                full = endpoint.name.text.replace("base", name, 1)
+                note = "; ".join((*base.notes, f"image_transport {short}", *notes))
+                self.endpoints.append(
+                    endpoint._replace(kind=kind, name=NameTemplate.literal(full), source=by.source, note=note)
+                )
+
+    def _is_installed(self, package: str) -> bool:
+        return self._situation.installed is not None and package in self._situation.installed
+
+    def _further(self, node: FurtherNode, scope: Scope, by: NodeInterface) -> None:
+        if not scope.holds(node.when):
+            return
+        described = self._documents.named(node.document)
+        name = scope.fill(node.node).text
+        if described is None or name is None:
+            self.gaps.append(Gap(by.source, f"no document {node.document} describes its node '{node.node}'"))
+            return
+        namespace = join(self._situation.namespace, scope.fill(node.namespace).text or "")
+        if node.namespace.startswith("/"):
+            namespace = node.namespace
+        self.further.append(
+            described._replace(
+                package=by.package,
+                executable=by.executable,
+                plugin=by.plugin,
+                name=name,
+                namespace=namespace,
+                own_rules=(f"__node:={name}", f"__ns:={namespace.rstrip('/') or '/'}"),
+            )
+        )
+
+    def _configured(self, configuration: Configuration, scope: Scope, by: NodeInterface) -> None:
+        if not scope.holds(configuration.when):
+            return
+        from nodl.configuration import read_configuration
+
+        file = scope.fill(configuration.file).text
+        found = read_configuration(configuration.kind, file or "", self._situation, by.source)
+        self.endpoints.extend(found.endpoints)
+        self.gaps.extend(found.gaps)
+
+
+_LONE = re.compile(r"\$\(param (?:[^ ()$]|\$\([a-z]+\))+\)\Z")
+"""A template that is one parameter and nothing else."""
+
+
+def _varied(
+    endpoint: Endpoint, variation: Variation, scope: Scope, notes: tuple[str, ...]
+) -> Iterator[Endpoint]:
+    if variation.each:
+        notes = (f"entry of {variation.each}", *notes)
+    for item in _repeated(variation.each, scope):
+        if not scope.holds(variation.when, item):
+            continue
+        if not variation.name:
+            yield endpoint._replace(note="; ".join(notes))
+            continue
+        filled = scope.fill(variation.name, item)
+        if filled.text is None and not variation.each and _LONE.match(variation.name):
+            yield _default(endpoint, variation.name, notes)
+        elif filled.text != "":  # an empty name switches an endpoint off
+            yield _named(endpoint, filled, notes)
+
+
+def _default(endpoint: Endpoint, template: str, notes: tuple[str, ...]) -> Endpoint:
+    """The listed name: what it has while nobody sets the parameter."""
+    parameter = template.removeprefix("$(param ").removesuffix(")")
+    note = "; ".join((f"parameter {parameter}, its default", *notes))
+    return endpoint._replace(note=note, certainty=Certainty.FROM_DEFAULT)
+
+
+def _named(endpoint: Endpoint, filled: Filled, notes: tuple[str, ...]) -> Endpoint:
+    return endpoint._replace(name=filled.template, note="; ".join((*filled.notes, *notes)))
+
+
+def _repeated(each: str, scope: Scope) -> Iterator[str]:
+    return scope.items(each) if each else iter(("",))
+
+
+def _sequence(value: object) -> tuple[object, ...]:
+    return tuple(value) if isinstance(value, (list, tuple)) else (value,)
+
+
+def _tf_listener(interface: NodeInterface, situation: Situation) -> Iterator[Endpoint]:
+    """``tf2_ros::TransformListener`` without a node makes one named by a memory address (transform_listener.cpp).
+
+    Of what that node has, only its service to describe types, which it has since iron, is named after it.
+    """
+    if situation.distro in ("foxy", "galactic", "humble"):
+        return
+    if situation.parameters.get("start_type_description_service") is False:
+        return
+    yield Endpoint(
+        EndpointKind.SERVICE_SERVER,
+        NameTemplate.literal(
+            join(situation.process_namespace, "transform_listener_impl_*/get_type_description")
+        ),
+        "type_description_interfaces/srv/GetTypeDescription",
+        interface.source,
+        Certainty.PATTERN,
+        note="the helper node of a TransformListener, whose name ends in a memory address",
+    )

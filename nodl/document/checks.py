@@ -1,0 +1,131 @@
+"""Small checkers over lined YAML values, from which the rules of a document are put together. Pure.
+
+Each takes a value and what to call it, and raises ``InvalidNoDLDocumentError`` with file:line, or is content.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+
+from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.errors import InvalidNoDLDocumentError
+from nodl.names import shown
+
+Checker = Callable[[YamlValue, str], None]
+
+
+def fail(value: YamlValue, message: str) -> None:
+    raise InvalidNoDLDocumentError.at(value.source, message)
+
+
+def text_of(pattern: str | None = None, meaning: str = "") -> Checker:
+    compiled = re.compile(pattern) if pattern else None
+
+    def check(value: YamlValue, what: str) -> None:
+        if not isinstance(value, YamlScalar) or not isinstance(value.value, str):
+            fail(value, f"{what} must be text")
+        elif compiled and not compiled.search(value.value):
+            fail(value, f"{what} {shown(value.value)} is not {meaning}")
+
+    return check
+
+
+def one_of(*allowed: str) -> Checker:
+    def check(value: YamlValue, what: str) -> None:
+        if not isinstance(value, YamlScalar) or value.value not in allowed:
+            fail(value, f"{what} must be one of {', '.join(allowed)}")
+
+    return check
+
+
+def integer(minimum: int, maximum: int | None = None) -> Checker:
+    def check(value: YamlValue, what: str) -> None:
+        number = value.value if isinstance(value, YamlScalar) else None
+        if isinstance(number, bool) or not isinstance(number, int):
+            fail(value, f"{what} must be an integer")
+        elif number < minimum or (maximum is not None and number > maximum):
+            limit = f"at least {minimum}" if maximum is None else f"between {minimum} and {maximum}"
+            fail(value, f"{what} must be {limit}")
+
+    return check
+
+
+def boolean(value: YamlValue, what: str) -> None:
+    if not isinstance(value, YamlScalar) or not isinstance(value.value, bool):
+        fail(value, f"{what} must be true or false")
+
+
+def number(value: YamlValue, what: str) -> None:
+    given = value.value if isinstance(value, YamlScalar) else None
+    if isinstance(given, bool) or not isinstance(given, (int, float)):
+        fail(value, f"{what} must be a number")
+
+
+def anything(value: YamlValue, what: str) -> None:
+    """No rule."""
+
+
+def list_of(item: Checker, length: int | None = None, minimum: int = 0) -> Checker:
+    def check(value: YamlValue, what: str) -> None:
+        if not isinstance(value, YamlList):
+            fail(value, f"{what} must be a list")
+            return
+        if length is not None and len(value.items) != length:
+            fail(value, f"{what} must have exactly {length} elements")
+        if len(value.items) < minimum:
+            fail(value, f"{what} must have at least {minimum} elements")
+        for index, each in enumerate(value.items):
+            item(each, f"{what}[{index}]")
+
+    return check
+
+
+def map_of(
+    keys: Mapping[str, Checker] | None = None,
+    required: tuple[str, ...] = (),
+    others: Checker | None = None,
+    patterns: Mapping[str, Checker] | None = None,
+    also: Callable[[YamlMap, str], None] | None = None,
+) -> Checker:
+    """A mapping: known ``keys``, else by ``patterns``, else ``others``; an unknown key is an error."""
+
+    def check(value: YamlValue, what: str) -> None:
+        if not isinstance(value, YamlMap):
+            fail(value, f"{what} must be a mapping")
+            return
+        for name in required:
+            if name not in value.items:
+                fail(value, f"{what} needs the key '{name}'")
+        for name, each in value.items.items():
+            by_pattern = (c for p, c in (patterns or {}).items() if re.fullmatch(p, name))
+            checker = (keys or {}).get(name) or next(by_pattern, others)
+            if checker is None:
+                known = ", ".join(keys or ())
+                raise InvalidNoDLDocumentError.at(
+                    value.keys[name], f"{what} has no key {shown(name)}; known: {known}"
+                )
+            checker(each, name if what == "the document" else f"{what}.{name}")
+        if also:
+            also(value, what)
+
+    return check
+
+
+def either(*checkers: Checker) -> Checker:
+    """The first checker that is content; the complaint of the last one otherwise."""
+
+    def check(value: YamlValue, what: str) -> None:
+        for checker in checkers[:-1]:
+            try:
+                return checker(value, what)
+            except InvalidNoDLDocumentError:
+                continue
+        return checkers[-1](value, what)
+
+    return check
+
+
+def null(value: YamlValue, what: str) -> None:
+    if not isinstance(value, YamlScalar) or value.value is not None:
+        fail(value, f"{what} takes no argument")

@@ -1,0 +1,134 @@
+"""The library of manifests: what nodes of widely used packages say, for those who have no manifest of them.
+
+Folders of NoDL v2 documents, one for each program, plugin or further node: those of users (``--library DIR``) before
+the one that ships with us. ``find`` opens the index and one document. docs/library.md describes the form.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+from nodl.errors import NoDLError
+from nodl.library.document import LibraryDocument, read_library_document
+from nodl.library.index import IndexEntry, read_index, scanned
+from nodl.node_interface import NodeInterface
+
+SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "documents")
+
+
+class Hit(NamedTuple):
+    """A document for what was asked. ``doubt``: it was written for another version, in words for a person."""
+
+    document: LibraryDocument
+    doubt: str = ""
+
+
+class Library:
+    """Folders of documents, the first that knows a name decides. ``folders``: those of the user."""
+
+    def __init__(self, folders: Iterable[str | os.PathLike[str]] = (), shipped: str | None = SHIPPED):
+        self._folders = [os.path.abspath(folder) for folder in folders]
+        for folder in self._folders:
+            if not os.path.isdir(folder):
+                raise NoDLError(f"--library {folder}: no such directory")
+        self._shipped = shipped
+        self._indexes: dict[str, tuple[IndexEntry, ...]] = {}
+
+    def find(self, package: str, name: str, *, distro: str = "", version: str | None = None) -> Hit | None:
+        """The document of executable or plugin ``name``. ``version``: of the installed package, if known.
+
+        Raises ``InvalidNoDLError`` for a broken document.
+        """
+        for folder in self._all():
+            entries = [e for e in self._entries(folder) if e.package == package and name in e.programs]
+            if entries:
+                return _chosen(folder, entries, distro, version)
+        return None
+
+    def of_class(self, plugin_class: str, *, distro: str = "") -> Hit | None:
+        """The document of a plugin, by the name of its class as launch files give it."""
+        for folder in self._all():
+            entries = [e for e in self._entries(folder) if plugin_class in e.classes]
+            if entries:
+                return _chosen(folder, entries, distro, None)
+        return None
+
+    def named(self, name: str, *, distro: str = "") -> Hit | None:
+        """The document ``package/stem``, as documents refer to each other."""
+        for folder in self._all():
+            entries = [e for e in self._entries(folder) if e.stem == name]
+            if entries:
+                return _chosen(folder, entries, distro, None)
+        return None
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
+        """Short name, package and description of each transport of image_transport."""
+        found: dict[str, tuple[str, str, NodeInterface]] = {}
+        for folder in self._all():
+            for entry in self._entries(folder):
+                if entry.transport and entry.transport not in found:
+                    interface = read_library_document(os.path.join(folder, entry.file)).interface
+                    found[entry.transport] = (entry.transport, entry.package, interface)
+        return tuple(found.values())
+
+    def documents(self) -> Iterator[LibraryDocument]:
+        """All of them, each package and name once, sorted."""
+        seen: dict[str, str] = {}
+        for folder in self._all():
+            for entry in self._entries(folder):
+                seen.setdefault(entry.file, os.path.join(folder, entry.file))
+        for file in sorted(seen):
+            yield read_library_document(seen[file])
+
+    def _all(self) -> Sequence[str]:
+        return [*self._folders, *([self._shipped] if self._shipped else [])]
+
+    def _entries(self, folder: str) -> tuple[IndexEntry, ...]:
+        if folder not in self._indexes:
+            self._indexes[folder] = read_index(folder) if folder == SHIPPED else scanned(folder)
+        return self._indexes[folder]
+
+
+def _chosen(folder: str, entries: Sequence[IndexEntry], distro: str, version: str | None) -> Hit:
+    """The entry for this version, else the last, with a doubt that names both."""
+    fitting = [entry for entry in entries if fits(entry.versions, distro, version)]
+    document = _read(os.path.join(folder, (fitting or entries)[-1].file))
+    return Hit(document, "" if fitting else _doubt(document, distro, version))
+
+
+def fits(versions: dict[str, str], distro: str, version: str | None) -> bool:
+    """Whether a document that was read from ``versions`` (a series by distribution) holds here.
+
+    A series covers what begins with it: 1.3 covers 1.3.7. Without an installed version the distribution decides; a
+    document that names none holds for all.
+    """
+    if not versions:
+        return True
+    if version is None:
+        return not distro or distro in versions
+    return any(_in_series(version, series) for series in versions.values())
+
+
+def series_of(versions: dict[str, str], distro: str, version: str | None) -> str:
+    """The distribution by whose rules the document is read: that of the installed version, where one is known."""
+    if version is not None and not (distro in versions and _in_series(version, versions[distro])):
+        return next((name for name, series in versions.items() if _in_series(version, series)), distro)
+    return distro
+
+
+def _in_series(version: str, series: str) -> bool:
+    return version.split(".")[: len(series.split("."))] == series.split(".")
+
+
+@lru_cache(maxsize=256)
+def _read(path: str) -> LibraryDocument:
+    return read_library_document(path)
+
+
+def _doubt(document: LibraryDocument, distro: str, version: str | None) -> str:
+    read = ", ".join(f"{series} ({name})" for name, series in document.versions.items())
+    here = f"version {version}" if version else f"distribution {distro}"
+    return f"{document.stem} was written for {read}, here is {here}"

@@ -1,0 +1,77 @@
+"""One document of a library: the node that it describes, the versions it holds for, and how that is known."""
+
+from __future__ import annotations
+
+import os
+from typing import NamedTuple
+
+from nodl.document import read_root
+from nodl.document.v2 import parse_root
+from nodl.document.v2_section import plain, section_of
+from nodl.node_interface import NodeInterface
+
+SUFFIX = ".nodl.yaml"
+
+
+class Evidence(NamedTuple):
+    """Where the description comes from. ``missing``: what is known to be left out; ``differs``: why an analysis of
+    the same sources says something else."""
+
+    repository: str = ""
+    version: str = ""
+    commit: str = ""
+    how: str = ""
+    missing: tuple[str, ...] = ()
+    differs: tuple[str, ...] = ()
+
+
+class LibraryDocument(NamedTuple):
+    """``stem``: ``package/name`` of the file. ``programs``: executables and plugins that run this node;
+    ``classes``: names of the class if other nodes load it. ``versions``: a series by distribution."""
+
+    interface: NodeInterface
+    stem: str
+    file: str
+    programs: tuple[str, ...]
+    classes: tuple[str, ...]
+    versions: dict[str, str]
+    evidence: Evidence
+    transport: str = ""
+
+    @property
+    def package(self) -> str:
+        return self.stem.partition("/")[0]
+
+
+def read_library_document(path: str) -> LibraryDocument:
+    """The document at ``.../PACKAGE/NAME.nodl.yaml``. Raises ``InvalidNoDLError``."""
+    package = os.path.basename(os.path.dirname(path))
+    name = os.path.basename(path).removesuffix(SUFFIX)
+    root = read_root(path)
+    section = section_of(root)
+    given = plain(section) if section else {}
+    assert isinstance(given, dict)
+    classes = tuple(given.get("classes") or ())
+    node = parse_root(root, path, package=package, name=name).interface
+    programs = () if classes or given.get("transport") else (node.executable, node.plugin)
+    return LibraryDocument(
+        interface=node,
+        stem=f"{package}/{name}",
+        file=path,
+        programs=(*(each for each in programs if each), *(given.get("also") or ())),
+        classes=classes,
+        versions=given.get("versions") or {},
+        evidence=_evidence(given.get("evidence") or {}),
+        transport=given.get("transport") or "",
+    )
+
+
+def _evidence(given: dict[str, str]) -> Evidence:
+    return Evidence(
+        given.get("repository", ""),
+        given.get("version", ""),
+        given.get("commit", ""),
+        given.get("how", ""),
+        tuple(given.get("missing") or ()),
+        tuple(given.get("differs") or ()),
+    )

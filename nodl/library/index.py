@@ -1,0 +1,90 @@
+"""What a folder of documents knows, without opening them: an index file, or a scan of the folder.
+
+The index of the library that ships with us is ``index.json`` beside the documents; a test holds it to them, and
+``secure-nodl library index`` writes it anew. Folders of users are scanned: they are small, and change.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from nodl.library.document import SUFFIX, LibraryDocument, read_library_document
+
+INDEX = "index.json"
+
+
+class IndexEntry(NamedTuple):
+    """One document: ``file`` relative to the folder, and by what it is found."""
+
+    file: str
+    programs: tuple[str, ...] = ()
+    classes: tuple[str, ...] = ()
+    versions: dict[str, str] = {}  # noqa: RUF012  # never changed
+    transport: str = ""
+
+    @property
+    def package(self) -> str:
+        return self.file.partition("/")[0]
+
+    @property
+    def stem(self) -> str:
+        return self.file.removesuffix(SUFFIX)
+
+
+def read_index(folder: str) -> tuple[IndexEntry, ...]:
+    with open(os.path.join(folder, INDEX), encoding="utf-8") as stream:
+        listed = json.load(stream)
+    return tuple(
+        IndexEntry(
+            file,
+            tuple(entry.get("programs", ())),
+            tuple(entry.get("classes", ())),
+            entry.get("versions", {}),
+            entry.get("transport", ""),
+        )
+        for file, entry in listed.items()
+    )
+
+
+def scanned(folder: str) -> tuple[IndexEntry, ...]:
+    """The entries of all documents below ``folder``. Raises ``InvalidNoDLError`` for a broken one."""
+    return tuple(_entry(folder, read_library_document(path)) for path in _files(folder))
+
+
+def index_text(folder: str) -> str:
+    """What the index of ``folder`` must say."""
+    fields = ("programs", "classes", "versions", "transport")
+    entries = {
+        entry.file: {name: getattr(entry, name) for name in fields if getattr(entry, name)}
+        for entry in scanned(folder)
+    }
+    lines = (f"  {json.dumps(file)}: {json.dumps(entry)}" for file, entry in entries.items())
+    return "{\n" + ",\n".join(lines) + "\n}\n"
+
+
+def _entry(folder: str, document: LibraryDocument) -> IndexEntry:
+    return IndexEntry(
+        os.path.relpath(document.file, folder).replace(os.sep, "/"),
+        document.programs,
+        document.classes,
+        document.versions,
+        document.transport,
+    )
+
+
+def _files(folder: str) -> Iterator[str]:
+    for package in sorted(os.listdir(folder)):
+        inside = os.path.join(folder, package)
+        if os.path.isdir(inside):
+            yield from (
+                os.path.join(inside, name) for name in sorted(os.listdir(inside)) if name.endswith(SUFFIX)
+            )
+
+
+def write_index(folder: str) -> None:
+    text = index_text(folder)
+    with open(os.path.join(folder, INDEX), "w", encoding="utf-8") as stream:
+        stream.write(text)

@@ -1,0 +1,124 @@
+"""The library of manifests that ships with us: what it has, what it says, and whether sources agree with it."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Iterator
+
+from enclave_launch.boundary.terminal import printable
+from nodl.ament_index import package_version, search_prefixes
+from nodl.library import SHIPPED, Hit, Library
+from nodl.library.document import LibraryDocument
+from nodl.verb.options import add_prefix_argument
+from nodl.verb.show import description_lines
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    parser = subparsers.add_parser(
+        "library", help="the manifests of widely used packages: list, show, where, check", description=__doc__
+    )
+    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    listing = actions.add_parser("list", help="every document: what it describes, for which versions")
+    listing.add_argument("packages", nargs="*", metavar="PACKAGE", help="only these")
+    listing.set_defaults(run=_list)
+    showing = actions.add_parser("show", help="what a document says, and how that is known")
+    showing.set_defaults(run=_show)
+    where = actions.add_parser("where", help="the file that would be used")
+    where.set_defaults(run=_where)
+    for action in (showing, where):
+        action.add_argument("package", metavar="PACKAGE")
+        action.add_argument("name", metavar="EXECUTABLE|PLUGIN")
+        action.add_argument("--distro", default="", help="ROS distribution (default: any)")
+        add_prefix_argument(action)
+    checking = actions.add_parser("check", help="hold the documents against sources in a folder")
+    checking.add_argument("sources", metavar="DIR", help="a folder with packages, such as a workspace's src")
+    checking.set_defaults(run=_check)
+    index = actions.add_parser("index", help="write the index of a folder of documents anew")
+    index.add_argument("folder", nargs="?", default=SHIPPED, metavar="DIR")
+    index.set_defaults(run=_index)
+    for action in (listing, showing, where, checking):
+        action.add_argument(
+            "--library",
+            metavar="DIR",
+            action="append",
+            default=[],
+            help="documents of your own, which come first",
+        )
+    return parser
+
+
+def _list(arguments: argparse.Namespace) -> int:
+    wanted = arguments.packages
+    found = [each for each in Library(arguments.library).documents() if not wanted or each.package in wanted]
+    for document in found:
+        print(printable("\t".join(_row(document))))
+    if not found:
+        print("the library has no document of that", file=sys.stderr)
+    return 0 if found else 1
+
+
+def _row(document: LibraryDocument) -> Iterator[str]:
+    yield document.package
+    yield " ".join((*document.programs, *document.classes)) or document.stem.partition("/")[2]
+    yield " ".join(f"{distro} {series}" for distro, series in document.versions.items())
+    yield f"{document.evidence.how} at {document.evidence.version}"
+
+
+def _show(arguments: argparse.Namespace) -> int:
+    hit = _found(arguments)
+    if hit is None:
+        return 1
+    for line in (*description_lines(hit.document.interface), *_evidence(hit.document)):
+        print(printable(line))
+    if hit.doubt:
+        print(hit.doubt, file=sys.stderr)
+    return 0
+
+
+def _where(arguments: argparse.Namespace) -> int:
+    hit = _found(arguments)
+    if hit is None:
+        return 1
+    print(hit.document.file)
+    return 0
+
+
+def _found(arguments: argparse.Namespace) -> Hit | None:
+    library = Library(arguments.library)
+    version = package_version(arguments.package, search_prefixes(arguments.prefix))
+    hit = library.find(arguments.package, arguments.name, distro=arguments.distro, version=version)
+    hit = hit or library.of_class(arguments.name, distro=arguments.distro)
+    if hit is None:
+        print(f"the library has no document of {arguments.package}/{arguments.name}", file=sys.stderr)
+    return hit
+
+
+def _evidence(document: LibraryDocument) -> Iterable[str]:
+    evidence = document.evidence
+    yield f"  {'known from':14} {evidence.how}: {evidence.repository} {evidence.version} ({evidence.commit})"
+    if document.versions:
+        yield f"  {'holds for':14} {', '.join(f'{d} {series}' for d, series in document.versions.items())}"
+    for text in evidence.missing:
+        yield f"  {'left out':14} {text}"
+    for text in evidence.differs:
+        yield f"  {'analysis':14} {text}"
+
+
+def _check(arguments: argparse.Namespace) -> int:
+    from nodl.library.check import check
+
+    verdicts = check(Library(arguments.library), arguments.sources)
+    for verdict in verdicts:
+        print("\n".join(printable(line) for line in str(verdict).splitlines()))
+    if not verdicts:
+        print(f"no package of the library is in {arguments.sources}", file=sys.stderr)
+        return 1
+    return 1 if any(verdict.is_wrong for verdict in verdicts) else 0
+
+
+def _index(arguments: argparse.Namespace) -> int:
+    from nodl.library.index import write_index
+
+    write_index(arguments.folder)
+    return 0

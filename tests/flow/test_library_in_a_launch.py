@@ -1,0 +1,253 @@
+"""A launch whose nodes have no manifest of their own: what the library says of them, and what comes before it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from enclave_launch.errors import UsageError
+from enclave_launch.flow import resolve
+from enclave_launch.options import ResolveOptions
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.report.plan_json import allowed_names, plan_json
+from enclave_launch.report.tree import plan_tree
+
+QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
+Launch = Callable[..., LaunchPlan]
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    return tmp_path / "install"
+
+
+@pytest.fixture
+def install(prefix: Path) -> Callable[..., Path]:
+    """A package with an executable: compiled, unless a Python source is given."""
+
+    def make(package: str, executable: str, version: str = "1.0.0", source: str = "") -> Path:
+        marker = prefix / "share/ament_index/resource_index/packages" / package
+        program = prefix / "lib" / package / executable
+        share = prefix / "share" / package
+        for folder in (marker.parent, program.parent, share):
+            folder.mkdir(parents=True, exist_ok=True)
+        marker.touch()
+        (share / "package.xml").write_text(
+            f"<package><name>{package}</name><version>{version}</version></package>"
+        )
+        program.write_bytes(source.encode() if source else b"\x7fELF\0")
+        program.chmod(0o755)
+        return share
+
+    return make
+
+
+@pytest.fixture
+def document(tmp_path: Path) -> Callable[..., Path]:
+    """A document of one publisher in the user's own library."""
+
+    def write(stem: str, topic: str, section: str = "{library: rclcpp}") -> Path:
+        path = tmp_path / "own" / f"{stem}.nodl.yaml"
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(
+            f"nodl_version: 2\ncodegen: {{enclave_launch: {section}}}\n"
+            f"publishers: [{{name: {topic}, type: p/T, qos: {QOS}}}]\n"
+        )
+        return tmp_path / "own"
+
+    return write
+
+
+@pytest.fixture
+def launch(tmp_path: Path, prefix: Path, monkeypatch: pytest.MonkeyPatch) -> Launch:
+    """``launch('<node .../>')`` with the installed packages; keywords are options."""
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+
+    def plan(text: str, **options: Any) -> LaunchPlan:
+        file = tmp_path / "t.launch.xml"
+        file.write_text(f"<launch>{text}</launch>")
+        given = {"distro": "jazzy", "allow_missing_packages": True, **options}
+        prefixes = (prefix,) if prefix.exists() else ()
+        return resolve(file, options=ResolveOptions(prefixes=prefixes, **given))
+
+    return plan
+
+
+def allowed(plan: LaunchPlan, kind: str) -> list[str]:
+    """The names of one list in all enclaves, without what every node has."""
+    return sorted(
+        name
+        for enclave in plan.derived.policy.enclaves
+        for name in allowed_names(enclave)[kind]
+        if (kind, name) not in plan.derived.built_in_names(enclave.path)
+    )
+
+
+PYTHON = """#!/usr/bin/env python3
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+rclpy.init()
+node = Node('n')
+node.create_publisher(String, {topic}, 1)
+rclpy.spin(node)
+"""
+NODE = '<node pkg="pkg" exec="prog" name="n"/>'
+
+
+def test_the_sources_of_interfaces_have_an_order(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path], tmp_path: Path
+) -> None:
+    own = (document("pkg/prog", "from_library"),)
+    share = install("pkg", "prog")
+    assert allowed(launch(NODE, library_folders=own), "publish") == ["/from_library"]
+    install("pkg", "prog", source=PYTHON.format(topic="'from_source'"))
+    assert allowed(launch(NODE, library_folders=own), "publish") == ["/from_source"]
+    manifest = (
+        '<interface version="1"><node name="n" executable="prog"><topic name="{}" type="p/msg/T" '
+        'role="publisher"/></node></interface>'
+    )
+    (share / "pkg.nodl.xml").write_text(manifest.format("from_package"))
+    assert allowed(launch(NODE, library_folders=own), "publish") == ["/from_package"]
+    named = tmp_path / "mine.nodl.xml"
+    named.write_text(manifest.format("from_option"))
+    plan = launch(NODE, library_folders=own, manifests=(named,))
+    assert allowed(plan, "publish") == ["/from_option"]
+
+
+def test_the_library_answers_where_an_analysis_leaves_something_open(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", source=PYTHON.format(topic="open('topic').read()"))
+    assert "is not known" in " ".join(map(str, launch(NODE).problems))
+    plan = launch(NODE, library_folders=(document("pkg/prog", "from_library"),))
+    assert allowed(plan, "publish") == ["/from_library"] and not plan.problems
+
+
+def test_the_plan_says_where_interfaces_come_from(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("pkg", "prog")
+    plan = launch(NODE, library_folders=(document("pkg/prog", "a"),))
+    assert "library pkg/prog)" in plan_tree(plan)
+    assert json.loads(plan_json(plan))["processes"][0]["interfaces"] == "library"
+    install("pkg", "prog", source=PYTHON.format(topic="'a'"))
+    assert json.loads(plan_json(launch(NODE)))["processes"][0]["interfaces"] == "inferred"
+
+
+def test_only_what_the_user_allows_is_asked(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("tf2_ros", "static_transform_publisher")
+    node = '<node pkg="tf2_ros" exec="static_transform_publisher" name="n"/>'
+    assert allowed(launch(node), "publish") == ["/tf_static"]
+    assert "no NoDL manifest" in str(launch(node, library=False).problems[0])
+    folder = document("tf2_ros/static_transform_publisher", "mine")
+    assert allowed(launch(node, library_folders=(folder,)), "publish") == ["/mine"]
+    with pytest.raises(UsageError, match="no such directory"):
+        launch(node, library_folders=(folder / "absent",))
+
+
+@pytest.mark.parametrize(("version", "warned"), [("1.3.9", False), ("1.30.0", True), ("2.0.0", True)])
+def test_a_document_for_another_version_is_used_with_a_warning_that_names_both(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path], version: str, warned: bool
+) -> None:
+    install("pkg", "prog", version)
+    folder = document("pkg/prog", "a", "{versions: {jazzy: '1.3'}}")
+    plan = launch(NODE, library_folders=(folder,))
+    assert allowed(plan, "publish") == ["/a"]
+    told = [str(warning) for warning in plan.warnings if warning.code == "library-version"]
+    assert bool(told) is warned
+    if warned:
+        assert "pkg/prog was written for 1.3 (jazzy), here is version " + version in told[0]
+
+
+def test_of_a_package_that_is_not_installed_the_distribution_decides(
+    launch: Launch, document: Callable[..., Path]
+) -> None:
+    folder = document("pkg/prog", "a", "{versions: {jazzy: '1.3'}}")
+    for distro, warned in (("jazzy", False), ("humble", True)):
+        plan = launch(NODE, library_folders=(folder,), distro=distro)
+        assert any(w.code == "library-version" for w in plan.warnings) is warned
+
+
+def test_remaps_namespaces_and_parameters_apply_as_to_any_manifest(
+    launch: Launch, document: Callable[..., Path]
+) -> None:
+    folder = document("pkg/prog", "scan", "{names: {publishers: {scan: {name: $(param topic)}}}}")
+    node = '<node pkg="pkg" exec="prog" name="n" namespace="r1">{}</node>'
+    own = (folder,)
+    assert allowed(launch(node.format(""), library_folders=own), "publish") == ["/r1/scan"]
+    param = '<param name="topic" value="front"/>'
+    assert allowed(launch(node.format(param), library_folders=own), "publish") == ["/r1/front"]
+    remap = '<remap from="front" to="/moved"/>'
+    assert allowed(launch(node.format(param + remap), library_folders=own), "publish") == ["/moved"]
+    assert allowed(launch(node.format(remap), library_folders=own), "publish") == ["/r1/scan"]
+
+
+def test_parameters_in_a_file_reach_a_node_that_launch_does_not_name(
+    launch: Launch, document: Callable[..., Path], tmp_path: Path
+) -> None:
+    folder = document(
+        "pkg/prog", "scan", "{node: own_name, names: {publishers: {scan: {name: $(param topic)}}}}"
+    )
+    file = tmp_path / "p.yaml"
+    file.write_text("own_name: {ros__parameters: {topic: front}}\nother: {ros__parameters: {topic: back}}\n")
+    plan = launch(f'<node pkg="pkg" exec="prog"><param from="{file}"/></node>', library_folders=(folder,))
+    assert allowed(plan, "publish") == ["/front"]
+
+
+COSTMAP = "{nodes: [{document: pkg/costmap, node: local_costmap, namespace: local_costmap}]}"
+
+
+@pytest.fixture
+def with_costmap(document: Callable[..., Path]) -> Path:
+    document("pkg/costmap", "footprint", "{names: {publishers: {footprint: {name: $(param topic)}}}}")
+    document("pkg/controller", "cmd_vel", COSTMAP.replace("{nodes", "{plugin: 'pkg::Controller', nodes"))
+    return document("pkg/prog", "cmd_vel", COSTMAP)
+
+
+def test_further_nodes_keep_their_name_and_follow_the_namespace(
+    launch: Launch, with_costmap: Path, tmp_path: Path
+) -> None:
+    file = tmp_path / "p.yaml"
+    file.write_text("r1: {local_costmap: {local_costmap: {ros__parameters: {topic: shape}}}}\n")
+    plan = launch(
+        f'<node pkg="pkg" exec="prog" name="renamed" namespace="r1"><param from="{file}"/></node>',
+        library_folders=(with_costmap,),
+    )
+    assert [node.fqn for node in plan.nodes] == ["/r1/renamed", "/r1/local_costmap/local_costmap"]
+    assert allowed(plan, "publish") == ["/r1/cmd_vel", "/r1/local_costmap/shape"]
+
+
+def test_further_nodes_of_a_component_obey_the_container(
+    launch: Launch, with_costmap: Path, tmp_path: Path
+) -> None:
+    plan = launch(
+        '<node_container pkg="rclcpp_components" exec="component_container" name="c" namespace="">'
+        '<remap from="footprint" to="moved"/>'
+        '<composable_node pkg="pkg" plugin="pkg::Controller" name="x"><remap from="cmd_vel" to="cmd"/>'
+        "</composable_node></node_container>",
+        library_folders=(with_costmap,),
+    )
+    assert allowed(plan, "publish") == ["/cmd", "/local_costmap/moved"]
+
+
+def test_a_name_that_ends_at_random_is_a_pattern_unless_launch_names_the_node(launch: Launch) -> None:
+    node = '<node pkg="tf2_ros" exec="static_transform_publisher" {}/>'
+    (enclave,) = launch(node.format("")).derived.policy.enclaves
+    assert "/static_transform_publisher_*/get_parameters" in allowed_names(enclave)["serve_services"]
+    (enclave,) = launch(node.format('name="base"')).derived.policy.enclaves
+    assert not any("*" in name for name in allowed_names(enclave)["serve_services"])
+
+
+def test_a_broken_document_is_told_with_file_and_line(launch: Launch, document: Callable[..., Path]) -> None:
+    from enclave_launch.errors import ManifestError
+
+    folder = document("pkg/prog", "a", "{surprise: 1}")
+    with pytest.raises(ManifestError, match=r"prog\.nodl\.yaml:2.*surprise"):
+        launch(NODE, library_folders=(folder,))
