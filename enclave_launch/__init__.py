@@ -20,9 +20,10 @@ if TYPE_CHECKING:
         ProvisionError,
         RuntimeFailure,
     )
-    from enclave_launch.flow import provision, resolve, run, run_async
+    from enclave_launch.flow import evaluate_launch, provision, resolve, run, run_async, start
     from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
     from enclave_launch.plan import LaunchPlan
+    from enclave_launch.runtime.running_launch import RunningLaunch, RunningProcess, printed, started
     from enclave_launch.secured import ProvisionedLaunch
 
 _HOMES = {
@@ -35,11 +36,17 @@ _HOMES = {
     "ResolveOptions": "options",
     "RunSettings": "options",
     "SecurityOptions": "options",
+    "evaluate_launch": "flow",
     "provision": "flow",
     "resolve": "flow",
     "run": "flow",
     "run_async": "flow",
+    "start": "flow",
     "LaunchPlan": "plan",
+    "RunningLaunch": "runtime.running_launch",
+    "RunningProcess": "runtime.running_launch",
+    "printed": "runtime.running_launch",
+    "started": "runtime.running_launch",
     "ProvisionedLaunch": "secured",
 }
 
@@ -53,12 +60,18 @@ __all__ = [
     "ProvisionedLaunch",
     "ResolveOptions",
     "RunSettings",
+    "RunningLaunch",
+    "RunningProcess",
     "RuntimeFailure",
     "SecurityOptions",
+    "evaluate_launch",
+    "printed",
     "provision",
     "resolve",
     "run",
     "run_async",
+    "start",
+    "started",
 ]
 
 

@@ -3,6 +3,7 @@
     plan = resolve("demo.launch.xml")                   decides everything, does nothing
     launch = provision(plan, "keystore")                keys, certificates, signed permissions
     status = run(launch)                                every process starts with its enclave
+    with start(launch) as running: ...                  the same beside the caller's own work
 
 ``run`` also takes a bare plan, or what ``evaluate_launch`` gives, and then starts it unsecured, as ``secure-launch``
 without ``--secure`` does; inside a running event loop await ``run_async``. Errors are ``EnclaveLaunchError``;
@@ -23,6 +24,7 @@ from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.process import Evaluation
+    from enclave_launch.runtime.running_launch import RunningLaunch
     from enclave_launch.secured import ProvisionedLaunch
 
 
@@ -130,6 +132,18 @@ def run(
         from enclave_launch.running import run_launched
 
         return run_launched(launch, settings, warden)
+
+
+def start(
+    launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None
+) -> RunningLaunch:
+    """Start what was planned and return at once: a handle to look at it, wait for it and stop it.
+
+    Signals stay the caller's. Raises as ``run``.
+    """
+    from enclave_launch.running import start_launched
+
+    return start_launched(launch, options or RunSettings())
 
 
 async def run_async(

@@ -7,6 +7,7 @@ plan. Starts processes; nothing comes after.
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Union
 
 from enclave_launch.boundary.terminal import printable_lines
@@ -14,10 +15,12 @@ from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
-from enclave_launch.runtime.service import RunOptions, run_launch, run_launch_async
+from enclave_launch.runtime.run_events import Observer
+from enclave_launch.runtime.service import LaunchService, RunOptions, run_launch, run_launch_async
 
 if TYPE_CHECKING:
     from enclave_launch.options import RunSettings
+    from enclave_launch.runtime.running_launch import RunningLaunch
     from enclave_launch.runtime.warden_process import WardenProcess
     from enclave_launch.secured import ProvisionedLaunch
 
@@ -42,6 +45,25 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     with ament_prefixes(source.prefixes):
         _check_programs(launch)
         return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
+
+
+def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
+    """In a thread of its own. Raises as ``run_launched``, before anything was started."""
+    from enclave_launch.runtime.running_launch import RunningLaunch
+
+    source = _evaluated(launch).source
+    gate, options = _gate(launch, settings), _options(launch, settings)
+    _check_programs(launch)
+
+    async def main(observe: Observer, hold: Callable[[LaunchService], None]) -> int:
+        with ament_prefixes(source.prefixes):
+            service = LaunchService(
+                source.launch_file, source.arguments, gate=gate, options=options, observe=observe
+            )
+            hold(service)
+            return await service.run()
+
+    return RunningLaunch(main)
 
 
 def _check_programs(launch: Launch) -> None:

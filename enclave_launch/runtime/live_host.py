@@ -23,6 +23,7 @@ from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.live_process import LiveProcess
 from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
 from enclave_launch.runtime.ros_services import ALTERNATIVE, RosServices
+from enclave_launch.runtime.run_events import Observer, ProcessOver, ProcessPlanned, unobserved
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.lifecycle import LifecycleNode
@@ -42,9 +43,11 @@ class LiveHost(BaseHost):
         secrets: frozenset[str],
         fail: Callable[[EnclaveLaunchError], None],
         services: RosServices | None = None,
+        observe: Observer = unobserved,
         **options: Any,
     ) -> None:
         super().__init__(**options)
+        self._observe = observe
         self._loop = asyncio.get_running_loop()
         self._tree = tree
         self._log = log
@@ -81,8 +84,15 @@ class LiveHost(BaseHost):
     ) -> asyncio.Future[None]:
         base = dict((action.process_details or {}).get("env") or {})
         live = LiveProcess(
-            action, process, context, self._tree, self._log, lambda tty: self._prepare(process, base, tty)
+            action,
+            process,
+            context,
+            self._tree,
+            self._log,
+            lambda tty: self._prepare(process, base, tty),
+            self._observe,
         )
+        self._observe(ProcessPlanned(process))
         self._watch_state(action, process, context)
         self.processes.append(live)
         completed: asyncio.Future[None] = self._loop.create_future()
@@ -141,17 +151,21 @@ class LiveHost(BaseHost):
             shutil.rmtree(self._parameter_directory, ignore_errors=True)
 
     async def _run(self, live: LiveProcess, completed: asyncio.Future[None]) -> None:
+        name = live.process.process_name
+        failed = True
         try:
             outcome = await live.run()
-            if outcome.returncode != 0 and not outcome.asked_to_end:
-                self.failed.append(live.process.process_name)
+            failed = outcome.returncode != 0 and not outcome.asked_to_end
+            if failed:
+                self.failed.append(name)
         except EnclaveLaunchError as error:
             self._fail(error)
         except (
             Exception
         ) as error:  # whatever it is: a process that did not run must not pass for one that did
-            self._fail(RuntimeFailure(f"{live.process.process_name}: {type(error).__name__}: {error}"))
+            self._fail(RuntimeFailure(f"{name}: {type(error).__name__}: {error}"))
         finally:
+            self._observe(ProcessOver(name, failed))
             self.processes.remove(live)
             if not completed.done():
                 completed.set_result(None)

@@ -25,9 +25,11 @@ from enclave_launch.description.events.process import (
 )
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.process import ResolvedProcess
+from enclave_launch.runtime import run_events
 from enclave_launch.runtime.launch_log import LaunchLog, Level
 from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, Stream
 from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter, OutputSetting, output_routes
+from enclave_launch.runtime.run_events import Observer
 from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
 
 if TYPE_CHECKING:
@@ -48,8 +50,10 @@ class LiveProcess:
         tree: ProcessTree,
         log: LaunchLog,
         prepare: Callable[[bool], Awaitable[ProcessSpec]],
+        observe: Observer,
     ) -> None:
         self.process = process
+        self._observe = observe
         self._action = action
         self._context = context
         self._log = log
@@ -96,10 +100,12 @@ class LiveProcess:
 
     def on_started(self, pid: int) -> None:
         self._details["pid"] = pid
+        self._observe(run_events.ProcessStarted(self.process.process_name, pid))
         self._context.emit_event_sync(ProcessStarted(**self._details))
 
     def on_output(self, stream: Stream, data: bytes) -> None:
         self._router.feed(stream, data)
+        self._observe(run_events.ProcessOutput(self.process.process_name, stream, data))
         if self._action.cached_output:
             self._action.captured_output[stream == "stderr"].append(data.decode(errors="replace"))
         event = (ProcessStdout if stream == "stdout" else ProcessStderr)(text=data, **self._details)
@@ -109,6 +115,7 @@ class LiveProcess:
     def on_exited(self, pid: int, returncode: int) -> None:
         self._router.flush()
         self._action.final_return_code = returncode
+        self._observe(run_events.ProcessExited(self.process.process_name, pid, returncode))
         self._context.emit_event_sync(ProcessExited(returncode=returncode, **self._details))
 
     # Events to it

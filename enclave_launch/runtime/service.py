@@ -37,6 +37,7 @@ from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
 from enclave_launch.runtime.process_tree import ProcessTree
 from enclave_launch.runtime.ros_services import RosServices
+from enclave_launch.runtime.run_events import LaunchFailed, LaunchOver, LaunchStarted, Observer, unobserved
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 from enclave_launch.runtime.warden_process import WardenProcess
 
@@ -115,7 +116,9 @@ class LaunchService:
         gate: EnclaveGate | None,
         options: RunOptions,
         warden: WardenProcess | None = None,
+        observe: Observer = unobserved,
     ) -> None:
+        self._observe = observe
         self._launch_file = os.path.abspath(launch_file)
         self._arguments = arguments
         self._gate = gate
@@ -156,6 +159,7 @@ class LaunchService:
                 secrets=self._options.secrets,
                 fail=self._on_failure,
                 services=self._services,
+                observe=self._observe,
                 **self._options.host_options,
             )
             stack.push_async_callback(self._host.close)
@@ -187,6 +191,7 @@ class LaunchService:
         self._say("INFO", f"Default logging verbosity is set to {'DEBUG' if self._options.debug else 'INFO'}")
         for notice in self._options.notices:
             self._say("WARNING", notice)
+        self._observe(LaunchStarted(str(self._log.directory)))
         self._begin()
         if tree.lost is not None:
             tree.lost.add_done_callback(self._on_warden_lost)
@@ -203,7 +208,9 @@ class LaunchService:
                 self._on_error(error)
         if cancelled is not None:
             raise cancelled
-        return self._exit_status()
+        status = self._exit_status()
+        self._observe(LaunchOver(status))
+        return status
 
     def _begin(self) -> None:
         argv = [f"{name}:={value}" for name, value in self._arguments]
@@ -280,12 +287,14 @@ class LaunchService:
 
             self._say("DEBUG", "".join(traceback.format_exception(error)))
         self._say("ERROR", message)
+        self._observe(LaunchFailed(message))
         self.shut_down(message)
 
     def _on_failure(self, error: EnclaveLaunchError) -> None:
         """A process could not be secured: nothing that depends on it is started, the launch ends."""
         self._failed = True
         self._say("CRITICAL", str(error))
+        self._observe(LaunchFailed(str(error)))
         self.shut_down(str(error))
 
     def _on_warden_lost(self, _: object) -> None:

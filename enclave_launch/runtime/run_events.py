@@ -1,0 +1,79 @@
+"""What happens in a run, as values for programs that watch it; told in order, in the launch's thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal, NamedTuple
+
+from enclave_launch.process import ResolvedProcess
+
+
+class LaunchStarted(NamedTuple):
+    """Evaluation begins. ``log_directory``: where launch.log and the processes' own logs are."""
+
+    log_directory: str
+
+
+class ProcessPlanned(NamedTuple):
+    """The launch came to this process; it starts as soon as its enclave is complete."""
+
+    process: ResolvedProcess
+
+
+class ProcessStarted(NamedTuple):
+    """``name`` is the process name (``talker-1``), unique within the launch. A respawned process starts again."""
+
+    name: str
+    pid: int
+
+
+class ProcessOutput(NamedTuple):
+    """As it was read: not cut into lines."""
+
+    name: str
+    stream: Literal["stdout", "stderr"]
+    data: bytes
+
+
+class ProcessExited(NamedTuple):
+    """``returncode`` as of ``subprocess``: negative for a signal."""
+
+    name: str
+    pid: int
+    returncode: int
+
+
+class ProcessOver(NamedTuple):
+    """It will not be started again. ``failed``: it ended badly on its own, or could not be started."""
+
+    name: str
+    failed: bool
+
+
+class LaunchFailed(NamedTuple):
+    """Why the launch cannot go on; it is shutting down."""
+
+    reason: str
+
+
+class LaunchOver(NamedTuple):
+    """Nothing is left of it. ``exit_status`` as ``run`` gives it."""
+
+    exit_status: int
+
+
+RunEvent = (
+    LaunchStarted
+    | ProcessPlanned
+    | ProcessStarted
+    | ProcessOutput
+    | ProcessExited
+    | ProcessOver
+    | LaunchFailed
+    | LaunchOver
+)
+Observer = Callable[[RunEvent], None]
+
+
+def unobserved(event: RunEvent) -> None:
+    """Of a run that nobody watches."""
