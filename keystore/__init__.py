@@ -41,13 +41,13 @@ if TYPE_CHECKING:
     from keystore.steps.governance_setting import set_governance as set_governance
     from keystore.steps.options import ProvisionOptions as ProvisionOptions
     from keystore.steps.provisioning import provision as provision
+    from keystore.steps.removal import RemoveOptions as RemoveOptions
+    from keystore.steps.removal import RemoveReport as RemoveReport
+    from keystore.steps.removal import remove as remove
     from keystore.steps.renewal import RenewOptions as RenewOptions
     from keystore.steps.renewal import renew as renew
     from keystore.steps.report import EnclaveReport as EnclaveReport
     from keystore.steps.report import ProvisionReport as ProvisionReport
-    from keystore.steps.revocation import RemoveOptions as RemoveOptions
-    from keystore.steps.revocation import RemoveReport as RemoveReport
-    from keystore.steps.revocation import remove as remove
     from keystore.steps.rollover import Step as Step
     from keystore.steps.rollover import roll_over as roll_over
     from keystore.verification import Finding as Finding
@@ -75,9 +75,9 @@ _HOMES = {
     "provision": "steps.provisioning",
     "RenewOptions": "steps.renewal",
     "renew": "steps.renewal",
-    "RemoveOptions": "steps.revocation",
-    "RemoveReport": "steps.revocation",
-    "remove": "steps.revocation",
+    "RemoveOptions": "steps.removal",
+    "RemoveReport": "steps.removal",
+    "remove": "steps.removal",
     "Step": "steps.rollover",
     "roll_over": "steps.rollover",
     "CaAccess": "signing.ca_access",

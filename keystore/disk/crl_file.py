@@ -1,4 +1,4 @@
-"""The CRL in force: from when until when. Cheap: asked before a launch."""
+"""The CRL on disk: its dates and number (cheap: asked before a launch), and whom it lists."""
 
 from __future__ import annotations
 
@@ -7,26 +7,67 @@ from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-
-if TYPE_CHECKING:
-    from cryptography import x509
 from keystore.errors import DamagedKeystore, printable
 from keystore.formats import der
+from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 
+if TYPE_CHECKING:
+    from cryptography import x509
+
+_CRL_NUMBER = der.object_identifier("2.5.29.20")
+_EXTENSIONS = 0xA0
+
 
 def crl_validity(view: KeystoreView) -> Validity:
-    """thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1)."""
-    pem = safe_files.read(view.root, layout.CRL)
-    place = printable(view.root / layout.CRL)
+    """thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystore."""
     try:
-        body = pem.split(b"-----BEGIN X509 CRL-----")[1].split(b"-----END")[0]
-        fields = der.parse(der.from_base64(body)).children()[0].children()
-        times = [part for part in fields if part.tag in (der.UTC_TIME, der.GENERALIZED_TIME)]
+        times = [part for part in _fields(view) if part.tag in (der.UTC_TIME, der.GENERALIZED_TIME)]
         return Validity(der.time_value(times[0]), der.time_value(times[1]))
     except (IndexError, der.DerError):
-        raise DamagedKeystore(f"{place} is no CRL with an end") from None
+        raise DamagedKeystore(f"{printable(view.root / layout.CRL)} is not a CRL with an end") from None
+
+
+def crl_number(view: KeystoreView) -> int:
+    """CRLNumber (RFC 5280 section 5.2.3), 0 without one. The signature is not checked. Raises DamagedKeystore."""
+    try:
+        holder = next((part for part in _fields(view) if part.tag == _EXTENSIONS), None)
+        extensions = holder.children()[0].children() if holder is not None else []
+        for extension in extensions:
+            name, *_, value = extension.children()
+            if name.whole == _CRL_NUMBER:
+                return int.from_bytes(der.parse(value.content).content, "big")
+        return 0
+    except (IndexError, ValueError):
+        raise DamagedKeystore(f"{printable(view.root / layout.CRL)} is not a readable CRL") from None
+
+
+def _fields(view: KeystoreView) -> list[der.Element]:
+    """Of TBSCertList."""
+    body = safe_files.read(view.root, layout.CRL).split(b"-----BEGIN X509 CRL-----")[1].split(b"-----END")[0]
+    return der.parse(der.from_base64(body)).children()[0].children()
+
+
+def crl_problem(view: KeystoreView, register: Register | None, now: datetime) -> str | None:
+    """Why the CRL on disk is not the one to use; None when it is, or when there is rightly none.
+
+    Without a register (a host that signs nothing) only its dates count. Reads dates and number, not the signature.
+    """
+    if register is not None and register.crl_published != view.has_crl:
+        return (
+            "the CRL is missing" if register.crl_published else "there is a CRL that was not published here"
+        )
+    if not view.has_crl:
+        return None
+    try:
+        if not crl_validity(view).covers(now):
+            return "the CRL has ended"  # every participant would be refused
+        if register is not None and crl_number(view) != register.crl_number:
+            return "the CRL is not the one published last"
+    except DamagedKeystore:
+        return "the CRL cannot be read"
+    return None
 
 
 def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
@@ -48,7 +89,7 @@ def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
         key = x509.load_der_x509_certificate(view.ca(Role.IDENTITY).der).public_key()
         valid = crl.is_signature_valid(key)  # type: ignore[arg-type]
     except (ValueError, TypeError, UnsupportedAlgorithm):
-        raise DamagedKeystore(f"{place} is no readable CRL; remove it and revoke again") from None
+        raise DamagedKeystore(f"{place} is not a readable CRL; remove it and revoke again") from None
     if not valid:
         raise DamagedKeystore(f"{place} is not signed by the identity CA; remove it and revoke again")
     return crl

@@ -8,6 +8,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystore, printable
 from keystore.formats.domains import Domains
+from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.signing import smime
 
@@ -32,10 +33,13 @@ def _listed_domains(signed: smime.SignedDocument, view: KeystoreView) -> Domains
     return Domains(tuple((int(one or low), int(one or high)) for one, low, high in found))
 
 
-def governance_stands(view: KeystoreView, domains: Domains | None) -> bool:
-    """Cheaply: signed by the present permissions CA, and each of ``domains`` is listed in it."""
+def governance_stands(view: KeystoreView, domains: Domains | None, register: Register | None = None) -> bool:
+    """Cheaply: signed by the present permissions CA, the one signed last as far as the register is here to say so,
+    and each of ``domains`` is listed in it."""
     signed = signed_governance(view)
     if not signed.embeds(view.ca(Role.PERMISSIONS).der):
+        return False
+    if register is not None and register.governance and signed.document != register.governance:
         return False
     return domains is None or covers(_listed_domains(signed, view), domains)
 

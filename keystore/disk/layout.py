@@ -28,6 +28,8 @@ RETIRED = "private/retired"
 INCOMING = "private/incoming"
 NEXT = "private/next"
 SUPERSEDED = "private/superseded.json"
+"""Of earlier versions; taken over into the register."""
+REGISTER = "private/register.json"
 
 KEY, CERT = "key.pem", "cert.pem"
 PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"

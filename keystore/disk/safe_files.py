@@ -16,6 +16,7 @@ from keystore.disk import layout
 from keystore.errors import DamagedKeystore, NotAKeystore, StorageError, UnsafeKeystore, printable
 
 _MAX_FILE = 8_000_000
+_MAX_REGISTER = 200_000_000
 _WRITABLE_BY_OTHERS = 0o022
 
 
@@ -61,8 +62,9 @@ def _read(root: Path, relative: str) -> bytes:
         info = os.fstat(descriptor)
         if not stat.S_ISREG(info.st_mode):
             raise UnsafeKeystore(f"{printable(root / relative)} is not a regular file; remove it")
-        if info.st_size > _MAX_FILE:
-            raise DamagedKeystore(f"{printable(root / relative)} is larger than {_MAX_FILE} bytes")
+        limit = _MAX_REGISTER if relative == layout.REGISTER else _MAX_FILE
+        if info.st_size > limit:
+            raise DamagedKeystore(f"{printable(root / relative)} is larger than {limit} bytes")
         content = os.read(descriptor, info.st_size + 1)
         if len(content) != info.st_size:
             raise DamagedKeystore(f"{printable(root / relative)} changed while it was read; try again")

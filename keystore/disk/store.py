@@ -1,6 +1,7 @@
 """The only writer. Every file appears whole, private ones are born private, and a crash is completable.
 
     batch.file / batch.directory      written aside, in <keystore>/.staging (mode 0700)
+    batch.record                      the register; always takes its place first
     batch.commit                      made durable, then renamed into place in the order they were added
 
 A rename is all that ever changes what others see. Whoever holds the lock first clears what a dead run left in
@@ -22,7 +23,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from keystore.disk import layout, lock, safe_files
+from keystore.disk.register_file import read_register
 from keystore.errors import StorageError
+from keystore.formats.register import Register, register_json
 
 PUBLIC_MODE, PRIVATE_MODE = 0o644, 0o600
 _SYNC_EACH = 12
@@ -50,6 +53,11 @@ class Store:
         self.root = root
         self._durable = durable
         self._checked: set[str] = set()
+        present = read_register(root)
+        self.has_register = present is not None
+        """False on a host that issues nothing, and before the first thing is issued."""
+        self.register = present or Register()
+        """What was issued so far; each ``Batch.record`` replaces it."""
 
     @contextmanager
     def batch(self) -> Iterator[Batch]:
@@ -58,6 +66,8 @@ class Store:
         try:
             yield batch
             batch.commit()
+            if batch.recorded is not None:
+                self.register, self.has_register = batch.recorded, True
         except OSError as error:
             raise StorageError.of(error, "writing the keystore") from None
         finally:
@@ -134,6 +144,14 @@ class Batch:
         self._moves: list[tuple[str, str]] = []
         self._written: list[str] = []
         self._staged_directories: list[str] = []
+        self.recorded: Register | None = None
+
+    def record(self, register: Register) -> None:
+        """Write the register, before everything else of this batch: what is issued is on record before it is seen."""
+        place = self._place()
+        self._write(place, Content(register_json(register), PRIVATE_MODE))
+        self._moves.insert(0, (place, layout.REGISTER))
+        self.recorded = register
 
     def file(self, target: str, data: bytes, mode: int = PUBLIC_MODE) -> None:
         """Replace or create one file."""

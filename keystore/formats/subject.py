@@ -15,6 +15,7 @@ from enum import Enum
 # X.520 ub-common-name; cryptography >= 43 enforces it.
 MAX_COMMON_NAME = 64
 _SEPARATORS = "[,/|]"
+_GENERATION = re.compile(r"[1-9][0-9]{0,8}\Z")
 
 
 class SubjectScheme(str, Enum):
@@ -24,16 +25,34 @@ class SubjectScheme(str, Enum):
     COMPATIBLE = "compatible"  # /front/camera: as SROS2, needed by `ros2 security create_permission`
 
 
-def common_name(enclave: str, scheme: SubjectScheme = SubjectScheme.EXACT) -> str:
-    """The CN of a valid enclave name, at most 64 characters, different for different names.
+def common_name(enclave: str, scheme: SubjectScheme = SubjectScheme.EXACT, generation: int = 1) -> str:
+    """The CN of a valid enclave name, at most 64 characters, different for different names and generations.
 
-    ``/front/camera`` becomes ``ros.front.camera``, the root ``ros``. Longer names become ``ros-`` + 160 bits
-    of SHA-256 + ``-`` + their last characters; ``-`` cannot occur in a plain form, so the two never meet.
+    ``/front/camera`` becomes ``ros.front.camera``, the root ``ros``; from the second generation on with its number:
+    ``ros.front.camera-2``. Longer names become ``ros-`` + 160 bits of SHA-256 + ``-`` + their last characters; ``-``
+    cannot occur in a name, so no two of these ever meet.
+
+    A new generation is what keeps old permissions from fitting: both implementations match a grant by its subject.
     """
+    numbered = enclave if generation == 1 else f"{enclave}-{generation}"
     if scheme is SubjectScheme.COMPATIBLE:
-        return enclave if len(enclave) <= MAX_COMMON_NAME else _short(enclave)
-    plain = "ros" if enclave == "/" else "ros" + enclave.replace("/", ".")
-    return plain if len(plain) <= MAX_COMMON_NAME else _short(enclave)
+        return numbered if len(numbered) <= MAX_COMMON_NAME else _short(numbered)
+    plain = "ros" + (numbered.removeprefix("/") if enclave == "/" else numbered.replace("/", "."))
+    return plain if len(plain) <= MAX_COMMON_NAME else _short(numbered)
+
+
+def generation_of(cn: str) -> int:
+    """The generation that a common name of ``common_name`` has; 1 for all others."""
+    digits = cn.rpartition("-")[2]
+    return int(digits) if "-" in cn and _GENERATION.match(digits) else 1
+
+
+def names_enclave(cn: str | None, enclave: str) -> bool:
+    """Whether ``cn`` is a common name that ``enclave`` can have, in any scheme and generation; SROS2's may be long."""
+    if cn is None:
+        return False
+    generation = generation_of(cn)
+    return cn == enclave or any(cn == common_name(enclave, scheme, generation) for scheme in SubjectScheme)
 
 
 def _short(enclave: str) -> str:

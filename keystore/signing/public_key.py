@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from keystore.formats import der
+from keystore.formats.certificate import CertificateFacts
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.types import PublicKeyTypes
@@ -69,3 +70,20 @@ def key_kind(spki: bytes) -> str:
     if key is None:
         return "damaged"
     return f"RSA-{key.key_size}" if isinstance(key, rsa.RSAPublicKey) else type(key).__name__
+
+
+def issued_by(facts: CertificateFacts, ca: CertificateFacts) -> bool:
+    """Whether ``ca`` signed this certificate: name and signature."""
+    parts = der.parse(facts.der).children()
+    if len(parts) != 3 or not facts.names_issuer(ca):
+        return False
+    body, algorithm, signature = parts
+    # A BIT STRING starts with the count of unused bits.
+    return signature_is_valid(ca.public_key, signature.content[1:], body.whole, algorithm.whole)
+
+
+def fingerprint(der_bytes: bytes) -> str:
+    """SHA-256 in hex: of a certificate, a public key or a document, as the register names them."""
+    import hashlib
+
+    return hashlib.sha256(der_bytes).hexdigest()

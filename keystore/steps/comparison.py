@@ -12,14 +12,17 @@ from pathlib import Path
 from typing import NamedTuple
 
 from keystore.disk import layout
-from keystore.disk.crl_file import crl_validity
+from keystore.disk.authorities import refuse_foreign_authorities
+from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.governance_file import governance_domains, governance_stands
+from keystore.disk.register_file import needs_register, read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.errors import NotAKeystore, printable
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document
 from keystore.formats.policy import EnclavePolicy
+from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, later, utc_now
 from keystore.steps.enclave_state import EnclaveState, PermissionsSource, Reissue, inspect
@@ -47,11 +50,15 @@ def compare(
         return None
     if os.path.lexists(root / layout.INCOMING):  # an interrupted change of a CA
         return None
-    if not (governance_stands(view, options.domains) and _crl_is_current(view, now)):
+    if needs_register(view):
+        return None
+    register = read_register(root)
+    refuse_foreign_authorities(view, register)
+    if not governance_stands(view, options.domains, register) or crl_problem(view, register, now):
         return None
     states = []
     for name, one in wanted.items():
-        states.append(inspect_wanted(view, name, one, options, now))
+        states.append(inspect_wanted(view, register, name, one, options, now))
         if not states[-1].is_good:
             return None
     ends = _first_end(view, (state.validity for state in states))
@@ -68,11 +75,6 @@ def _refuse_unless_it_can_be_made(view: KeystoreView, options: ProvisionOptions)
         raise NotAKeystore(
             f"{printable(view.root)} exists and is not a keystore; choose an empty or new directory"
         )
-
-
-def _crl_is_current(view: KeystoreView, now: datetime) -> bool:
-    """A CRL that has ended keeps every participant from starting."""
-    return not view.has_crl or crl_validity(view).covers(now)
 
 
 def _first_end(view: KeystoreView, enclaves: Iterable[Validity | None]) -> datetime:
@@ -95,12 +97,17 @@ def differences(
     chosen = with_domains(root, options or ProvisionOptions())
     view = KeystoreView(root)
     view.require_complete()
+    register = read_register(root)
+    refuse_foreign_authorities(view, register)
     now = chosen.now or utc_now()
     wanted = WantedEnclave(permissions_source(policy, chosen))
-    state = inspect_wanted(view, policy.path, wanted, chosen, now)
-    governance = () if governance_stands(view, chosen.domains) else ("the governance is not what it was",)
-    crl = () if _crl_is_current(view, now) else ("the CRL has ended",)
-    return (*(() if state.is_good else state.reasons), *governance, *crl)
+    state = inspect_wanted(view, register, policy.path, wanted, chosen, now)
+    reasons = [] if state.is_good else [*state.reasons]
+    if not governance_stands(view, chosen.domains, register):
+        reasons.append("the governance is not what it was")
+    if problem := crl_problem(view, register, now):
+        reasons.append(problem)
+    return tuple(reasons)
 
 
 def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
@@ -127,10 +134,15 @@ def as_found(state: EnclaveState) -> EnclaveReport:
 
 
 def inspect_wanted(
-    view: KeystoreView, enclave: str, wanted: WantedEnclave, options: ProvisionOptions, now: datetime
+    view: KeystoreView,
+    register: Register | None,
+    enclave: str,
+    wanted: WantedEnclave,
+    options: ProvisionOptions,
+    now: datetime,
 ) -> EnclaveState:
     """The enclave's state against what is wanted; what is asked to be issued anew counts as a difference."""
-    state = inspect(view, enclave, wanted.permissions, now, later(now, options.renew_within))
+    state = inspect(view, register, enclave, wanted.permissions, now, later(now, options.renew_within))
     if wanted.reissue is Reissue.NOTHING or state.reissue is Reissue.KEY_PAIR:
         return state
     return state._replace(reissue=wanted.reissue, permissions=True, reasons=(*state.reasons, "asked for"))

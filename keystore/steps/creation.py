@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
@@ -26,6 +26,7 @@ from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printab
 from keystore.formats.certificate import read_certificate
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
+from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
@@ -33,6 +34,7 @@ from keystore.signing import authority, smime
 from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.signer import FileSigner, open_signer
+from keystore.steps.opening import opened_for_change
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +89,8 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
     _refuse_foreign(root)
     refuse_unusable(chosen)
     store.create_root(root)
-    with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    now = chosen.now or utc_now()
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         return complete(opened, chosen)
 
 
@@ -147,6 +150,7 @@ def _complete_ca(
     if has_cert:
         if role in options.imported:
             _refuse_other_ca(opened, role, options.imported[role])
+        _record_present_ca(opened, view, role)
         return  # a missing key is no fault: the CA may be kept elsewhere
     _refuse_foreign_enclaves(view, role)
     if role in options.imported:
@@ -163,6 +167,14 @@ def _complete_ca(
             f"the {role.value.replace('_ca', ' CA')} key is {authority_kind(made)}: "
             "Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
         )
+
+
+def _record_present_ca(opened: Store, view: KeystoreView, role: Role) -> None:
+    """Of a keystore that an earlier version, or SROS2, left incomplete: the register knows no CA of this role yet."""
+    known = {its for (its, _), state in opened.register.authorities.items() if state is AuthorityState.IN_USE}
+    if view.key_file(role) is not None and role not in known:
+        with opened.batch() as batch:
+            batch.record(opened.register.with_authority(role, view.ca(role).der, AuthorityState.IN_USE))
 
 
 def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
@@ -243,7 +255,9 @@ def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: byt
     opened.ensure_directory(layout.PRIVATE)
     opened.ensure_directory(layout.INCOMING)
     name = "key.p11" if key_name.endswith(".p11") else layout.KEY
+    facts = read_certificate(cert, layout.INCOMING)
     with opened.batch() as batch:
+        batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
         batch.directory(
             f"{layout.INCOMING}/{role.value}",
             {name: Content(key, store.PRIVATE_MODE), layout.CERT: Content(cert)},
@@ -331,8 +345,10 @@ def mirror_governance(opened: Store) -> bool:
 
 
 def write_governance(opened: Store, document: bytes, permissions_ca: Authority, now: datetime) -> None:
+    """Record, sign and publish it."""
     signed = sign_document(document, permissions_ca, now)
     with opened.batch() as batch:
+        batch.record(replace(opened.register, governance=document))
         batch.file(layout.GOVERNANCE_XML, document)
         batch.file(layout.GOVERNANCE, signed)
 
@@ -342,14 +358,15 @@ def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
 
 
 def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
-    """Sign the governance again if its domains or its signer no longer fit; whether that was needed.
+    """Sign the governance again if it is not the one signed last, or its domains or signer no longer fit; whether
+    that was needed.
 
     Raises InvalidInput when it has several rules and none for a domain: then a person must decide.
     """
     view = KeystoreView(opened.root)
-    if governance_stands(view, domains):
+    if governance_stands(view, domains, opened.register):
         return False
-    document = trusted_document(view, layout.GOVERNANCE)
+    document = opened.register.governance or trusted_document(view, layout.GOVERNANCE)
     governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
     if not covers(governance.domains(), domains):
         document = governance_document(governance.extended_to(domains))

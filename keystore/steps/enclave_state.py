@@ -20,8 +20,9 @@ from keystore.errors import DamagedKeystore, UnsafeKeystore, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
+from keystore.formats.register import Register
 from keystore.formats.role import Role
-from keystore.formats.subject import SubjectScheme, common_name, subject_name
+from keystore.formats.subject import names_enclave, subject_name
 from keystore.formats.validity import Validity
 from keystore.signing import smime
 from keystore.signing.key_pair import key_matches
@@ -53,13 +54,14 @@ class EnclaveState(NamedTuple):
     facts: CertificateFacts | None
     permissions: bool
     links: tuple[str, ...]
-    lax_key: bool
     reasons: tuple[str, ...]
     validity: Validity | None = None
+    incident: bool = False
+    """Its key is not the one issued for it, or others could read it: what it had must be revoked."""
 
     @property
     def is_good(self) -> bool:
-        return self.reissue is Reissue.NOTHING and not (self.permissions or self.links or self.lax_key)
+        return self.reissue is Reissue.NOTHING and not (self.permissions or self.links)
 
     @property
     def exists(self) -> bool:
@@ -67,21 +69,27 @@ class EnclaveState(NamedTuple):
 
 
 def inspect(
-    view: KeystoreView, enclave: str, wanted: PermissionsSource, now: datetime, due: datetime
+    view: KeystoreView,
+    register: Register | None,
+    enclave: str,
+    wanted: PermissionsSource,
+    now: datetime,
+    due: datetime,
 ) -> EnclaveState:
-    """``due``: certificates that end before it count as stale (``now`` for: only the expired).
+    """``due``: certificates that end before it count as stale (``now`` for: only the expired). ``register`` is None
+    on a host that issues nothing.
 
     Raises UnsafeKeystore for links, owners and modes that let others in.
     """
     directory = layout.enclave_directory(enclave)
     wanted_links = layout.enclave_links(enclave, crl=view.has_crl)
     if not _is_there(view, directory):
-        return EnclaveState(enclave, Reissue.KEY_PAIR, None, True, tuple(wanted_links), False, (NEW,))
+        return EnclaveState(enclave, Reissue.KEY_PAIR, None, True, tuple(wanted_links), (NEW,))
     reasons: list[str] = []
-    lax = _key_mode(view, directory)
-    reissue, facts = _identity(view, enclave, directory, now, due, reasons)
-    if lax:
-        reasons.append("the private key was readable by others")
+    found = _identity(view, register, enclave, directory, now, due)
+    reissue, facts = found.reissue, found.facts
+    if found.problem:
+        reasons.append(found.problem)
     validity = None
     permissions = reissue is not Reissue.NOTHING or facts is None
     if reissue is Reissue.NOTHING and facts is not None and facts.common_name is not None:
@@ -93,7 +101,7 @@ def inspect(
     )
     if links and reasons != [NEW]:
         reasons.append(f"{', '.join(links)} missing or out of step")
-    return EnclaveState(enclave, reissue, facts, permissions, links, lax is True, tuple(reasons), validity)
+    return EnclaveState(enclave, reissue, facts, permissions, links, tuple(reasons), validity, found.incident)
 
 
 def _is_there(view: KeystoreView, directory: str) -> bool:
@@ -112,36 +120,55 @@ def _is_there(view: KeystoreView, directory: str) -> bool:
     return True
 
 
-def _key_mode(view: KeystoreView, directory: str) -> bool | None:
-    """None without a key, else whether others can read it."""
-    path = f"{view.root}/{directory}/{layout.KEY}"
-    try:
-        info = os.lstat(path)
-    except (FileNotFoundError, NotADirectoryError):
-        return None
-    if not stat.S_ISREG(info.st_mode):
-        raise UnsafeKeystore(f"{printable(path)} is not a regular file; remove it")
-    if problem := safe_files.private_problem(path, info):
-        raise UnsafeKeystore(problem)
-    return bool(info.st_mode & 0o077)
+class _Found(NamedTuple):
+    """The key pair as it stands, and what is wrong with it."""
+
+    reissue: Reissue
+    facts: CertificateFacts | None
+    problem: str = ""
+    incident: bool = False
 
 
 def _identity(
-    view: KeystoreView, enclave: str, directory: str, now: datetime, due: datetime, reasons: list[str]
-) -> tuple[Reissue, CertificateFacts | None]:
+    view: KeystoreView,
+    register: Register | None,
+    enclave: str,
+    directory: str,
+    now: datetime,
+    due: datetime,
+) -> _Found:
+    mode = _key_mode(view, directory)
     key = safe_files.read_if_there(view.root, f"{directory}/{layout.KEY}")
     cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
     facts = _facts(cert)
     if key is None:
-        reasons.append("no private key" if cert is not None else NEW)
-        return Reissue.KEY_PAIR, facts
+        return _Found(Reissue.KEY_PAIR, facts, "no private key" if cert is not None else NEW)
+    if mode & 0o077:
+        return _Found(Reissue.KEY_PAIR, facts, f"others could read its private key (mode {mode:04o})", True)
     problem = (
-        _certificate_problem(view, enclave, key, facts, now, due) if cert is not None else "no certificate"
+        _certificate_problem(view, register, enclave, key, facts, now, due)
+        if cert is not None
+        else "no certificate"
     )
     if problem is None:
-        return Reissue.NOTHING, facts
-    reasons.append(problem)
-    return Reissue.CERTIFICATE, facts
+        return _Found(Reissue.NOTHING, facts)
+    if register is not None and not _key_is_ours(register, enclave, key):
+        return _Found(Reissue.KEY_PAIR, facts, f"its private key was not issued here ({problem})", True)
+    return _Found(Reissue.CERTIFICATE, facts, problem)
+
+
+def _key_mode(view: KeystoreView, directory: str) -> int:
+    """The permission bits of the private key, 0 without one."""
+    path = f"{view.root}/{directory}/{layout.KEY}"
+    try:
+        info = os.lstat(path)
+    except (FileNotFoundError, NotADirectoryError):
+        return 0
+    if not stat.S_ISREG(info.st_mode):
+        raise UnsafeKeystore(f"{printable(path)} is not a regular file; remove it")
+    if problem := safe_files.private_problem(path, info):
+        raise UnsafeKeystore(problem)
+    return stat.S_IMODE(info.st_mode)
 
 
 def _facts(cert: bytes | None) -> CertificateFacts | None:
@@ -152,13 +179,17 @@ def _facts(cert: bytes | None) -> CertificateFacts | None:
 
 
 def _certificate_problem(
-    view: KeystoreView, enclave: str, key: bytes, facts: CertificateFacts | None, now: datetime, due: datetime
+    view: KeystoreView,
+    register: Register | None,
+    enclave: str,
+    key: bytes,
+    facts: CertificateFacts | None,
+    now: datetime,
+    due: datetime,
 ) -> str | None:
     if facts is None:
         return "the certificate cannot be read"
-    if facts.common_name != enclave and all(
-        facts.common_name != common_name(enclave, scheme) for scheme in SubjectScheme
-    ):
+    if not names_enclave(facts.common_name, enclave):
         return "the certificate names another subject"
     if not facts.names_issuer(view.ca(Role.IDENTITY)):
         return "the certificate is by another CA"
@@ -168,7 +199,37 @@ def _certificate_problem(
         return "the certificate expires soon"
     if not key_matches(key, facts):
         return "the certificate belongs to another key"
+    return _record_problem(register, enclave, facts.serial)
+
+
+def _record_problem(register: Register | None, enclave: str, serial: int) -> str | None:
+    """What the register says against a certificate that looks good by itself."""
+    if register is None:
+        return None
+    record = register.certificates.get(serial)
+    if record is None or record.enclave != enclave:
+        return "the certificate was not issued here for this enclave"
+    if record.revoked is not None:
+        return "the certificate is revoked"
+    if record.replaced:
+        return "the certificate is an earlier one, put back or left by an interrupted run"
     return None
+
+
+def _key_is_ours(register: Register, enclave: str, key_pem: bytes) -> bool:
+    """Whether a certificate of this enclave was issued for the key and is not revoked: only such a key is certified
+    again."""
+    from keystore.errors import SigningUnavailable
+    from keystore.signing.authority import spki
+    from keystore.signing.identity import public_half
+    from keystore.signing.public_key import fingerprint
+
+    try:
+        present = fingerprint(spki(public_half(key_pem, "the enclave's key")))
+    except SigningUnavailable:
+        return False
+    records = [one for one in register.of_enclave(enclave) if one.key == present]
+    return bool(records) and all(one.revoked is None for one in records)
 
 
 def _permissions_stand(

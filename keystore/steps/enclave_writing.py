@@ -1,38 +1,41 @@
-"""Issuing and signing what ``enclave_state`` found missing, into a batch of the store."""
+"""Issuing and signing what the comparison found missing, into a batch of the store."""
 
 from __future__ import annotations
 
 import shlex
-from datetime import datetime
+from datetime import datetime, timedelta
 from functools import cached_property
 from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files, store
-from keystore.disk.governance_file import governance_domains
 from keystore.disk.store import Batch, Content, Link, Store
-from keystore.disk.superseded import Superseded
-from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput, KeystoreError, printable
-from keystore.formats.permissions import permissions_document
+from keystore.errors import DamagedKeystore, InvalidInput, printable
+from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
-from keystore.formats.policy import EnclavePolicy
+from keystore.formats.register import IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
 from keystore.formats.subject import (
     SubjectScheme,
     borrowable,
     cannot_be_told_apart,
     common_name,
+    scheme_of,
     subject_name,
 )
-from keystore.formats.validity import Validity
+from keystore.formats.validity import Validity, iso
 from keystore.signing.authority import Authority, IdentityIssuer
-from keystore.signing.identity import certify, new_identity, public_half
+from keystore.signing.identity import Identity, certify, new_identity, public_half
+from keystore.signing.records import certificate_record, permissions_record
 from keystore.steps.creation import sign_document
+from keystore.steps.crl import can_revoke, revocable
 from keystore.steps.enclave_state import EnclaveState, PermissionsSource, Reissue
+from keystore.steps.past_permissions import kept_permissions, what_is_taken_away
 
 if TYPE_CHECKING:
     from keystore.steps.options import ProvisionOptions
+
+_DAY = timedelta(days=1)
 
 
 class EnclaveWriter:
@@ -43,7 +46,15 @@ class EnclaveWriter:
         self._view = view
         self._options = options
         self._now = now
+        self._issued: list[IssuedCertificate] = []
+        self._signed: list[SignedPermissions] = []
+        self._revoked: set[int] = set()  # of this batch, all in the register
+        self.has_revoked = False
         self.warnings: list[str] = []
+
+    @property
+    def _register(self) -> Register:
+        return self._opened.register
 
     @cached_property
     def _issuer(self) -> IdentityIssuer:
@@ -56,6 +67,10 @@ class EnclaveWriter:
     @cached_property
     def _permissions_ca(self) -> Authority:
         return self._view.authority(Role.PERMISSIONS, self._options.access)
+
+    @cached_property
+    def _can_revoke(self) -> bool:
+        return self._options.revoke and can_revoke(self._view)
 
     @cached_property
     def _validity(self) -> Validity:
@@ -91,85 +106,147 @@ class EnclaveWriter:
             )
 
     def _present_name(self, enclave: str) -> str:
-        from keystore.formats.certificate import read_certificate
-
         relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
         pem = safe_files.read_if_there(self._view.root, relative)
         facts = read_certificate(pem, printable(relative)) if pem else None
         return (facts.common_name if facts else None) or common_name(enclave, self._scheme)
-
-    def replaced(self, states: list[EnclaveState]) -> list[Superseded]:
-        """Certificates by the present CA that ``write`` will replace before they have ended."""
-        ca = self._view.ca(Role.IDENTITY)
-        return [
-            Superseded(state.enclave, state.facts.serial, state.facts.validity.not_after)
-            for state in states
-            if state.reissue is not Reissue.NOTHING
-            and state.facts is not None
-            and state.facts.names_issuer(ca)
-        ]
 
     def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> tuple[str, ...]:
         """Add the enclave's missing files; returns what was done. Order: key, certificate, links,
         permissions, so that a process never finds permissions without an identity."""
         entries: dict[str, Content | Link] = {}
         actions: list[str] = []
-        named = self._identity(state, entries, actions)
+        if state.incident:
+            self._revoke(state, "key")
+        lost = what_is_taken_away(self._view, self._register, state.enclave, permissions)
+        if lost:
+            state = self._end_rights(state, lost)
+        named = self._identity(state, bool(lost), entries, actions)
         links = layout.enclave_links(state.enclave, crl=True)
         for name in state.links:
             entries[name] = Link(links[name], layout.link_source(name))
         if state.permissions:
             self._permissions(state, *named, permissions, entries)
-        self._name_actions(state, actions)
-        if state.lax_key and layout.KEY not in entries:
-            self._opened.set_mode(
-                f"{layout.enclave_directory(state.enclave)}/{layout.KEY}", store.PRIVATE_MODE
-            )
+        if "created" not in actions:
+            actions += [
+                word for word, done in (("permissions", state.permissions), ("links", state.links)) if done
+            ]
         if entries:
             batch.directory(layout.enclave_directory(state.enclave), entries)
+        if any(self._register.certificates[serial].enclave == state.enclave for serial in self._revoked):
+            actions.append("old certificate revoked")
         return tuple(actions)
 
-    def _name_actions(self, state: EnclaveState, actions: list[str]) -> None:
-        if "created" in actions:
+    def record(self, batch: Batch) -> None:
+        """What was added to the batch: on record before anything of it is seen."""
+        if not (self._issued or self._signed or self._revoked):
             return
-        if state.permissions:
-            actions.append("permissions")
-        if state.links:
-            actions.append("links")
-        if state.lax_key:
-            actions.append("mode")
+        register = self._register.with_certificates(self._issued).with_documents(self._signed)
+        if self._revoked:
+            register = register.with_revoked(self._revoked, self._now)
+            self.has_revoked = True
+        batch.record(register.without_ended(self._now))
+        self._issued, self._signed, self._revoked = [], [], set()
+
+    def _end_rights(self, state: EnclaveState, lost: tuple[str, ...]) -> EnclaveState:
+        """Documents cannot be revoked: the old one would fit until it ends. What ends it is another subject, and the
+        old certificate on the CRL."""
+        what = f"{', '.join(lost[:3])}{f' and {len(lost) - 3} more' if len(lost) > 3 else ''}"
+        if self._scheme is SubjectScheme.COMPATIBLE:
+            self.warnings.append(
+                f"{state.enclave} may no longer {what}, but with compatible subjects its old permissions fit it until "
+                f"{self._end_of(state)}: whoever copied them can use them again"
+            )
+            return state
+        self._revoke(state, what)
+        reissue = Reissue.CERTIFICATE if state.reissue is Reissue.NOTHING else state.reissue
+        return state._replace(reissue=reissue, permissions=True)
+
+    def _revoke(self, state: EnclaveState, what: str) -> None:
+        found = revocable(self._view, self._register, [state.enclave])
+        if not found:
+            return
+        if self._can_revoke:
+            self._revoked |= {one.serial for one in found}
+        else:
+            self.warnings.append(
+                f"the old certificate of {state.enclave} was not revoked: whoever copied it with its key and "
+                f"permissions can use them until {self._end_of(state)} ({what})"
+            )
+
+    def _end_of(self, state: EnclaveState) -> str:
+        ends = [one.not_after for one in self._register.of_enclave(state.enclave) if one.revoked is None]
+        return iso(max(ends)) if ends else "they end"
 
     def _identity(
-        self, state: EnclaveState, entries: dict[str, Content | Link], actions: list[str]
+        self,
+        state: EnclaveState,
+        new_generation: bool,
+        entries: dict[str, Content | Link],
+        actions: list[str],
     ) -> tuple[str, Validity]:
-        """Subject and validity of the certificate the enclave will have."""
+        """Common name and validity of the certificate the enclave will have."""
         if state.reissue is Reissue.NOTHING and state.facts is not None:
-            return subject_name(state.facts.common_name or ""), state.facts.validity
-        cn = common_name(state.enclave, self._scheme)
-        if state.reissue is Reissue.KEY_PAIR:
-            made = new_identity(self._issuer, cn, self._validity, self._view.settings.curve)
-            actions.append("key and certificate" if state.facts is not None else "created")
-        else:
-            relative = f"{layout.enclave_directory(state.enclave)}/{layout.KEY}"
-            key = safe_files.read_private(self._view.root, relative)
-            place = printable(self._view.root / relative)
-            made = certify(self._issuer, cn, public_half(key, place), self._validity)
-            actions.append("certificate")
+            return state.facts.common_name or "", state.facts.validity
+        made = self._issue(state, self._subject(state.enclave, new_generation), actions)
         if made.key is not None:
             entries[layout.KEY] = Content(made.key, store.PRIVATE_MODE)
         entries[layout.CERT] = Content(made.cert)
-        return subject_name(made.common_name), made.validity
+        facts = read_certificate(made.cert, "the new certificate")
+        self._issued.append(certificate_record(state.enclave, facts, self._identity_ca.facts))
+        self._revoke_longer(state, made.validity)
+        return made.common_name, made.validity
+
+    def _issue(self, state: EnclaveState, cn: str, actions: list[str]) -> Identity:
+        if state.reissue is Reissue.KEY_PAIR:
+            known = state.facts is not None or bool(self._register.of_enclave(state.enclave))
+            actions.append("key and certificate" if known and not _is_new(state) else "created")
+            return new_identity(self._issuer, cn, self._validity, self._view.settings.curve)
+        relative = f"{layout.enclave_directory(state.enclave)}/{layout.KEY}"
+        key = safe_files.read_private(self._view.root, relative)
+        actions.append("certificate")
+        return certify(
+            self._issuer, cn, public_half(key, printable(self._view.root / relative)), self._validity
+        )
+
+    def _subject(self, enclave: str, new_generation: bool) -> str:
+        """The subject it has; another one for a new generation, or after a change of the scheme."""
+        records = self._register.of_enclave(enclave)
+        used = {one.subject for one in records} | {
+            one.subject for one in self._register.documents if one.enclave == enclave
+        }
+        latest = self._register.permissions(enclave)
+        present = latest.subject if latest is not None else records[-1].subject if records else ""
+        if present and not new_generation and scheme_of(present) is self._scheme:
+            return present
+        generation = 1
+        while new_generation and common_name(enclave, self._scheme, generation) in used:
+            generation += 1
+        return common_name(enclave, self._scheme, generation)
+
+    def _revoke_longer(self, state: EnclaveState, validity: Validity) -> None:
+        """A shorter life that was asked for is one only when the longer certificate cannot be used any more."""
+        if self._options.lifetime is None and self._options.valid_until is None:
+            return
+        found = revocable(self._view, self._register, [state.enclave])
+        longer = {one.serial for one in found if one.not_after > validity.not_after + _DAY} - self._revoked
+        if longer and self._can_revoke:
+            self._revoked |= longer
 
     def _permissions(
         self,
         state: EnclaveState,
-        subject: str,
+        cn: str,
         validity: Validity,
         source: PermissionsSource,
         entries: dict[str, Content | Link],
     ) -> None:
-        document = source(subject, validity) or self._kept(state, subject, validity)
+        subject = subject_name(cn)
+        document = source(subject, validity) or kept_permissions(
+            self._view, self._register, state.enclave, subject, validity, self._options.rmw
+        )
         signed = sign_document(document, self._permissions_ca, self._now)
+        self._signed.append(permissions_record(state.enclave, cn, document))
         if len(signed) >= WARN_BYTES:
             self.warnings.append(
                 f"the permissions of enclave {state.enclave} take {len(signed)} bytes; Fast DDS carries "
@@ -178,32 +255,8 @@ class EnclaveWriter:
         entries[layout.PERMISSIONS_XML] = Content(document)
         entries[layout.PERMISSIONS] = Content(signed)
 
-    def _kept(self, state: EnclaveState, subject: str, validity: Validity) -> bytes:
-        """What the enclave was granted before, under its new subject and dates; without a past, nothing."""
-        from keystore.formats.permissions_dates import redated
 
-        relative = f"{layout.enclave_directory(state.enclave)}/{layout.PERMISSIONS}"
-        if safe_files.read_if_there(self._view.root, relative) is None:
-            nothing = EnclavePolicy(state.enclave, ())
-            return permissions_document(
-                subject,
-                nothing,
-                validity=validity,
-                domains=governance_domains(self._view),
-                rmw=self._options.rmw,
-            )
-        try:
-            document = trusted_document(self._view, relative)
-            return redated(document, _own_subjects(state), subject, validity, printable(relative))
-        except KeystoreError as error:
-            raise DamagedKeystore(
-                f"{error}. What it may do is not known then: give it with secure-keystore apply-policy"
-            ) from None
+def _is_new(state: EnclaveState) -> bool:
+    from keystore.steps.enclave_state import NEW
 
-
-def _own_subjects(state: EnclaveState) -> set[str]:
-    """Every subject this enclave can have had: an interrupted renewal may have replaced only its certificate."""
-    names = {common_name(state.enclave, scheme) for scheme in SubjectScheme} | {state.enclave}
-    if state.facts is not None and state.facts.common_name is not None:
-        names.add(state.facts.common_name)
-    return {subject_name(cn) for cn in names}
+    return state.reasons == (NEW,)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from keystore.disk import layout, lock, safe_files, store
+from keystore.disk import layout, lock, safe_files
 from keystore.disk.copies import refresh_copies
 from keystore.disk.governance_file import governance_stands, signed_governance
 from keystore.disk.safe_files import resolve_root
@@ -16,6 +16,7 @@ from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
 from keystore.steps.creation import write_governance
+from keystore.steps.opening import opened_for_change
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,11 +37,12 @@ def set_governance(
     root = resolve_root(keystore)
     KeystoreView(root).require_complete()
     document = governance_document(governance)
-    with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    now = utc_now()
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         view = KeystoreView(root)
-        changed = not _stands(view, document)
+        changed = not _stands(view, document) or opened.register.governance != document
         if changed:
-            write_governance(opened, document, view.authority(Role.PERMISSIONS, chosen.access), utc_now())
+            write_governance(opened, document, view.authority(Role.PERMISSIONS, chosen.access), now)
         refresh_copies(opened)
     return changed
 

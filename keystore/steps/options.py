@@ -39,3 +39,5 @@ class ProvisionOptions(NamedTuple):
     durable: bool = True
     progress: Progress | None = None
     now: datetime | None = None
+    revoke: bool = True
+    """Revoke certificates whose rights shrink or whose key is not safe; without it they are usable until they end."""

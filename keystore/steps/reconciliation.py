@@ -10,20 +10,22 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import store
+from keystore.disk.authorities import refuse_foreign_authorities
 from keystore.disk.governance_file import governance_domains
 from keystore.disk.store import Store
-from keystore.disk.superseded import remember
 from keystore.disk.view import KeystoreView
 from keystore.formats.enclave_name import check_distinct
 from keystore.formats.role import Role
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity
 from keystore.steps.comparison import WantedEnclave, as_found, inspect_wanted
 from keystore.steps.creation import CreateOptions, complete, renew_governance
+from keystore.steps.crl import publish_crl, restore_crl
 from keystore.steps.enclave_state import EnclaveState
 from keystore.steps.enclave_writing import EnclaveWriter
+from keystore.steps.opening import opened_for_change
 from keystore.steps.options import Progress, ProvisionOptions
 from keystore.steps.report import EnclaveReport, ProvisionReport
-from keystore.steps.revocation import renew_crl
+from keystore.steps.signing_here import refuse_without_keys
 
 # Bounds what an interrupted run loses, and how often the disk is waited for.
 _BATCH = 250
@@ -36,23 +38,32 @@ def reconcile(
     # An impossible validity is refused before a keystore is made for it.
     lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
     Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
-    with _locked(root, options) as opened:
+    with _locked(root, options, now) as opened:
         done, warnings = _complete_keystore(opened, options, now)
         view = KeystoreView(root)
+        register = opened.register if opened.has_register else None
+        refuse_foreign_authorities(view, register)
         warnings += _exposures(view)
         check_distinct(dict.fromkeys((*view.enclaves(), *wanted)))
         writer = EnclaveWriter(opened, view, options, now)
-        states = [inspect_wanted(view, name, one, options, now) for name, one in wanted.items()]
+        states = [inspect_wanted(view, register, name, one, options, now) for name, one in wanted.items()]
+        refuse_without_keys(view, states, wanted)
         writer.check_subjects(states)
-        reports = _write_all(opened, writer, states, wanted, options.progress, now)
+        reports = _write_all(opened, writer, states, wanted, options.progress)
+        if writer.has_revoked:
+            publish_crl(opened, options.access, now)
+            warnings.append(
+                "certificates were revoked: deploy crl.pem to every host and restart what runs there; participants "
+                "read it when they start"
+            )
     return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
 
 
 @contextmanager
-def _locked(root: Path, options: ProvisionOptions) -> Iterator[Store]:
+def _locked(root: Path, options: ProvisionOptions, now: datetime) -> Iterator[Store]:
     if options.create:
         store.create_root(root)
-    with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
+    with opened_for_change(root, now, timeout=options.lock_timeout, durable=options.durable) as opened:
         yield opened
 
 
@@ -72,8 +83,7 @@ def _complete_keystore(
     done = list(report.actions)
     if renew_governance(opened, domains, options.access, now):
         done.append(f"governance signed for domains {domains}")
-    if renew_crl(opened, options.access, now, options.renew_within):
-        done.append("CRL published again")
+    done += restore_crl(opened, options.access, now, options.renew_within)
     return done, list(report.warnings)
 
 
@@ -87,7 +97,10 @@ def _exposures(view: KeystoreView) -> list[str]:
         )
     files = [name for role in Role if (name := view.key_file(role)) is not None]
     if any(os.stat(view.root / name).st_mode & 0o077 for name in files):
-        said.append("the CA keys can be read by others; secure-keystore renew closes them")
+        said.append(
+            "the CA keys can be read by others; secure-keystore renew closes them. Whoever read them can make any "
+            "enclave: secure-keystore renew --ca start replaces them"
+        )
     return said
 
 
@@ -97,7 +110,6 @@ def _write_all(
     states: list[EnclaveState],
     wanted: Mapping[str, WantedEnclave],
     progress: Progress | None,
-    now: datetime,
 ) -> tuple[EnclaveReport, ...]:
     """In batches: bounded loss when interrupted, few calls to make it durable."""
     reports = {state.enclave: as_found(state) for state in states}
@@ -105,10 +117,10 @@ def _write_all(
     for start in range(0, len(todo), _BATCH):
         part = todo[start : start + _BATCH]
         with opened.batch() as batch:
-            remember(batch, KeystoreView(opened.root), writer.replaced(part), now)
             for position, state in enumerate(part, start + 1):
                 actions = writer.write(batch, state, wanted[state.enclave].permissions)
                 reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)
                 if progress is not None:
                     progress(position, len(todo))
+            writer.record(batch)
     return tuple(reports.values())

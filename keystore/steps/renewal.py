@@ -11,11 +11,14 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
-from keystore.disk import layout, safe_files, store
+from keystore.disk import layout, safe_files
+from keystore.disk.authorities import describe, foreign_authorities
+from keystore.disk.copies import refresh_copies
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
@@ -24,18 +27,22 @@ from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
 from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, scheme_of
 from keystore.formats.validity import utc_now
+from keystore.signing.authority import pem_certificate
 from keystore.steps import rollover
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import install_incoming, mirror_governance
+from keystore.steps.crl import restore_crl
 from keystore.steps.enclave_state import Reissue
 from keystore.steps.enclaves import keep
+from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import bring_about
+from keystore.steps.removal import revoke_replaced
 from keystore.steps.report import ProvisionReport
-from keystore.steps.revocation import renew_crl, revoke_replaced
 
 DEFAULT_WITHIN = timedelta(days=30)
 
@@ -67,11 +74,10 @@ def renew(
     now = provisioning.now or utc_now()
     named = None if enclaves is None else sorted({validate_enclave_name(name) for name in enclaves})
     _refuse_unknown(root, named)
-    with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:
+    with _opened(root, provisioning, now) as opened:
         install_incoming(opened)
         repaired = _repair_keystore(opened, chosen, now)
-        if renew_crl(opened, provisioning.access, now, chosen.within):
-            repaired.append("CRL published again")
+        repaired += restore_crl(opened, provisioning.access, now, chosen.within)
         if mirror_governance(opened):
             repaired.append("governance.xml made equal to the signed governance.p7s")
     view = KeystoreView(root)
@@ -79,11 +85,15 @@ def renew(
     due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
     report = bring_about(root, wanted, with_domains(root, due))
     if chosen.revoke_old:
-        with store.opened(root, timeout=provisioning.lock_timeout, durable=provisioning.durable) as opened:
+        with _opened(root, provisioning, now) as opened:
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
             count = revoke_replaced(opened, changed, provisioning.access, now)
         repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
     return report._replace(created=(*repaired, *report.created))
+
+
+def _opened(root: Path, options: ProvisionOptions, now: datetime) -> AbstractContextManager[Store]:
+    return opened_for_change(root, now, timeout=options.lock_timeout, durable=options.durable)
 
 
 def _refuse_unknown(root: Path, named: list[str] | None) -> None:
@@ -124,10 +134,32 @@ def _facts(view: KeystoreView, name: str) -> CertificateFacts | None:
 
 def _repair_keystore(opened: Store, options: RenewOptions, now: datetime) -> list[str]:
     done = [f"made {name} private" for name in _close_modes(opened)]
+    done += _drop_foreign_authorities(opened)
     if KeystoreView(opened.root).shares_one_ca:
         rollover.separate_permissions_ca(opened, options.provisioning, now, encrypt=options.encrypt_ca_keys)
         done.append("permissions CA separated from the identity CA; deploy all enclaves together")
     return done
+
+
+def _drop_foreign_authorities(opened: Store) -> list[str]:
+    """Trust files keep the CAs that the register knows, the one in use first."""
+    view = KeystoreView(opened.root)
+    foreign = foreign_authorities(view, opened.register if opened.has_register else None)
+    for role in sorted({role for role, _ in foreign}):
+        known = [
+            ca for (its, ca), state in opened.register.authorities.items()
+            if its is role and state is AuthorityState.IN_USE
+        ]  # fmt: skip
+        kept = [ca.der for ca in view.ca_bundle(role) if opened.register.knows_authority(role, ca.der)]
+        bundle = dict.fromkeys((*known, *kept))
+        with opened.batch() as batch:
+            batch.file(layout.ca_cert(role), b"".join(map(pem_certificate, bundle)))
+    if foreign:
+        refresh_copies(opened)
+    return [
+        f"CA that this keystore did not make removed from {layout.ca_cert(role)}: {describe(ca)}"
+        for role, ca in foreign
+    ]
 
 
 def _close_modes(opened: Store) -> list[str]:

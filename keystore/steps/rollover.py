@@ -17,28 +17,33 @@ from __future__ import annotations
 
 import os
 from collections.abc import Collection
+from contextlib import suppress
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
 from keystore.disk.copies import refresh_copies
+from keystore.disk.governance_file import governance_stands
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Content, Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput
-from keystore.formats.certificate import read_certificate
+from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.formats.certificate import read_certificate, read_pem
+from keystore.formats.der import DerError
+from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, utc_now
-from keystore.signing import authority
+from keystore.signing import authority, smime
 from keystore.signing.authority import Authority, pem_certificate
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
+from keystore.steps.crl import drop_crl
 from keystore.steps.enclaves import keep
+from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import bring_about
 from keystore.steps.report import ProvisionReport
-from keystore.steps.revocation import drop_crl
 
 
 class Step(str, Enum):
@@ -64,10 +69,12 @@ def roll_over(
     root = resolve_root(keystore)
     KeystoreView(root).require_complete()
     now = chosen.now or utc_now()
-    with store.opened(root, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         install_incoming(opened)
         for role in roles:
             _forget_installed(opened, role)
+        if step is Step.FINISH:
+            _refuse_to_strand(opened, roles)
         done = [_STEPS[step](opened, role, chosen, now, encrypt) for role in roles]
         refresh_copies(opened)
     if step is not Step.SWITCH:
@@ -94,6 +101,7 @@ def _make_next(
     opened.ensure_directory(layout.PRIVATE)
     opened.ensure_directory(layout.NEXT)
     with opened.batch() as batch:
+        batch.record(opened.register.with_authority(role, made.facts.der, AuthorityState.WAITING))
         batch.directory(
             _waiting(role), {layout.KEY: Content(key, store.PRIVATE_MODE), layout.CERT: Content(made.pem())}
         )
@@ -174,6 +182,38 @@ def _finish(opened: Store, role: Role, options: ProvisionOptions, now: datetime,
             f"everything is still signed by the old {_title(role)}: first --ca switch, and deploy"
         )
     return _trust(opened, role, pem_certificate(KeystoreView(opened.root).ca(role).der))
+
+
+def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
+    """Raises InvalidInput while anything in force hangs on an old CA: nobody would trust it any more."""
+    view = KeystoreView(opened.root)
+    stranded = sorted({name for name in view.enclaves() if _hangs_on_old_ca(view, name, roles)})
+    governance = Role.PERMISSIONS in roles and not governance_stands(view, None)
+    if not stranded and not governance:
+        return
+    what = []
+    if stranded:
+        some = ", ".join(stranded[:3]) + (" ..." if len(stranded) > 3 else "")
+        what.append(f"{len(stranded)} of {len(view.enclaves())} enclaves ({some})")
+    if governance:
+        what.append("the governance")
+    raise InvalidInput(
+        f"{' and '.join(what)} still belong to the old CA and would be trusted no more; complete the switch first: "
+        "secure-keystore renew KEYSTORE --ca switch, then deploy"
+    )
+
+
+def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) -> bool:
+    """What cannot be read belongs to no CA; renew or verify tells of it."""
+    directory = layout.enclave_directory(enclave)
+    pem = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
+    signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
+    with suppress(DerError, DamagedKeystore):
+        if Role.IDENTITY in roles and pem and not read_pem(pem).names_issuer(view.ca(Role.IDENTITY)):
+            return True
+        if Role.PERMISSIONS in roles and signed:
+            return not smime.read(signed, directory).embeds(view.ca(Role.PERMISSIONS).der)
+    return False
 
 
 def separate_permissions_ca(

@@ -20,7 +20,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.steps.revocation import RemoveOptions, remove
+    from keystore.steps.removal import RemoveOptions, remove
 
     options = RemoveOptions(
         revoke=not arguments.no_revoke,

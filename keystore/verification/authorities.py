@@ -10,7 +10,6 @@ from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, SigningUnavailable, UnsafeKeystore
-from keystore.formats import der
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.governance import parse_governance
 from keystore.formats.role import Role
@@ -18,7 +17,7 @@ from keystore.formats.validity import iso
 from keystore.signing import smime
 from keystore.signing.authority import check_can_serve
 from keystore.signing.ca_access import CaAccess
-from keystore.signing.public_key import key_kind, signature_is_valid
+from keystore.signing.public_key import issued_by, key_kind
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
@@ -74,16 +73,6 @@ def _check_certificate(
             Severity.WARNING, "ca-key-kind", place,
             f"a {key_kind(facts.public_key)} key: Cyclone DDS refuses it, Fast DDS accepts it",
         )  # fmt: skip
-
-
-def issued_by(facts: CertificateFacts, ca: CertificateFacts) -> bool:
-    """Whether ``ca`` signed this certificate: name and signature."""
-    parts = der.parse(facts.der).children()
-    if len(parts) != 3 or not facts.names_issuer(ca):
-        return False
-    body, algorithm, signature = parts
-    # A BIT STRING starts with the count of unused bits.
-    return signature_is_valid(ca.public_key, signature.content[1:], body.whole, algorithm.whole)
 
 
 def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Finding]:

@@ -19,7 +19,7 @@ from keystore.formats.subject import (
     SubjectScheme,
     borrowable,
     cannot_be_told_apart,
-    common_name,
+    names_enclave,
     scheme_of,
     subject_name,
 )
@@ -27,10 +27,10 @@ from keystore.formats.validity import LATEST, Validity, iso, parse_moment
 from keystore.signing import smime
 from keystore.signing.identity import public_half
 from keystore.signing.key_pair import key_matches
-from keystore.signing.public_key import key_kind
+from keystore.signing.public_key import issued_by, key_kind
 from keystore.signing.signer import load_private_key
 from keystore.verification import repair
-from keystore.verification.authorities import CYCLONE_KINDS, issued_by
+from keystore.verification.authorities import CYCLONE_KINDS
 from keystore.verification.finding import Finding, Severity
 
 _WILDCARD = re.compile(r"[*?\[]")
@@ -178,8 +178,7 @@ class _EnclaveCheck:
             )  # fmt: skip
 
     def _subject(self, facts: CertificateFacts) -> Iterator[Finding]:
-        allowed = {common_name(self._enclave, scheme) for scheme in SubjectScheme} | {self._enclave}
-        if facts.common_name not in allowed or facts.name_parts != 1:
+        if not names_enclave(facts.common_name, self._enclave) or facts.name_parts != 1:
             yield self.error("wrong-subject", layout.CERT, "its subject is not that of this enclave")
 
     def _links(self) -> Iterator[Finding]:

@@ -18,8 +18,8 @@ from pathlib import Path
 from keystore.errors import KeystoreError
 from keystore.formats.role import Role
 from keystore.steps.creation import CreateOptions, create_keystore
+from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.revocation import RemoveOptions, remove
 from keystore.steps.rollover import Step, roll_over
 from tests.keystore.kit import filled, options
 

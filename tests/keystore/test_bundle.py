@@ -13,7 +13,7 @@ import pytest
 from keystore.disk import layout
 from keystore.errors import DamagedKeystore, InvalidInput
 from keystore.steps.bundle import PublicFiles, export
-from keystore.steps.revocation import RemoveOptions, remove
+from keystore.steps.removal import RemoveOptions, remove
 from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, contents, filled, mode, openssl
 

@@ -205,7 +205,9 @@ def test_where_the_ca_keys_are_not_nothing_is_signed_but_a_launch_works(tmp_path
         path.unlink()
     (root / "private").rmdir()
     assert actions(provision(root, [policy("/a")], options=options())) == {}
-    with pytest.raises(SigningUnavailable, match="run this where the CA key is"):
+    with pytest.raises(
+        SigningUnavailable, match=r"has no CA keys.*(?s:.)*/a: other permissions; lacks publish rt/new"
+    ):
         provision(root, [policy("/a", "/new")], options=options())
     assert findings(root) == {"no-ca-key"}
 

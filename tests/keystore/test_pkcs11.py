@@ -18,7 +18,7 @@ from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.pkcs11_signer import Pkcs11Signer, parse_uri
 from keystore.steps.creation import ImportedCa
 from keystore.steps.provisioning import provision
-from keystore.steps.revocation import RemoveOptions, remove
+from keystore.steps.removal import RemoveOptions, remove
 from keystore.verification import verify
 from tests.keystore.kit import DAY, created, openssl, options, policy
 
@@ -94,7 +94,7 @@ def test_everything_is_signed_by_the_token(root: Path, token: Mapping[str, str])
 
 
 def test_the_keystore_holds_uris_not_keys(root: Path) -> None:
-    assert {path.name: path.read_text() for path in (root / "private").iterdir()} == {
+    assert {path.name: path.read_text() for path in (root / "private").glob("*.key.*")} == {
         f"{role.value}.key.p11": uri(role) + "\n" for role in Role
     }
 

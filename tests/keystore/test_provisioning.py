@@ -64,7 +64,7 @@ def test_the_layout_is_sros2s(tmp_path: Path) -> None:
     assert {name for name, target in found.items() if isinstance(target, bytes)} == {
         "secure-keystore.json",
         "public/identity_ca.cert.pem", "public/permissions_ca.cert.pem",
-        "private/identity_ca.key.pem", "private/permissions_ca.key.pem",
+        "private/identity_ca.key.pem", "private/permissions_ca.key.pem", "private/register.json",
         "enclaves/governance.xml", "enclaves/governance.p7s",
         *(f"enclaves/{where}{name}" for where in ("", "front/camera/")
           for name in ("cert.pem", "key.pem", "permissions.xml", "permissions.p7s")),
@@ -145,7 +145,9 @@ def test_only_what_differs_is_signed_again(tmp_path: Path) -> None:
     after = contents(root)
     assert actions(report) == {"/b": ("permissions",)}
     changed = {name for name in after if after[name] != before.get(name)}
-    assert changed == {"enclaves/b/permissions.xml", "enclaves/b/permissions.p7s"}
+    assert changed == {
+        "enclaves/b/permissions.xml", "enclaves/b/permissions.p7s", "private/register.json",
+    }  # fmt: skip
 
 
 def test_taking_a_topic_away_takes_its_permission_away(tmp_path: Path) -> None:
@@ -164,7 +166,7 @@ def granted(root: Path, name: str) -> set[str]:
 def test_other_enclaves_are_left_alone(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a", "/b"])
     before = snapshot(root / "enclaves/b")
-    provision(root, [policy("/a", "/new")], options=options())
+    provision(root, [policy("/a", "/chatter", "/new")], options=options())
     assert snapshot(root / "enclaves/b") == before
 
 
@@ -206,13 +208,14 @@ def test_a_dangling_link_in_a_targets_place_is_replaced(tmp_path: Path) -> None:
     assert actions(provision(root, [policy("/a")], options=options())) == {"/a": ("links",)}
 
 
-def test_a_wrong_key_gets_a_new_certificate_rather_than_a_silent_robot(tmp_path: Path) -> None:
+def test_a_key_that_was_not_issued_for_the_enclave_is_not_certified(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a", "/b"])
     shutil.copy(root / "enclaves/b/key.pem", root / "enclaves/a/key.pem")
     assert "key-mismatch" in codes(root)
     assert actions(provision(root, [policy("/a")], options=options())) == {
-        "/a": ("certificate", "permissions")
+        "/a": ("key and certificate", "permissions", "old certificate revoked")
     }
+    assert (root / "enclaves/a/key.pem").read_bytes() != (root / "enclaves/b/key.pem").read_bytes()
     assert codes(root) == set()
 
 
@@ -403,11 +406,16 @@ def test_world_writable_places_are_refused(tmp_path: Path) -> None:
         provision(tmp_path / "open/ks", [policy("/a")], options=options())
 
 
-def test_a_key_that_others_could_read_is_closed(tmp_path: Path) -> None:
+def test_a_key_that_others_could_read_is_replaced_and_its_certificate_revoked(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a"])
-    (root / "enclaves/a/key.pem").chmod(0o644)
-    assert actions(provision(root, [policy("/a")], options=options())) == {"/a": ("mode",)}
-    assert mode(root / "enclaves/a/key.pem") == 0o600
+    key = root / "enclaves/a/key.pem"
+    exposed = key.read_bytes()
+    key.chmod(0o644)
+    assert actions(provision(root, [policy("/a")], options=options())) == {
+        "/a": ("key and certificate", "permissions", "old certificate revoked")
+    }
+    assert mode(key) == 0o600 and key.read_bytes() != exposed
+    assert codes(root) == set()
 
 
 def test_no_symlinks_on_this_file_system(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from keystore.errors import KeystoreError
-from keystore.steps.revocation import RemoveOptions, remove
+from keystore.steps.removal import RemoveOptions, remove
 from keystore.verb import main
 from keystore.verification import Finding, verify
 from tests.dds import sros2_style

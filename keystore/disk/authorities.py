@@ -1,0 +1,41 @@
+"""Which CAs a keystore trusts, held against those that its register knows. Cheap: asked before a launch."""
+
+from __future__ import annotations
+
+from keystore.disk import layout
+from keystore.disk.view import KeystoreView
+from keystore.errors import UnsafeKeystore, printable
+from keystore.formats.certificate import CertificateFacts
+from keystore.formats.register import Register
+from keystore.formats.role import Role
+
+
+def foreign_authorities(view: KeystoreView, register: Register | None) -> list[tuple[Role, CertificateFacts]]:
+    """Trusted CAs that this keystore did not make and was not given; none can be told without a register."""
+    if register is None:
+        return []
+    return [
+        (role, ca)
+        for role in Role
+        for ca in view.ca_bundle(role)
+        if not register.knows_authority(role, ca.der)
+    ]
+
+
+def refuse_foreign_authorities(view: KeystoreView, register: Register | None) -> None:
+    """Raises UnsafeKeystore: whoever holds the key of such a CA can make enclaves that Fast DDS lets in."""
+    for role, ca in foreign_authorities(view, register):
+        raise UnsafeKeystore(
+            f"{printable(view.root / layout.ca_cert(role))} holds a CA that this keystore did not make: "
+            f"{describe(ca)}. Find out who put it there; to remove it: secure-keystore renew "
+            f"{printable(view.root)}"
+        )
+
+
+def describe(ca: CertificateFacts) -> str:
+    """Its name and the SHA-256 fingerprint that openssl and browsers show."""
+    import hashlib
+
+    digest = hashlib.sha256(ca.der).hexdigest().upper()
+    pairs = ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
+    return f"{printable(ca.common_name or 'without a common name')}, SHA-256 {pairs}"

@@ -1,0 +1,32 @@
+"""The register on disk. Cheap: asked before a launch; ``store`` writes it, first of each batch."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from keystore.disk import layout, safe_files
+from keystore.disk.view import KeystoreView
+from keystore.errors import printable
+from keystore.formats.register import Register, parse_register
+from keystore.formats.role import Role
+
+
+def read_register(root: Path) -> Register | None:
+    """None where there is none: a bundle without ``private/``, a keystore of SROS2 or of an earlier version.
+
+    Raises DamagedKeystore for what is not a register and UnsafeKeystore for one that others could have written.
+    """
+    if not os.path.lexists(f"{root}/{layout.REGISTER}"):
+        return None
+    text = safe_files.read_private(root, layout.REGISTER)
+    return parse_register(text, printable(root / layout.REGISTER))
+
+
+def needs_register(view: KeystoreView) -> bool:
+    """Whether this keystore issues but has no register: SROS2 made it, or an earlier version."""
+    return (
+        not os.path.lexists(view.root / layout.REGISTER)
+        and all(os.path.isfile(view.root / layout.ca_cert(role)) for role in Role)
+        and any(view.key_file(role) is not None for role in Role)
+    )

@@ -1,0 +1,249 @@
+"""The register of a keystore: what was issued, to whom, until when, and what of it was revoked. Pure.
+
+``private/register.json``, written before a certificate or document leaves the CA. What stands elsewhere in the
+keystore can be put back from a backup or copied in; the register says whether it is what was issued last.
+
+    authorities     every CA this keystore made or was given: waiting, in use, or retired
+    certificates    by serial number; of each enclave one is in force
+    documents       what was signed for whom, by hash; governance as text
+    crl_number      of the CRL published last, 0 before the first (RFC 5280 section 5.2.3: it only grows)
+"""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from enum import Enum
+from functools import cached_property
+from typing import Any, NamedTuple
+
+from keystore.errors import DamagedKeystore
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.role import Role
+from keystore.formats.validity import iso, parse_moment
+
+_VERSION = 1
+UNKNOWN = ""
+"""In place of an enclave, subject or key: of certificates that only a CRL of an earlier version tells of."""
+
+
+class AuthorityState(str, Enum):
+    """Of a CA: whether it is to come, signs, or has signed."""
+
+    WAITING = "waiting"
+    IN_USE = "in use"
+    RETIRED = "retired"
+
+
+class IssuedCertificate(NamedTuple):
+    """``subject`` is the common name, ``key`` the SHA-256 of the public key (SubjectPublicKeyInfo, hex), ``issuer``
+    the SHA-256 of the CA's certificate. ``replaced``: another one of the enclave is in force, or it was removed."""
+
+    serial: int
+    enclave: str
+    subject: str
+    key: str
+    issuer: str
+    not_before: datetime
+    not_after: datetime
+    replaced: bool = False
+    revoked: datetime | None = None
+
+    @property
+    def in_force(self) -> bool:
+        return not self.replaced and self.revoked is None
+
+
+class SignedPermissions(NamedTuple):
+    """``document`` is the SHA-256 of the signed XML, ``rules`` of what it grants apart from subject and dates."""
+
+    enclave: str
+    subject: str
+    document: str
+    rules: str
+    not_after: datetime
+
+
+@dataclass(frozen=True)
+class Register:
+    """``authorities``: role and DER certificate -> state. ``crl_published``: whether there is a CRL by the CA in use.
+    Each change gives a new register."""
+
+    authorities: Mapping[tuple[Role, bytes], AuthorityState] = field(default_factory=dict)
+    certificates: Mapping[int, IssuedCertificate] = field(default_factory=dict)
+    documents: tuple[SignedPermissions, ...] = ()
+    governance: bytes = b""
+    crl_number: int = 0
+    crl_published: bool = False
+
+    @cached_property
+    def _by_enclave(self) -> dict[str, list[IssuedCertificate]]:
+        found: dict[str, list[IssuedCertificate]] = {}
+        for one in self.certificates.values():
+            found.setdefault(one.enclave, []).append(one)
+        return found
+
+    @cached_property
+    def _latest_documents(self) -> dict[str, SignedPermissions]:
+        return {one.enclave: one for one in self.documents}
+
+    def of_enclave(self, enclave: str) -> list[IssuedCertificate]:
+        """Every certificate of the enclave that is remembered, in the order of issue."""
+        return self._by_enclave.get(enclave, [])
+
+    def in_force(self, enclave: str) -> IssuedCertificate | None:
+        """The certificate issued last, unless it was revoked or removed."""
+        return next((one for one in reversed(self.of_enclave(enclave)) if one.in_force), None)
+
+    def permissions(self, enclave: str) -> SignedPermissions | None:
+        """The document signed last for the enclave."""
+        return self._latest_documents.get(enclave)
+
+    def knows_authority(self, role: Role, ca: bytes) -> bool:
+        """Whether this keystore made the CA with this certificate, or was given it."""
+        return (role, ca) in self.authorities
+
+    def revoked(self, issuer: str) -> dict[int, datetime]:
+        """Serial -> date of revocation, of the certificates that this CA issued."""
+        return {
+            one.serial: one.revoked
+            for one in self.certificates.values()
+            if one.revoked is not None and one.issuer == issuer
+        }
+
+    def with_authority(self, role: Role, ca: bytes, state: AuthorityState) -> Register:
+        """A CA in use retires the one that was."""
+        known = dict(self.authorities)
+        if state is AuthorityState.IN_USE:
+            for (its, other), was in self.authorities.items():
+                if its is role and was is AuthorityState.IN_USE:
+                    known[its, other] = AuthorityState.RETIRED
+        known[role, ca] = state
+        return replace(self, authorities=known)
+
+    def with_certificates(self, issued: Iterable[IssuedCertificate]) -> Register:
+        """Each takes the place of what its enclave had."""
+        fresh = list(issued)
+        enclaves = {one.enclave for one in fresh}
+        known = {
+            serial: one._replace(replaced=True) if one.enclave in enclaves else one
+            for serial, one in self.certificates.items()
+        }
+        return replace(self, certificates={**known, **{one.serial: one for one in fresh}})
+
+    def with_documents(self, signed: Iterable[SignedPermissions]) -> Register:
+        fresh = tuple(signed)
+        kept = tuple(one for one in self.documents if one not in fresh)
+        return replace(self, documents=(*kept, *fresh))
+
+    def without_enclaves(self, enclaves: Iterable[str]) -> Register:
+        """Removed: none of their certificates is in force, what they were granted stays known."""
+        gone = set(enclaves)
+        known = {
+            serial: one._replace(replaced=True) if one.enclave in gone else one
+            for serial, one in self.certificates.items()
+        }
+        return replace(self, certificates=known)
+
+    def with_revoked(self, serials: Iterable[int], now: datetime) -> Register:
+        """A CRL that lists them has to follow: its number is counted up."""
+        known = dict(self.certificates)
+        for serial in serials:
+            if serial in known and known[serial].revoked is None:
+                known[serial] = known[serial]._replace(revoked=now)
+        return replace(self, certificates=known).with_next_crl(now)
+
+    def with_next_crl(self, now: datetime) -> Register:
+        """Another CRL is to be published. Its number is the time where that is enough to let it grow."""
+        number = max(int(now.timestamp()), self.crl_number + 1)
+        return replace(self, crl_number=number, crl_published=True)
+
+    def without_ended(self, now: datetime) -> Register:
+        """Nobody can use what has ended; what is in force stays, so that an enclave is still known."""
+        certificates = {
+            serial: one for serial, one in self.certificates.items() if one.in_force or one.not_after > now
+        }
+        documents = tuple(
+            one for one in self.documents if one.not_after > now or one is self.permissions(one.enclave)
+        )
+        return replace(self, certificates=certificates, documents=documents)
+
+
+def register_json(register: Register) -> bytes:
+    """One line for each entry: differences between two versions can be read."""
+    authorities = [
+        [role.value, state.value, base64.b64encode(ca).decode()]
+        for (role, ca), state in register.authorities.items()
+    ]
+    parts = {
+        "authorities": authorities,
+        "certificates": [_certificate_row(one) for one in register.certificates.values()],
+        "documents": [
+            [one.enclave, one.subject, one.document, one.rules, iso(one.not_after)]
+            for one in register.documents
+        ],
+    }
+    lines = ["{", f'"version": {_VERSION},', f'"crl_number": {register.crl_number},']
+    lines.append(f'"crl_published": {json.dumps(register.crl_published)},')
+    lines.append(f'"governance": {json.dumps(register.governance.decode())},')
+    for name, rows in parts.items():
+        body = ",\n".join(json.dumps(row) for row in rows)
+        lines.append(f'"{name}": [\n{body}\n],')
+    lines[-1] = lines[-1].rstrip(",")
+    return "\n".join((*lines, "}", "")).encode()
+
+
+def _certificate_row(one: IssuedCertificate) -> list[Any]:
+    revoked = iso(one.revoked) if one.revoked is not None else None
+    dates = (iso(one.not_before), iso(one.not_after))
+    return [f"{one.serial:x}", one.enclave, one.subject, one.key, one.issuer, *dates, one.replaced, revoked]
+
+
+def parse_register(text: bytes, place: str) -> Register:
+    """Raises DamagedKeystore for anything but what ``register_json`` writes."""
+    try:
+        content: Any = json.loads(text)
+        if content["version"] != _VERSION:
+            raise DamagedKeystore(f"{place} was written by a newer version; update secure-keystore")
+        return Register(
+            dict(_authorities(content["authorities"])),
+            {one.serial: one for one in map(_certificate, content["certificates"])},
+            tuple(map(_document, content["documents"])),
+            content["governance"].encode(),
+            int(content["crl_number"]),
+            bool(content["crl_published"]),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError):
+        raise DamagedKeystore(
+            f"{place} is not a register that secure-keystore wrote; restore it from a backup"
+        ) from None
+
+
+def _authorities(rows: list[Any]) -> Iterator[tuple[tuple[Role, bytes], AuthorityState]]:
+    for role, state, ca in rows:
+        yield (Role(role), base64.b64decode(ca, validate=True)), AuthorityState(state)
+
+
+def _certificate(row: list[Any]) -> IssuedCertificate:
+    serial, enclave, subject, key, issuer, not_before, not_after, replaced, revoked = row
+    return IssuedCertificate(
+        int(serial, 16),
+        validate_enclave_name(enclave) if enclave != UNKNOWN else UNKNOWN,
+        str(subject),
+        str(key),
+        str(issuer),
+        parse_moment(not_before),
+        parse_moment(not_after),
+        bool(replaced),
+        parse_moment(revoked) if revoked is not None else None,
+    )
+
+
+def _document(row: list[Any]) -> SignedPermissions:
+    enclave, subject, document, rules, not_after = row
+    return SignedPermissions(
+        validate_enclave_name(enclave), str(subject), str(document), str(rules), parse_moment(not_after)
+    )

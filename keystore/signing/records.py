@@ -1,0 +1,39 @@
+"""What the register keeps of a certificate and of a signed document."""
+
+from __future__ import annotations
+
+from keystore.errors import DamagedKeystore
+from keystore.formats.certificate import CertificateFacts
+from keystore.formats.permissions_change import grant_for, rules_text
+from keystore.formats.permissions_read import Grant
+from keystore.formats.register import UNKNOWN, IssuedCertificate, SignedPermissions
+from keystore.formats.subject import subject_name
+from keystore.formats.validity import parse_moment
+from keystore.signing.public_key import fingerprint
+
+
+def certificate_record(enclave: str, facts: CertificateFacts, issuer: CertificateFacts) -> IssuedCertificate:
+    """``issuer`` is the CA whose key signed it."""
+    return IssuedCertificate(
+        facts.serial,
+        enclave,
+        facts.common_name or UNKNOWN,
+        fingerprint(facts.public_key),
+        fingerprint(issuer.der),
+        *facts.validity,
+    )
+
+
+def permissions_record(enclave: str, common_name: str, document: bytes) -> SignedPermissions:
+    """Raises DamagedKeystore when the document grants nothing to this subject, InvalidInput when it is none."""
+    grant = grant_for(document, subject_name(common_name), f"the permissions of {enclave}")
+    if grant is None:
+        raise DamagedKeystore(f"the permissions of {enclave} have no grant for {subject_name(common_name)}")
+    return SignedPermissions(
+        enclave, common_name, fingerprint(document), rules_digest(grant), parse_moment(grant.not_after)
+    )
+
+
+def rules_digest(grant: Grant) -> str:
+    """Equal for grants that permit the same, whatever their subject and dates."""
+    return fingerprint(rules_text(grant).encode())

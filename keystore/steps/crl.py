@@ -1,0 +1,125 @@
+"""The CRL, made from the register. Which implementations look at it, and when: see ``keystore.steps.removal``.
+
+A CRL names one CA, and both implementations read only the first of a file: it lists what the identity CA in use
+issued. Its number only grows; one with another number than the register's was put back and is replaced.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import replace
+from datetime import datetime, timedelta
+
+from keystore.disk import layout, safe_files
+from keystore.disk.crl_file import crl_problem, crl_validity
+from keystore.disk.store import Link, Store
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.formats.register import IssuedCertificate, Register
+from keystore.formats.role import Role
+from keystore.formats.validity import later
+from keystore.signing.authority import IdentityIssuer
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.public_key import fingerprint
+
+# Nobody fetches CRLs in a DDS system: a short life would buy nothing and risk an outage.
+CRL_LIFETIME = timedelta(days=365)
+_BACKDATE = timedelta(days=1)
+
+
+def can_revoke(view: KeystoreView) -> bool:
+    """Whether participants would accept a CRL of the identity CA: its key usage has cRLSign, or is absent."""
+    from cryptography import x509
+
+    ca = x509.load_der_x509_certificate(view.ca(Role.IDENTITY).der)
+    try:
+        return ca.extensions.get_extension_for_class(x509.KeyUsage).value.crl_sign
+    except x509.ExtensionNotFound:
+        return True
+
+
+def refuse_without_crl_sign(view: KeystoreView) -> None:
+    if not can_revoke(view):
+        raise InvalidInput(
+            "the identity CA may not sign CRLs (key usage lacks cRLSign), participants would refuse one; "
+            "replace the CA (renew --ca start), or only delete with --no-revoke"
+        )
+
+
+def revocable(view: KeystoreView, register: Register, enclaves: Iterable[str]) -> list[IssuedCertificate]:
+    """What these enclaves have or had of the identity CA in use, as far as it is not revoked yet."""
+    issuer = fingerprint(view.ca(Role.IDENTITY).der)
+    return [
+        one
+        for enclave in enclaves
+        for one in register.of_enclave(enclave)
+        if one.issuer == issuer and one.revoked is None
+    ]
+
+
+def publish_crl(opened: Store, access: CaAccess, now: datetime) -> None:
+    """Write ``public/crl.pem`` as the register has it and give it to every enclave.
+
+    Raises InvalidInput when the CA may not sign CRLs, SigningUnavailable without its key.
+    """
+    view = KeystoreView(opened.root)
+    refuse_without_crl_sign(view)
+    issuer = view.authority(Role.IDENTITY, access)
+    end = min(now + CRL_LIFETIME, issuer.validity.not_after)
+    revoked = opened.register.revoked(fingerprint(issuer.facts.der))
+    crl = IdentityIssuer(issuer).revocation_list(revoked, now - _BACKDATE, end, opened.register.crl_number)
+    with opened.batch() as batch:
+        batch.file(layout.CRL, crl)
+    link_crl(opened, KeystoreView(opened.root).enclaves())
+
+
+def revoke(opened: Store, serials: Collection[int], access: CaAccess, now: datetime) -> None:
+    """Record these certificates as revoked, then publish the CRL."""
+    with opened.batch() as batch:
+        batch.record(opened.register.with_revoked(serials, now))
+    publish_crl(opened, access, now)
+
+
+def link_crl(opened: Store, names: Iterable[str]) -> None:
+    """Give each enclave its ``crl.pem``; copies of it are refreshed."""
+    with opened.batch() as batch:
+        for name in names:
+            target = f"{layout.enclave_directory(name)}/{layout.ENCLAVE_CRL}"
+            if safe_files.link_target(opened.root, target) != layout.crl_link(name):
+                batch.link(target, Link(layout.crl_link(name), layout.CRL))
+
+
+def restore_crl(
+    opened: Store, access: CaAccess, now: datetime, within: timedelta = timedelta(0)
+) -> list[str]:
+    """Publish the CRL anew when it is not the one to use, or ends within ``within``; what was done, in words.
+
+    Raises DamagedKeystore for a CRL that this keystore did not publish: it may be all that says who was revoked.
+    """
+    view = KeystoreView(opened.root)
+    problem = crl_problem(view, opened.register if opened.has_register else None, now)
+    if problem is not None and opened.has_register and not opened.register.crl_published:
+        raise DamagedKeystore(
+            f"{layout.CRL} was not published by this keystore; look at it, remove it, and revoke with "
+            "secure-keystore remove or renew --revoke-old"
+        )
+    if problem is None:
+        if not view.has_crl:
+            return []
+        if crl_validity(view).not_after > later(now, within):
+            link_crl(opened, view.enclaves())  # an interrupted run may have left some without
+            return []
+        problem = "the CRL ends soon" if within else "the CRL has ended"
+    with opened.batch() as batch:
+        batch.record(opened.register.with_next_crl(now))
+    publish_crl(opened, access, now)
+    return [f"CRL published again: {problem}"]
+
+
+def drop_crl(opened: Store) -> None:
+    """After a change of the identity CA: what the old one revoked is not trusted any more."""
+    for name in KeystoreView(opened.root).enclaves():
+        opened.remove(f"{layout.enclave_directory(name)}/{layout.ENCLAVE_CRL}")
+    opened.remove(layout.CRL)
+    with opened.batch() as batch:
+        batch.record(replace(opened.register, crl_published=False))

@@ -1,0 +1,131 @@
+"""A keystore opened for a change: under the lock, with its register; one of an earlier layout is taken over first."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import replace
+from datetime import datetime
+from pathlib import Path
+
+from keystore.disk import layout, lock, safe_files, store
+from keystore.disk.crl_file import crl_number, revoked_serials
+from keystore.disk.register_file import needs_register
+from keystore.disk.store import Store
+from keystore.disk.superseded import superseded
+from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.view import KeystoreView
+from keystore.errors import KeystoreError, printable
+from keystore.formats import certificate
+from keystore.formats.certificate import CertificateFacts, read_certificates
+from keystore.formats.der import DerError
+from keystore.formats.register import UNKNOWN, AuthorityState, IssuedCertificate, Register, SignedPermissions
+from keystore.formats.role import Role
+from keystore.formats.subject import common_name
+from keystore.signing.public_key import fingerprint, issued_by
+from keystore.signing.records import certificate_record, permissions_record
+
+
+@contextmanager
+def opened_for_change(
+    root: Path, now: datetime, *, timeout: float = lock.DEFAULT_TIMEOUT, durable: bool = True
+) -> Iterator[Store]:
+    """As ``store.opened``; a complete keystore without a register gets one made from what stands in it."""
+    with store.opened(root, timeout=timeout, durable=durable) as opened:
+        if needs_register(KeystoreView(root)):
+            take_over(opened, now)
+        yield opened
+
+
+def take_over(opened: Store, now: datetime) -> None:
+    """Record what can be known of a keystore without a register: of what stands in it all that its CAs really
+    signed, and what an earlier version remembered of certificates that were replaced.
+
+    Raises DamagedKeystore for a CRL that cannot be trusted: nobody knows then who was revoked.
+    """
+    view = KeystoreView(opened.root)
+    register = _authorities(view)
+    with suppress(KeystoreError):  # signed by somebody else: the next governance is recorded
+        register = replace(register, governance=trusted_document(view, layout.GOVERNANCE))
+    register = register.with_certificates(_replaced(view, now)).with_certificates(_issued(view))
+    register = register.with_documents(_documents(view, register))
+    register = _with_crl(view, register)
+    opened.ensure_directory(layout.PRIVATE)
+    with opened.batch() as batch:
+        batch.record(register)
+    opened.remove(layout.SUPERSEDED)
+
+
+def _authorities(view: KeystoreView) -> Register:
+    """Of a trust file with several CAs only those count that the keystore made itself: a switch keeps the old one
+    among the retired, a start the new one among those that wait."""
+    register = Register()
+    for role in Role:
+        register = register.with_authority(role, view.ca(role).der, AuthorityState.IN_USE)
+        for facts in _certificates_in(view, f"{layout.NEXT}/{role.value}", ""):
+            register = register.with_authority(role, facts.der, AuthorityState.WAITING)
+        for facts in _certificates_in(view, layout.RETIRED, f"{role.value}-"):
+            if not register.knows_authority(role, facts.der):
+                register = register.with_authority(role, facts.der, AuthorityState.RETIRED)
+    return register
+
+
+def _certificates_in(view: KeystoreView, directory: str, prefix: str) -> Iterator[CertificateFacts]:
+    try:
+        names = sorted(os.listdir(view.root / directory))
+    except (FileNotFoundError, NotADirectoryError):
+        return
+    for name in names:
+        if name.startswith(prefix) and name.endswith(layout.CERT):
+            pem = safe_files.read(view.root, f"{directory}/{name}")
+            yield from read_certificates(pem, printable(view.root / directory / name))
+
+
+def _replaced(view: KeystoreView, now: datetime) -> Iterator[IssuedCertificate]:
+    issuer = fingerprint(view.ca(Role.IDENTITY).der)
+    for one in superseded(view):
+        subject = common_name(one.enclave)
+        yield IssuedCertificate(
+            one.serial, one.enclave, subject, UNKNOWN, issuer, now, one.not_after, replaced=True
+        )
+
+
+def _issued(view: KeystoreView) -> Iterator[IssuedCertificate]:
+    for enclave in view.enclaves():
+        pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(enclave)}/{layout.CERT}")
+        try:
+            facts = certificate.read_pem(pem or b"")
+            issuer = next((ca for ca in view.ca_bundle(Role.IDENTITY) if issued_by(facts, ca)), None)
+        except DerError:
+            continue
+        if issuer is not None:
+            yield certificate_record(enclave, facts, issuer)
+
+
+def _documents(view: KeystoreView, register: Register) -> Iterator[SignedPermissions]:
+    for one in register.certificates.values():
+        if one.in_force:
+            with suppress(KeystoreError):  # not signed by us, or not for this subject: it counts for nothing
+                document = trusted_document(
+                    view, f"{layout.enclave_directory(one.enclave)}/{layout.PERMISSIONS}"
+                )
+                yield permissions_record(one.enclave, one.subject, document)
+
+
+def _with_crl(view: KeystoreView, register: Register) -> Register:
+    if not view.has_crl:
+        return register
+    issuer, end = fingerprint(view.ca(Role.IDENTITY).der), view.ca(Role.IDENTITY).validity.not_after
+    revoked = revoked_serials(view)
+    unknown = {
+        serial: IssuedCertificate(serial, UNKNOWN, UNKNOWN, UNKNOWN, issuer, moment, end, replaced=True)
+        for serial, moment in revoked.items()
+        if serial not in register.certificates
+    }
+    known = {
+        serial: one._replace(revoked=revoked.get(serial)) for serial, one in register.certificates.items()
+    }
+    return replace(
+        register, certificates={**unknown, **known}, crl_number=crl_number(view), crl_published=True
+    )

@@ -1,0 +1,108 @@
+"""What an enclave was granted before: to grant it again, or to see what it loses.
+
+Only the document signed last counts, as the register has it. An older one that somebody put back was signed by us
+too; to sign it again, or to compare with it, would give back what was taken away.
+"""
+
+from __future__ import annotations
+
+from keystore.disk import layout, safe_files
+from keystore.disk.governance_file import governance_domains
+from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystore, KeystoreError, printable
+from keystore.formats.permissions import permissions_document
+from keystore.formats.permissions_change import taken_away
+from keystore.formats.permissions_dates import redated
+from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.policy import EnclavePolicy
+from keystore.formats.register import Register, SignedPermissions
+from keystore.formats.role import Role
+from keystore.formats.subject import names_enclave
+from keystore.formats.validity import Validity
+from keystore.signing.records import rules_digest
+from keystore.steps.enclave_state import PermissionsSource
+
+UNKNOWN_RIGHTS = "do what it was granted before"
+
+
+def what_is_taken_away(
+    view: KeystoreView, register: Register, enclave: str, wanted: PermissionsSource
+) -> tuple[str, ...]:
+    """What the enclave was granted last and is not to have any more (``publish rt/chatter``), empty for nothing.
+
+    Where what it had cannot be read any more, that is said instead.
+    """
+    last = register.permissions(enclave)
+    if last is None:
+        return ()
+    grant = _granted_last(view, last)
+    probe = wanted(f"CN={last.subject}", view.ca(Role.IDENTITY).validity)
+    if probe is None:
+        present = safe_files.read_if_there(view.root, _place(enclave))
+        if present is not None:
+            return ()  # it keeps what it has
+        probe = _nothing(view, enclave, f"CN={last.subject}", view.ca(Role.IDENTITY).validity, None)
+    (new,) = parse_permissions(probe)
+    if rules_digest(new) == last.rules:
+        return ()
+    return taken_away(grant, new) if grant is not None else (UNKNOWN_RIGHTS,)
+
+
+def kept_permissions(
+    view: KeystoreView, register: Register, enclave: str, subject: str, validity: Validity, rmw: str | None
+) -> bytes:
+    """What the enclave was granted before, under its new subject and dates; without a past, nothing.
+
+    Raises DamagedKeystore for a document that is not the one signed last for this enclave.
+    """
+    place = _place(enclave)
+    if safe_files.read_if_there(view.root, place) is None:
+        return _nothing(view, enclave, subject, validity, rmw)
+    try:
+        document = trusted_document(view, place)
+        mine = _grant(document, enclave)
+        last = register.permissions(enclave)
+        if last is not None and (mine is None or rules_digest(mine) != last.rules):
+            raise DamagedKeystore(f"{printable(view.root / place)} is not what was signed last for {enclave}")
+        names = {mine.subject_name.strip()} if mine is not None else set()
+        return redated(document, names, subject, validity, printable(place))
+    except KeystoreError as error:
+        raise DamagedKeystore(
+            f"{error}. What it may do is not known then: give it with secure-keystore apply-policy"
+        ) from None
+
+
+def _granted_last(view: KeystoreView, last: SignedPermissions) -> Grant | None:
+    """The grant on disk, if it is the one recorded."""
+    try:
+        grant = _grant(trusted_document(view, _place(last.enclave)), last.enclave)
+    except KeystoreError:
+        return None
+    return grant if grant is not None and rules_digest(grant) == last.rules else None
+
+
+def _grant(document: bytes, enclave: str) -> Grant | None:
+    """The first grant of a document for this enclave, under any subject it can have had."""
+    grants = parse_permissions(document, f"the permissions of {enclave}")
+    prefix = "CN="
+    return next(
+        (
+            grant
+            for grant in grants
+            if grant.subject_name.strip().startswith(prefix)
+            and names_enclave(grant.subject_name.strip().removeprefix(prefix), enclave)
+        ),
+        None,
+    )
+
+
+def _nothing(view: KeystoreView, enclave: str, subject: str, validity: Validity, rmw: str | None) -> bytes:
+    nothing = EnclavePolicy(enclave, ())
+    return permissions_document(
+        subject, nothing, validity=validity, domains=governance_domains(view), rmw=rmw
+    )
+
+
+def _place(enclave: str) -> str:
+    return f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"

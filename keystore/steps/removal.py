@@ -1,0 +1,127 @@
+"""Enclaves taken out for good: their certificates revoked, their files deleted.
+
+Which implementations look at the CRL (``crl.pem`` in each enclave directory, there only after a
+revocation): rmw_cyclonedds_cpp passes it as ``org.eclipse.cyclonedds.sec.auth.crl``, rmw_fastrtps_* as
+``dds.sec.auth.builtin.PKI-DH.identity_crl``; both refuse a listed peer at handshake, and read the file
+only when a participant starts. rmw_connextdds does not pass one. Every enclave needs the new file, so
+deploy after removing. Permissions cannot be revoked, they are useless without a valid identity.
+
+A CRL past its nextUpdate makes every participant fail: ``status`` lists it and ``renew`` renews it in time.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+from keystore.disk import layout, lock
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.store import Store
+from keystore.disk.view import KeystoreView
+from keystore.errors import InvalidInput, printable
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.role import Role
+from keystore.formats.validity import utc_now
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.public_key import fingerprint
+from keystore.steps.crl import publish_crl, refuse_without_crl_sign, restore_crl, revocable, revoke
+from keystore.steps.opening import opened_for_change
+
+# The key first, so that nothing usable remains; the certificate last, so that a repeated run can revoke it.
+_DELETE_ORDER = (
+    layout.KEY, layout.PERMISSIONS, layout.PERMISSIONS_XML, layout.ENCLAVE_GOVERNANCE, layout.ENCLAVE_CRL,
+    "identity_ca.cert.pem", "permissions_ca.cert.pem", layout.CERT,
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveOptions:
+    """``revoke`` False only deletes: copies of the enclave elsewhere stay valid until they expire."""
+
+    revoke: bool = True
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+    now: datetime | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RemoveReport:
+    removed: tuple[str, ...]
+    revoked: int
+    """How many certificates the CRL lists now."""
+    warnings: tuple[str, ...] = ()
+
+
+def remove(
+    keystore: Path | str, names: Iterable[str], *, options: RemoveOptions | None = None
+) -> RemoveReport:
+    """Revoke what they have and had, publish the CRL to all remaining enclaves, then delete. Repeating completes an
+    interrupted run.
+
+    Enclaves below a removed one stay. Raises InvalidInput for an enclave that is not there.
+    """
+    chosen = options or RemoveOptions()
+    now = chosen.now or utc_now()
+    wanted = sorted({validate_enclave_name(name) for name in names})
+    root = resolve_root(keystore)
+    KeystoreView(root).require_complete()
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        unknown = sorted(set(wanted) - set(KeystoreView(root).enclaves()))
+        if unknown:
+            raise InvalidInput(
+                f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
+            )
+        warnings = _strike(opened, wanted, chosen, now)
+        for name in wanted:
+            _delete(opened, name)
+        issuer = fingerprint(KeystoreView(root).ca(Role.IDENTITY).der)
+        return RemoveReport(tuple(wanted), len(opened.register.revoked(issuer)), tuple(warnings))
+
+
+def _strike(opened: Store, names: list[str], options: RemoveOptions, now: datetime) -> list[str]:
+    """Take the enclaves off the register; with ``revoke`` everything they have and had onto the CRL."""
+    view = KeystoreView(opened.root)
+    found = revocable(view, opened.register, names) if options.revoke else []
+    if found:
+        refuse_without_crl_sign(view)
+        view.authority(Role.IDENTITY, options.access)  # before anything is recorded
+    struck = opened.register.with_revoked((one.serial for one in found), now) if found else opened.register
+    with opened.batch() as batch:
+        batch.record(struck.without_enclaves(names))
+    if found:
+        publish_crl(opened, options.access, now)
+    elif options.revoke:
+        restore_crl(opened, options.access, now)
+    known = {one.enclave for one in opened.register.certificates.values() if one.revoked is not None}
+    return [
+        f"no certificate of {name} by the present identity CA is on record, nothing to revoke"
+        for name in names
+        if options.revoke and name not in known
+    ]
+
+
+def revoke_replaced(opened: Store, names: Iterable[str], access: CaAccess, now: datetime) -> int:
+    """Revoke what these enclaves had before, not what they have now; how many certificates that adds."""
+    found = revocable(KeystoreView(opened.root), opened.register, names)
+    serials = {one.serial for one in found if not one.in_force}
+    if serials:
+        revoke(opened, serials, access, now)
+    return len(serials)
+
+
+def _delete(opened: Store, name: str) -> None:
+    """Exactly the files of this enclave; the root's governance belongs to the keystore."""
+    directory = layout.enclave_directory(name)
+    for file in _DELETE_ORDER:
+        if not (name == "/" and file == layout.ENCLAVE_GOVERNANCE):
+            opened.remove(f"{directory}/{file}")
+    if name == "/":
+        opened.sync_directories({directory})
+        return
+    while directory != layout.ENCLAVES and opened.remove_empty_directory(directory):
+        directory = os.path.dirname(directory)
+    opened.sync_directories({directory})

@@ -1,0 +1,65 @@
+"""A host without the CA keys: what would have to be signed is told, enclave by enclave, before anything is tried."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from keystore.disk import layout, safe_files
+from keystore.disk.view import KeystoreView
+from keystore.errors import KeystoreError, SigningUnavailable, printable
+from keystore.formats.permissions_change import grant_for, taken_away
+from keystore.formats.role import Role
+from keystore.formats.subject import subject_name
+from keystore.signing import smime
+from keystore.steps.comparison import WantedEnclave
+from keystore.steps.enclave_state import OTHER_PERMISSIONS, EnclaveState, Reissue
+
+_SHOWN = 10
+
+
+def refuse_without_keys(
+    view: KeystoreView, states: list[EnclaveState], wanted: Mapping[str, WantedEnclave]
+) -> None:
+    """Raises SigningUnavailable with every enclave that differs, and how, when the key that would be needed is not
+    here."""
+    if view.key_file(Role.PERMISSIONS) is not None and view.key_file(Role.IDENTITY) is not None:
+        return
+    lines = []
+    for state in states:
+        needs = [Role.IDENTITY] if state.reissue is not Reissue.NOTHING else []
+        needs += [Role.PERMISSIONS] if state.permissions else []
+        if any(view.key_file(role) is None for role in needs):
+            lines.append(f"{state.enclave}: {'; '.join(_reasons(view, state, wanted[state.enclave]))}")
+    if not lines:
+        return
+    more = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
+    listed = "".join(f"\n  {line}" for line in lines[:_SHOWN]) + more
+    raise SigningUnavailable(
+        f"{printable(view.root)} has no CA keys, so nothing can be signed here, but these enclaves differ from what "
+        f"is asked for:{listed}\nBring them up to date where the CA keys are (start or apply-policy there), "
+        "then export again"
+    )
+
+
+def _reasons(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> Iterator[str]:
+    for reason in state.reasons:
+        yield reason
+        if reason == OTHER_PERMISSIONS and state.facts is not None and state.facts.common_name is not None:
+            yield from _permission_differences(view, state, wanted)
+
+
+def _permission_differences(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> Iterator[str]:
+    assert state.facts is not None
+    subject, place = subject_name(state.facts.common_name or ""), layout.PERMISSIONS
+    try:
+        signed = safe_files.read(view.root, f"{layout.enclave_directory(state.enclave)}/{layout.PERMISSIONS}")
+        present = grant_for(smime.read(signed, place).document, subject, place)
+        document = wanted.permissions(subject, state.facts.validity)
+        asked = grant_for(document, subject, place) if document is not None else None
+    except KeystoreError:
+        return
+    if present is None or asked is None:
+        return
+    for words, lost in (("lacks", taken_away(asked, present)), ("has beyond it", taken_away(present, asked))):
+        if lost:
+            yield f"{words} {', '.join(lost[:4])}{' ...' if len(lost) > 4 else ''}"
