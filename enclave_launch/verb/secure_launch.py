@@ -215,7 +215,7 @@ def _launch_plainly(target: Target, options: argparse.Namespace) -> int:
 
 def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int:
     from enclave_launch.flow import provision, run
-    from enclave_launch.verb.security import expiry_notices, security_options
+    from enclave_launch.verb.security import expiry_notices, repair_notices, security_options
 
     _warn(plan.warnings)
     _check_before_keys_are_made(plan)
@@ -224,7 +224,7 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int
 
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
-    _warn((*launch.report.warnings, *expiry_notices(launch, options.warn_expiry)))
+    _warn((*repair_notices(launch), *launch.report.warnings, *expiry_notices(launch, options.warn_expiry)))
     return run(launch, options=_run_settings(options))
 
 

@@ -16,6 +16,8 @@ from keystore.formats.validity import later, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.steps.options import ProvisionOptions
 
+_NEW_KEYSTORE = "governance signed"
+
 
 def security_options(options: argparse.Namespace) -> SecurityOptions:
     """Raises ``UsageError`` for a value that is not what its option takes."""
@@ -54,6 +56,16 @@ def _passphrase(options: argparse.Namespace) -> Secret | None:
     if options.ca_passphrase_env is not None:
         return Secret(variable=options.ca_passphrase_env)
     return None
+
+
+def repair_notices(launch: ProvisionedLaunch) -> Iterator[str]:
+    """What of the keystore was not as it should be and was repaired, one line each; new things are not repairs."""
+    report = launch.report
+    if _NEW_KEYSTORE not in report.created:
+        yield from (f"keystore {report.keystore}: {text}" for text in report.created)
+    for enclave in report.enclaves:
+        if enclave.actions and "created" not in enclave.actions:
+            yield f"enclave {enclave.enclave}: {', '.join(enclave.actions)} ({'; '.join(enclave.reasons)})"
 
 
 def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:

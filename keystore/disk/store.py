@@ -58,6 +58,8 @@ class Store:
         """False on a host that issues nothing, and before the first thing is issued."""
         self.register = present or Register()
         """What was issued so far; each ``Batch.record`` replaces it."""
+        self.notes: list[str] = []
+        """What was done to the keystore itself while opening it, for the report."""
 
     @contextmanager
     def batch(self) -> Iterator[Batch]:

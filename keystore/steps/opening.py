@@ -55,6 +55,9 @@ def take_over(opened: Store, now: datetime) -> None:
     with opened.batch() as batch:
         batch.record(register)
     opened.remove(layout.SUPERSEDED)
+    opened.notes.append(
+        f"register of what was issued made from what stands here: {len(register.certificates)} certificates"
+    )
 
 
 def _authorities(view: KeystoreView) -> Register:
@@ -119,7 +122,9 @@ def _with_crl(view: KeystoreView, register: Register) -> Register:
     issuer, end = fingerprint(view.ca(Role.IDENTITY).der), view.ca(Role.IDENTITY).validity.not_after
     revoked = revoked_serials(view)
     unknown = {
-        serial: IssuedCertificate(serial, UNKNOWN, UNKNOWN, UNKNOWN, issuer, moment, end, replaced=True)
+        serial: IssuedCertificate(
+            serial, UNKNOWN, UNKNOWN, UNKNOWN, issuer, moment, end, replaced=True, revoked=moment
+        )
         for serial, moment in revoked.items()
         if serial not in register.certificates
     }

@@ -40,6 +40,7 @@ def reconcile(
     Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
     with _locked(root, options, now) as opened:
         done, warnings = _complete_keystore(opened, options, now)
+        done = [*opened.notes, *done]
         view = KeystoreView(root)
         register = opened.register if opened.has_register else None
         refuse_foreign_authorities(view, register)

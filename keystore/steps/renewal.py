@@ -76,7 +76,7 @@ def renew(
     _refuse_unknown(root, named)
     with _opened(root, provisioning, now) as opened:
         install_incoming(opened)
-        repaired = _repair_keystore(opened, chosen, now)
+        repaired = [*opened.notes, *_repair_keystore(opened, chosen, now)]
         repaired += restore_crl(opened, provisioning.access, now, chosen.within)
         if mirror_governance(opened):
             repaired.append("governance.xml made equal to the signed governance.p7s")

@@ -1,0 +1,461 @@
+"""What a keystore remembers: whatever is put back, copied in or taken away is told from what was issued last."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+from hypothesis import given
+from hypothesis import strategies as st
+
+from keystore.disk import layout
+from keystore.disk.register_file import read_register
+from keystore.errors import DamagedKeystore, InvalidInput, UnsafeKeystore
+from keystore.formats.certificate import read_pem
+from keystore.formats.domains import Domains
+from keystore.formats.governance import DomainRule, Governance, Protection
+from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.register import (
+    AuthorityState,
+    IssuedCertificate,
+    Register,
+    SignedPermissions,
+    parse_register,
+    register_json,
+)
+from keystore.formats.role import Role
+from keystore.formats.subject import SubjectScheme, common_name, generation_of, names_enclave
+from keystore.steps.enclaves import create_enclaves
+from keystore.steps.governance_setting import GovernanceOptions, set_governance
+from keystore.steps.provisioning import provision
+from keystore.steps.removal import RemoveOptions, remove
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.rollover import Step, roll_over
+from keystore.verification import verify
+from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
+
+QUICK = RemoveOptions(durable=False)
+
+
+def codes(root: Path) -> set[str]:
+    return {finding.code for finding in verify(root).findings if finding.severity.fails}
+
+
+def register(root: Path) -> Register:
+    found = read_register(root)
+    assert found is not None
+    return found
+
+
+def crl(root: Path) -> x509.CertificateRevocationList:
+    return x509.load_pem_x509_crl((root / "public/crl.pem").read_bytes())
+
+
+def number(root: Path) -> int:
+    found: int = crl(root).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
+    return found
+
+
+def serial(root: Path, name: str) -> int:
+    return read_pem((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
+
+
+def common_name_of(root: Path, name: str) -> str | None:
+    return read_pem((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).common_name
+
+
+def is_revoked(root: Path, number: int) -> bool:
+    return crl(root).get_revoked_certificate_by_serial_number(number) is not None
+
+
+def grant(root: Path, name: str) -> Grant:
+    (found,) = parse_permissions((root / layout.enclave_directory(name) / "permissions.xml").read_bytes())
+    return found
+
+
+class TestTheRecord:
+    def test_holds_every_certificate_and_document(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks")
+        found = register(root)
+        assert {one.enclave: one.serial for one in found.certificates.values()} == {
+            name: serial(root, name) for name in ("/a", "/b")
+        }
+        assert {one.enclave for one in found.documents} == {"/a", "/b"}
+        assert {(role, state) for (role, _), state in found.authorities.items()} == {
+            (role, AuthorityState.IN_USE) for role in Role
+        }
+        assert found.governance == (root / "enclaves/governance.xml").read_bytes()
+
+    def test_is_private(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks")
+        assert (root / layout.REGISTER).stat().st_mode & 0o777 == 0o600
+        (root / layout.REGISTER).chmod(0o666)
+        with pytest.raises(UnsafeKeystore, match="can be written by others"):
+            provision(root, [policy("/a")], options=options())
+
+    @pytest.mark.parametrize("text", ["", "{}", "[]", '{"version": 1}', "\xff", "[" * 100_000])
+    def test_that_cannot_be_read_is_not_guessed(self, tmp_path: Path, text: str) -> None:
+        root = filled(tmp_path / "ks")
+        (root / layout.REGISTER).write_bytes(text.encode("latin-1"))
+        with pytest.raises(DamagedKeystore, match=r"register\.json.* restore it from a backup"):
+            provision(root, [policy("/a")], options=options())
+
+    def test_forgets_what_has_ended(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"], now=NOW, lifetime=10 * DAY)
+        provision(root, [policy("/a")], options=options(now=NOW + 11 * DAY, lifetime=10 * DAY))
+        assert len(register(root).certificates) == 1
+        provision(root, [policy("/a")], options=options(now=NOW + 12 * DAY, renew_within=10 * DAY))
+        assert len(register(root).certificates) == 2, "the one before can still be used"
+
+    @given(
+        st.lists(
+            st.builds(
+                IssuedCertificate,
+                st.integers(1, 2**159),
+                st.sampled_from(["/", "/a", "/a/b", ""]),
+                st.text(max_size=20),
+                st.text("0123456789abcdef", max_size=64),
+                st.text("0123456789abcdef", max_size=64),
+                st.datetimes().map(lambda moment: NOW),
+                st.integers(1, 10**6).map(lambda hours: NOW + timedelta(hours=hours)),
+                st.booleans(),
+                st.none() | st.just(NOW),
+            ),
+            unique_by=lambda one: one.serial,
+        ),
+        st.binary(min_size=1, max_size=40),
+        st.integers(0, 2**40),
+    )
+    def test_is_read_as_it_was_written(
+        self, issued: list[IssuedCertificate], ca: bytes, crl_number: int
+    ) -> None:
+        written = Register(
+            {(Role.IDENTITY, ca): AuthorityState.WAITING, (Role.PERMISSIONS, ca): AuthorityState.RETIRED},
+            {one.serial: one for one in issued},
+            (SignedPermissions("/a", "ros.a", "00", "11", NOW),),
+            b"<dds/>\n",
+            crl_number,
+            bool(issued),
+        )
+        assert parse_register(register_json(written), "register.json") == written
+
+
+class TestRevocations:
+    def removed(self, tmp_path: Path) -> tuple[Path, Path]:
+        """A keystore from which two enclaves were removed, and the CRL from between."""
+        root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
+        remove(root, ["/b"], options=QUICK)
+        shutil.copy(root / "public/crl.pem", tmp_path / "old-crl.pem")
+        remove(root, ["/c"], options=QUICK)
+        return root, tmp_path / "old-crl.pem"
+
+    def test_an_older_crl_that_is_put_back_is_replaced(self, tmp_path: Path) -> None:
+        root, old = self.removed(tmp_path)
+        last = number(root)
+        shutil.copy(old, root / "public/crl.pem")
+        report = provision(root, [policy("/a")], options=options())
+        assert report.created == ("CRL published again: the CRL is not the one published last",)
+        assert len(crl(root)) == 2 and number(root) > last
+
+    def test_a_lost_crl_is_published_again(self, tmp_path: Path) -> None:
+        root, _ = self.removed(tmp_path)
+        for path in root.rglob("crl.pem"):
+            path.unlink()
+        assert provision(root, [policy("/a")], options=options()).created == (
+            "CRL published again: the CRL is missing",
+        )
+        assert len(crl(root)) == 2 and (root / "enclaves/a/crl.pem").is_symlink()
+
+    def test_the_next_removal_does_not_lose_the_earlier_ones(self, tmp_path: Path) -> None:
+        root, old = self.removed(tmp_path)
+        shutil.copy(old, root / "public/crl.pem")
+        assert remove(root, ["/a"], options=QUICK).revoked == 3
+        assert len(crl(root)) == 3
+
+    def test_the_crl_published_last_stays(self, tmp_path: Path) -> None:
+        root, _ = self.removed(tmp_path)
+        before = snapshot(root)
+        assert not provision(root, [policy("/a")], options=options()).changed
+        assert snapshot(root) == before
+
+    def test_a_crl_that_nobody_published_is_left_for_a_person(self, tmp_path: Path) -> None:
+        _, old = self.removed(tmp_path)
+        other = filled(tmp_path / "other", ["/a"])
+        shutil.copy(old, other / "public/crl.pem")
+        with pytest.raises(DamagedKeystore, match="was not published by this keystore"):
+            provision(other, [policy("/a")], options=options())
+
+    def test_what_was_replaced_before_the_removal_is_revoked_too(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks")
+        first = serial(root, "/b")
+        renew(root, ["/b"], options=RenewOptions(provisioning=options()))
+        remove(root, ["/b"], options=QUICK)
+        assert is_revoked(root, first)
+
+
+class TestRightsThatAreTakenAway:
+    def reduced(self, tmp_path: Path) -> Path:
+        """/a had /secret and has it no more; what it had before is in ``before``."""
+        root = tmp_path / "ks"
+        provision(root, [policy("/a", "/chatter", "/secret"), policy("/b")], options=options())
+        shutil.copytree(root / "enclaves/a", tmp_path / "before", symlinks=True)
+        provision(root, [policy("/a", "/chatter"), policy("/b")], options=options())
+        return root
+
+    def test_a_new_subject_and_the_old_certificate_revoked(self, tmp_path: Path) -> None:
+        root = self.reduced(tmp_path)
+        assert common_name_of(root, "/a") == "ros.a-2" and grant(root, "/a").subject_name == "CN=ros.a-2"
+        assert is_revoked(root, read_pem((tmp_path / "before/cert.pem").read_bytes()).serial)
+        assert (root / "enclaves/a/key.pem").read_bytes() == (tmp_path / "before/key.pem").read_bytes()
+        assert common_name_of(root, "/b") == "ros.b" and codes(root) == set()
+
+    def test_it_is_said_what_is_left_to_do(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        report = provision(root, [policy("/a", "/other")], options=options())
+        assert actions(report) == {"/a": ("certificate", "permissions", "old certificate revoked")}
+        assert any("deploy crl.pem to every host" in warning for warning in report.warnings)
+
+    def test_more_rights_need_no_new_certificate(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        report = provision(root, [policy("/a", "/chatter", "/more")], options=options())
+        assert actions(report) == {"/a": ("permissions",)} and not (root / "public/crl.pem").exists()
+
+    def test_a_second_run_changes_nothing(self, tmp_path: Path) -> None:
+        root = self.reduced(tmp_path)
+        before = snapshot(root)
+        assert not provision(root, [policy("/a"), policy("/b")], options=options()).changed
+        assert snapshot(root) == before
+
+    def test_old_permissions_put_back_are_not_signed_again(self, tmp_path: Path) -> None:
+        root = self.reduced(tmp_path)
+        for name in ("permissions.p7s", "permissions.xml"):
+            shutil.copy(tmp_path / "before" / name, root / "enclaves/a" / name)
+        with pytest.raises(DamagedKeystore, match=r"not what was signed last for /a.* apply-policy"):
+            renew(root, ["/a"], options=RenewOptions(provisioning=options()))
+        provision(root, [policy("/a")], options=options())
+        assert [rule.publish for rule in grant(root, "/a").rules] == [("ros_discovery_info", "rt/chatter")]
+
+    def test_an_old_enclave_put_back_as_a_whole_is_replaced(self, tmp_path: Path) -> None:
+        root = self.reduced(tmp_path)
+        shutil.rmtree(root / "enclaves/a")
+        shutil.copytree(tmp_path / "before", root / "enclaves/a", symlinks=True)
+        old = serial(root, "/a")
+        report = provision(root, [policy("/a")], options=options())
+        assert "the certificate is revoked" in str(report.enclaves[0].reasons)
+        assert serial(root, "/a") != old and is_revoked(root, old) and codes(root) == set()
+
+    def test_a_removed_enclave_that_comes_back_is_not_what_it_was(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks")
+        remove(root, ["/a"], options=QUICK)
+        create_enclaves(root, ["/a"], options=options())
+        assert common_name_of(root, "/a") == "ros.a-2"
+        remove(root, ["/b"], options=QUICK)
+        provision(root, [policy("/b")], options=options())
+        assert common_name_of(root, "/b") == "ros.b", "it may do what it could before"
+
+    def test_a_domain_less_is_a_right_less(self, tmp_path: Path) -> None:
+        root = tmp_path / "ks"
+        provision(root, [policy("/a")], options=options(domains=Domains.parse("0-5")))
+        report = provision(root, [policy("/a")], options=options(domains=Domains.parse("0")))
+        assert "old certificate revoked" in actions(report)["/a"]
+
+    def test_compatible_subjects_stay_and_the_gap_is_told(self, tmp_path: Path) -> None:
+        root = tmp_path / "ks"
+        chosen = options(subjects=SubjectScheme.COMPATIBLE)
+        provision(root, [policy("/a", "/chatter", "/secret")], options=chosen)
+        report = provision(root, [policy("/a")], options=chosen)
+        assert common_name_of(root, "/a") == "/a"
+        assert any("may no longer publish rt/secret, but" in warning for warning in report.warnings)
+
+    def test_revoking_can_be_declined_and_is_then_told(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        report = provision(root, [policy("/a", "/other")], options=options(revoke=False))
+        assert common_name_of(root, "/a") == "ros.a-2" and not (root / "public/crl.pem").exists()
+        assert any("was not revoked" in warning for warning in report.warnings)
+
+    def test_a_shorter_life_ends_the_longer_certificate(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        long = serial(root, "/a")
+        renew(root, ["/a"], options=RenewOptions(provisioning=options(lifetime=30 * DAY)))
+        assert is_revoked(root, long)
+
+
+class TestIncidents:
+    def test_a_foreign_key_is_never_certified(self, tmp_path: Path) -> None:
+        root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
+        old = serial(root, "/a")
+        shutil.copy(other / "enclaves/a/key.pem", root / "enclaves/a/key.pem")
+        report = provision(root, [policy("/a")], options=options())
+        assert "was not issued here" in report.enclaves[0].reasons[0]
+        assert (root / "enclaves/a/key.pem").read_bytes() != (other / "enclaves/a/key.pem").read_bytes()
+        assert is_revoked(root, old)
+
+    @pytest.mark.parametrize("gone", [["cert.pem"], ["cert.pem", "permissions.p7s"]])
+    def test_a_foreign_key_without_certificate_is_none_either(self, tmp_path: Path, gone: list[str]) -> None:
+        root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
+        shutil.copy(other / "enclaves/a/key.pem", root / "enclaves/a/key.pem")
+        for name in gone:
+            (root / "enclaves/a" / name).unlink()
+        provision(root, [policy("/a")], options=options())
+        assert (root / "enclaves/a/key.pem").read_bytes() != (other / "enclaves/a/key.pem").read_bytes()
+
+    def test_a_foreign_key_is_not_certified_because_the_certificate_ended(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"], now=NOW, lifetime=10 * DAY)
+        other = filled(tmp_path / "other", ["/a"])
+        shutil.copy(other / "enclaves/a/key.pem", root / "enclaves/a/key.pem")
+        provision(root, [policy("/a")], options=options(now=NOW + 11 * DAY))
+        assert (root / "enclaves/a/key.pem").read_bytes() != (other / "enclaves/a/key.pem").read_bytes()
+
+    def test_ones_own_key_keeps_its_place_when_the_certificate_is_lost(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        key = (root / "enclaves/a/key.pem").read_bytes()
+        (root / "enclaves/a/cert.pem").unlink()
+        provision(root, [policy("/a")], options=options())
+        assert (root / "enclaves/a/key.pem").read_bytes() == key
+
+    def test_renewal_revokes_what_others_could_read(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        old = serial(root, "/a")
+        (root / "enclaves/a/key.pem").chmod(0o640)
+        renew(root, ["/a"], options=RenewOptions(new_keys=True, provisioning=options()))
+        assert is_revoked(root, old) and codes(root) == set()
+
+    def test_an_earlier_governance_put_back_is_signed_anew(self, tmp_path: Path) -> None:
+        root = tmp_path / "ks"
+        lax = Governance((DomainRule(domains=Domains.single(0), rtps_protection_kind=Protection.NONE),))
+        filled(root, ["/a"])
+        strict = (root / "enclaves/governance.xml").read_bytes()
+        set_governance(root, lax, options=GovernanceOptions(durable=False))
+        for name in ("governance.p7s", "governance.xml"):
+            shutil.copy(root / "enclaves" / name, tmp_path / name)
+        set_governance(
+            root, Governance.for_domains(Domains.single(0)), options=GovernanceOptions(durable=False)
+        )
+        for name in ("governance.p7s", "governance.xml"):
+            shutil.copy(tmp_path / name, root / "enclaves" / name)
+        assert "governance signed" in provision(root, [policy("/a")], options=options()).created[0]
+        assert (root / "enclaves/governance.xml").read_bytes() == strict
+
+
+class TestAuthorities:
+    @pytest.mark.parametrize("role", Role)
+    def test_a_foreign_one_beside_ours_is_refused_and_removed(self, tmp_path: Path, role: Role) -> None:
+        root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
+        trusted = root / layout.ca_cert(role)
+        ours = trusted.read_bytes()
+        trusted.write_bytes(ours + (other / layout.ca_cert(role)).read_bytes())
+        with pytest.raises(UnsafeKeystore, match=r"a CA that this keystore did not make: .*SHA-256 "):
+            provision(root, [policy("/a")], options=options())
+        report = renew(root, options=RenewOptions(provisioning=options()))
+        assert f"removed from {layout.ca_cert(role)}" in report.created[0]
+        assert trusted.read_bytes() == ours
+
+    def test_one_in_place_of_ours_is_refused(self, tmp_path: Path) -> None:
+        root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
+        shutil.copy(other / "public/identity_ca.cert.pem", root / "public/identity_ca.cert.pem")
+        with pytest.raises(UnsafeKeystore, match="did not make"):
+            provision(root, [policy("/a")], options=options())
+
+    def test_a_roll_over_of_our_own_is_known(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        for step in Step:
+            roll_over(root, step, options=options())
+            assert not provision(root, [policy("/a")], options=options()).changed
+
+    def test_finishing_does_not_strand_what_an_interrupted_switch_left(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
+        roll_over(root, Step.START, options=options())
+        shutil.copytree(root / "enclaves/b", tmp_path / "b", symlinks=True)
+        roll_over(root, Step.SWITCH, options=options())
+        shutil.rmtree(root / "enclaves/b")
+        shutil.copytree(tmp_path / "b", root / "enclaves/b", symlinks=True)
+        with pytest.raises(
+            InvalidInput, match=r"1 of 3 enclaves \(/b\) still belong to the old CA.*--ca switch"
+        ):
+            roll_over(root, Step.FINISH, options=options())
+        roll_over(root, Step.SWITCH, options=options())
+        roll_over(root, Step.FINISH, options=options())
+        assert codes(root) == set()
+
+
+class TestTakingOver:
+    def earlier(self, root: Path, replaced: list[tuple[str, int]] | None = None) -> Path:
+        """The keystore as the version before the register would have left it."""
+        (root / layout.REGISTER).unlink()
+        if replaced:
+            rows = [
+                {"enclave": name, "serial": f"{one:040x}", "not_after": "2036-01-01T00:00:00Z"}
+                for name, one in replaced
+            ]
+            text = json.dumps({"version": 1, "certificates": rows})
+            (root / layout.SUPERSEDED).write_text(text)
+            (root / layout.SUPERSEDED).chmod(0o600)
+        return root
+
+    def test_everything_that_stands_is_recorded_and_nothing_changes(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks")
+        before = register(root)
+        report = provision(self.earlier(root), [policy("/a"), policy("/b")], options=options())
+        assert actions(report) == {}
+        assert report.created == ("register of what was issued made from what stands here: 2 certificates",)
+        assert register(root) == before
+
+    def test_revocations_and_replaced_certificates_are_kept(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
+        first = serial(root, "/a")
+        renew(root, ["/a"], options=RenewOptions(provisioning=options()))
+        gone = serial(root, "/c")
+        remove(root, ["/c"], options=QUICK)
+        last = number(root)
+        self.earlier(root, [("/a", first)])
+        remove(root, ["/a"], options=QUICK)
+        assert is_revoked(root, first) and is_revoked(root, gone) and number(root) > last
+        assert not (root / layout.SUPERSEDED).exists()
+
+    def test_a_foreign_ca_is_not_taken_over(self, tmp_path: Path) -> None:
+        root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
+        trusted = root / "public/identity_ca.cert.pem"
+        trusted.write_bytes(trusted.read_bytes() + (other / "public/identity_ca.cert.pem").read_bytes())
+        with pytest.raises(UnsafeKeystore, match="did not make"):
+            provision(self.earlier(root), [policy("/a")], options=options())
+
+    @pytest.mark.parametrize("step", [Step.START, Step.SWITCH])
+    def test_a_roll_over_under_way_is_taken_over(self, tmp_path: Path, step: Step) -> None:
+        root = filled(tmp_path / "ks", ["/a"])
+        for one in list(Step)[: list(Step).index(step) + 1]:
+            roll_over(root, one, options=options())
+        self.earlier(root)
+        for one in list(Step)[list(Step).index(step) + 1 :]:
+            roll_over(root, one, options=options())
+        assert codes(root) == set()
+
+    def test_a_forged_certificate_is_not_recorded(self, tmp_path: Path) -> None:
+        root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
+        for name in ("key.pem", "cert.pem"):
+            shutil.copy(other / "enclaves/a" / name, root / "enclaves/a" / name)
+        provision(self.earlier(root), [policy("/a")], options=options())
+        assert (root / "enclaves/a/key.pem").read_bytes() != (other / "enclaves/a/key.pem").read_bytes()
+        assert codes(root) == set()
+
+
+class TestGenerations:
+    NAMES = st.sampled_from(
+        ["/", "/a", "/a/b", "/" + "x" * 70, "/" + "/".join(["part"] * 15), "/a" + "1" * 62]
+    )
+
+    @given(NAMES, st.sampled_from(SubjectScheme), st.integers(1, 999))
+    def test_a_subject_tells_its_generation(
+        self, enclave: str, scheme: SubjectScheme, generation: int
+    ) -> None:
+        cn = common_name(enclave, scheme, generation)
+        assert len(cn) <= 64 and names_enclave(cn, enclave) and generation_of(cn) == generation
+
+    @given(st.lists(st.tuples(NAMES, st.integers(1, 50)), unique=True, min_size=2, max_size=2))
+    def test_no_two_are_the_same(self, two: list[tuple[str, int]]) -> None:
+        first, second = ((common_name(name, generation=one), name) for name, one in two)
+        assert first[0] != second[0]
+        assert first[1] == second[1] or not names_enclave(first[0], second[1])
