@@ -12,7 +12,7 @@ from pathlib import Path
 
 from nodl.infer.analysis import analyse_rest, start
 from nodl.infer.interpreter.run import Run
-from nodl.infer.packages import EntryPoint, Package, find_package, read_package
+from nodl.infer.packages import EntryPoint, Package, find_package
 from nodl.infer.program import Program
 from nodl.infer.results import Origin, interfaces_of
 from nodl.node_interface import Gap, NodeInterface
@@ -57,29 +57,17 @@ def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
 
 
 def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
-    """C++ sources, package by package. Without the extra ``cpp`` each package is a gap."""
-    packages: dict[str | None, list[str]] = {}
-    for file in files:
-        package = find_package(file)
-        packages.setdefault(package.folder if package else None, []).append(file)
-    nodes: list[NodeInterface] = []
-    gaps: list[Gap] = []
-    for folder, sources in packages.items():
-        from nodl.infer.cpp.cmake import read_build
-        from nodl.infer.cpp.nodes import nodes_of_unit
-        from nodl.infer.cpp.source import CppSupportMissing, read_unit
+    """C++ sources. Without the extra ``cpp`` they are one gap."""
+    if not files:
+        return [], []
+    from nodl.infer.cpp.syntax import CppSupportMissing
+    from nodl.infer.cpp.system import infer_sources
 
-        try:
-            unit = read_unit(sources)
-        except CppSupportMissing as error:
-            gaps.append(Gap(SourceRef(sources[0]), str(error)))
-            continue
-        found, open_questions = nodes_of_unit(
-            unit, read_build(folder), read_package(folder).name if folder else None
-        )
-        nodes.extend(found)
-        gaps.extend(open_questions)
-    return nodes, gaps
+    try:
+        inferred = infer_sources(files)
+    except CppSupportMissing as error:
+        return [], [Gap(SourceRef(files[0]), str(error))]
+    return inferred.nodes, inferred.gaps
 
 
 def _distinct(nodes: list[NodeInterface]) -> tuple[NodeInterface, ...]:

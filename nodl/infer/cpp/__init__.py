@@ -1,6 +1,6 @@
 """Interfaces of rclcpp nodes from C++ source, through tree-sitter (extra ``cpp``).
 
-A front half of lower certainty than the Python one: every method of a node class is taken as reachable,
-variables hold any value assigned to them anywhere in their function or class. What that cannot tell is
-unknown and said so.
+``project`` finds packages and what CMake builds; ``preprocess`` and ``declarations`` read files; ``names`` says what a
+name means; ``machine``, ``statements``, ``expressions``, ``calls`` and ``objects`` run a program in the abstract;
+``models`` knows rclcpp and well-known libraries; ``ledger`` asks what became of every place that makes interfaces.
 """

@@ -1,53 +1,423 @@
-"""What a ``CMakeLists.txt`` builds: executables with their sources, registered components.
+"""What a ``CMakeLists.txt`` builds: targets with sources, definitions and links, registered components, plugin files.
 
-Only literal calls and ``set(VARIABLE ...)`` lists are understood; nothing is run.
+Reads files below the package; runs nothing. Conditions are not decided, except tests (left out): both sides count.
 """
 
 from __future__ import annotations
 
-import itertools
+import glob
 import os
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-_CALL = re.compile(r"^\s*(\w+)\s*\(([^()]*)\)", re.MULTILINE)
-_VARIABLE = re.compile(r"\$\{(\w+)\}")
-_EXECUTABLES = frozenset({"add_executable", "ament_auto_add_executable", "rclcpp_add_executable"})
+_ARGUMENT = re.compile(r'\[(=*)\[((?:.|\n)*?)\]\1\]|"((?:\\.|[^"\\])*)"|([^\s()"]+)|([()])')
+_COMMAND = re.compile(r"[ \t]*(\w+)\s*\(")
+_VARIABLE = re.compile(r"\$\{([\w.\-]+)\}")
+_SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C")
+_EXECUTABLES = frozenset(
+    {
+        "add_executable",
+        "ament_auto_add_executable",
+        "rclcpp_add_executable",
+        "qt5_add_executable",
+        "qt6_add_executable",
+        "qt_add_executable",
+    }
+)
+_LIBRARIES = frozenset({"add_library", "ament_auto_add_library"})
+_LIBRARY_WORDS = frozenset(
+    {
+        "SHARED",
+        "STATIC",
+        "MODULE",
+        "OBJECT",
+        "INTERFACE",
+        "EXCLUDE_FROM_ALL",
+        "IMPORTED",
+        "ALIAS",
+        "GLOBAL",
+        "UNKNOWN",
+    }
+)
+_LINK_WORDS = frozenset({"PUBLIC", "PRIVATE", "INTERFACE", "SYSTEM"})
+_BLOCK_ENDS = {
+    "if": "endif",
+    "foreach": "endforeach",
+    "function": "endfunction",
+    "macro": "endmacro",
+    "while": "endwhile",
+}
+
+Command = tuple[str, list[str]]
+
+
+@dataclass
+class Target:
+    name: str
+    executable: bool
+    sources: list[str] = field(default_factory=list)
+    definitions: dict[str, str] = field(default_factory=dict)
+    links: list[str] = field(default_factory=list)
+    automatic: bool = False  # ament_auto: links every library of the package
 
 
 @dataclass
 class Build:
-    executables: dict[str, set[str]] = field(default_factory=dict)  # name -> file names of its sources
-    plugins: dict[str, str | None] = field(default_factory=dict)  # class -> executable made for it
+    """``plugins``: class -> executable that is made for it; ``plugin_files``: descriptions for pluginlib."""
+
+    folder: str = ""
+    targets: dict[str, Target] = field(default_factory=dict)
+    plugins: dict[str, str | None] = field(default_factory=dict)
+    plugin_targets: dict[str, str] = field(default_factory=dict)  # class -> library target
+    plugin_files: list[str] = field(default_factory=list)
+    includes: list[str] = field(default_factory=list)
+    renamed: dict[str, str] = field(default_factory=dict)  # target -> OUTPUT_NAME
+    parameter_files: dict[str, str] = field(
+        default_factory=dict
+    )  # library -> YAML of generate_parameter_library
+    questions: list[tuple[str, str]] = field(default_factory=list)
 
 
 def read_build(folder: str | None) -> Build:
-    build = Build()
-    if folder is None:
-        return build
-    try:
-        text = Path(folder, "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        return build
-    variables: dict[str, str] = {}
-    for name, arguments in _CALL.findall(re.sub(r"#.*", "", text)):
-        expanded = _VARIABLE.sub(lambda match: variables.get(match[1], match[0]), arguments)
-        words = [word.strip('"') for word in expanded.split()]
-        if name.lower() == "set" and words:
-            variables[words[0]] = " ".join(words[1:])
-        elif name.lower() == "project" and words:
-            variables["PROJECT_NAME"] = words[0]
-        elif name.lower() in _EXECUTABLES and words:
-            build.executables[words[0]] = {os.path.basename(word) for word in words[1:]}
-        elif name.lower() == "rclcpp_components_register_node" and words:
-            _register(build, words)
-        elif name.lower() == "rclcpp_components_register_nodes":
-            build.plugins.update(dict.fromkeys(words[1:]))
+    """The build of a package folder; an empty one without ``CMakeLists.txt``."""
+    build = Build(folder or "")
+    if folder is not None:
+        _Reader(build).read(folder, {})
     return build
 
 
-def _register(build: Build, words: list[str]) -> None:
-    options = dict(itertools.pairwise(words))
-    if "PLUGIN" in options:
-        build.plugins[options["PLUGIN"]] = options.get("EXECUTABLE")
+def commands(source: str) -> Iterator[Command]:
+    """Every command with its arguments, parentheses kept as arguments of their own."""
+    source = re.sub(r"#\[(=*)\[(?:.|\n)*?\]\1\]|(?<!\\)#[^\n]*", "", source)
+    position = 0
+    while True:
+        match = _COMMAND.search(source, position)
+        if match is None:
+            return
+        words: list[str] = []
+        depth, position = 1, match.end()
+        while depth and (found := _ARGUMENT.search(source, position)):
+            position = found.end()
+            if found[5]:
+                depth += 1 if found[5] == "(" else -1
+                if depth:
+                    words.append(found[5])
+            elif found[3] is not None:
+                words.append('"' + found[3])
+            else:
+                words.append(found[2] or found[4] or "")
+        yield match[1].lower(), words
+        if depth:
+            return
+
+
+class _Reader:
+    def __init__(self, build: Build):
+        self.build = build
+        self.functions: dict[str, tuple[bool, list[str], list[Command]]] = {}
+        self.steps = 0
+        self.definitions: dict[str, str] = {}
+
+    def read(self, folder: str, variables: dict[str, str]) -> None:
+        try:
+            source = Path(folder, "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
+        except OSError:
+            return
+        variables = {**variables, "CMAKE_CURRENT_SOURCE_DIR": folder, "CMAKE_CURRENT_LIST_DIR": folder}
+        variables.setdefault("CMAKE_SOURCE_DIR", folder)
+        variables.setdefault("PROJECT_SOURCE_DIR", folder)
+        self.run(list(commands(source)), variables)
+
+    def run(self, listed: Sequence[Command], variables: dict[str, str]) -> None:
+        index = 0
+        while index < len(listed):
+            name, words = listed[index]
+            self.steps += 1
+            if self.steps > 20_000:
+                return
+            end = _block(listed, index) if name in _BLOCK_ENDS else index
+            if end > index:
+                self.block(name, words, listed[index + 1 : end], variables)
+            elif name not in ("else", "elseif"):
+                self.command(name, words, variables)
+            index = end + 1
+
+    def block(self, name: str, words: list[str], body: Sequence[Command], variables: dict[str, str]) -> None:
+        if name in ("function", "macro"):
+            self.functions[words[0].lower()] = (name == "function", words[1:], list(body))
+        elif name == "foreach":
+            given = _expand(words, variables)
+            items = [word for word in given[1:] if word not in ("IN", "ITEMS", "LISTS")]
+            if "LISTS" in given:
+                items = [part for word in items for part in variables.get(word, "").split(";") if part]
+            for item in items:
+                self.run(body, _Layer(variables, {given[0]: item}))
+        elif name == "if":
+            self._if(words, body, variables)
+        elif name == "while":
+            self.run(body, variables)
+
+    def _if(self, words: list[str], body: Sequence[Command], variables: dict[str, str]) -> None:
+        parts: list[tuple[list[str], list[Command]]] = [(words, [])]
+        depth = 0
+        for command in body:
+            depth += (command[0] == "if") - (command[0] == "endif")
+            if depth == 0 and command[0] in ("else", "elseif"):
+                parts.append((command[1] if command[0] == "elseif" else ["ELSE"], []))
+            else:
+                parts[-1][1].append(command)
+        for condition, inside in parts:
+            known = _known(condition)
+            if known is not False:
+                self.run(inside, variables)
+            if known is True:
+                return
+
+    def command(self, name: str, words: list[str], variables: dict[str, str]) -> None:
+        given = _expand(words, variables)
+        if name in self.functions:
+            self._call(name, given, variables)
+            return
+        if not given:
+            return
+        if name in _EXECUTABLES:
+            self._target(given, variables, executable=True, automatic=name.startswith("ament_auto"))
+        elif name in _LIBRARIES:
+            self._target(given, variables, executable=False, automatic=name.startswith("ament_auto"))
+        else:
+            handler = getattr(self, f"_do_{name}", None)
+            if handler is not None:
+                handler(given, variables)
+
+    def _call(self, name: str, given: list[str], variables: dict[str, str]) -> None:
+        own, parameters, body = self.functions[name]
+        inner = {
+            **dict(zip(parameters, given, strict=False)),
+            "ARGN": ";".join(given[len(parameters) :]),
+            "ARGV": ";".join(given),
+        }
+        inner.update({f"ARGV{index}": word for index, word in enumerate(given)})
+        self.run(body, {**variables, **inner} if own else _Layer(variables, inner))
+
+    def _target(
+        self, given: list[str], variables: dict[str, str], *, executable: bool, automatic: bool
+    ) -> None:
+        if "IMPORTED" in given or "ALIAS" in given:
+            return
+        target = self.build.targets.setdefault(given[0], Target(given[0], executable))
+        target.automatic = automatic
+        words = given[1:]
+        if automatic and "DIRECTORY" in words:
+            folder = _path(words[words.index("DIRECTORY") + 1], variables)
+            words = [
+                file
+                for suffix in _SOURCE_SUFFIXES
+                for file in sorted(glob.glob(f"{folder}/**/*{suffix}", recursive=True))
+            ]
+        self._sources(target, words, variables)
+        target.definitions.update(self.definitions)
+
+    def _sources(self, target: Target, words: list[str], variables: dict[str, str]) -> None:
+        for word in words:
+            if word in _LIBRARY_WORDS or word in _LINK_WORDS:
+                continue
+            if word.startswith("$<TARGET_OBJECTS:"):
+                target.links.append(word[len("$<TARGET_OBJECTS:") :].rstrip(">"))
+                continue
+            file = _path(word, variables)
+            if file.endswith(_SOURCE_SUFFIXES) and file not in target.sources:
+                target.sources.append(file)
+
+    # --- single commands --------------------------------------------------------------------------------
+
+    def _do_set(self, given: list[str], variables: dict[str, str]) -> None:
+        words = given[1 : given.index("CACHE")] if "CACHE" in given else given[1:]
+        variables[given[0]] = ";".join(word for word in words if word != "PARENT_SCOPE")
+
+    def _do_list(self, given: list[str], variables: dict[str, str]) -> None:
+        if given[0] == "APPEND" and len(given) > 1:
+            before = [variables[given[1]]] if variables.get(given[1]) else []
+            variables[given[1]] = ";".join([*before, *given[2:]])
+
+    def _do_cmake_parse_arguments(self, given: list[str], variables: dict[str, str]) -> None:
+        """``PREFIX options one-value-words multi-value-words arguments...``; empty lists are kept as empty words."""
+        if len(given) < 4:
+            return
+        prefix, single, several = given[0], given[2].split(";"), given[3].split(";")
+        words = set(filter(None, [*given[1].split(";"), *single, *several]))
+        found: dict[str, list[str]] = {}
+        current = ""
+        for word in given[4:]:
+            if word in words:
+                current = word
+                found.setdefault(word, [])
+            elif current:
+                found[current].append(word)
+        for name in words:
+            variables[f"{prefix}_{name}"] = ";".join(found.get(name, []))
+
+    def _do_project(self, given: list[str], variables: dict[str, str]) -> None:
+        variables["PROJECT_NAME"] = variables["CMAKE_PROJECT_NAME"] = given[0]
+
+    def _do_file(self, given: list[str], variables: dict[str, str]) -> None:
+        if given[0] in ("GLOB", "GLOB_RECURSE") and len(given) > 2:
+            patterns = [
+                word
+                for word in given[2:]
+                if word not in ("CONFIGURE_DEPENDS", "RELATIVE", "LIST_DIRECTORIES", "true", "false")
+            ]
+            found = [
+                f
+                for p in patterns
+                for f in sorted(glob.glob(_deep(_path(p, variables), given[0]), recursive=True))
+            ]
+            variables[given[1]] = ";".join(found)
+
+    def _do_aux_source_directory(self, given: list[str], variables: dict[str, str]) -> None:
+        folder = _path(given[0], variables)
+        found = [str(p) for p in sorted(Path(folder).glob("*")) if p.suffix in _SOURCE_SUFFIXES]
+        variables[given[-1]] = ";".join(found)
+
+    def _do_target_sources(self, given: list[str], variables: dict[str, str]) -> None:
+        if given[0] in self.build.targets:
+            self._sources(self.build.targets[given[0]], given[1:], variables)
+
+    def _do_target_link_libraries(self, given: list[str], variables: dict[str, str]) -> None:
+        if given[0] in self.build.targets:
+            self.build.targets[given[0]].links += [w for w in given[1:] if w not in _LINK_WORDS]
+
+    def _do_target_compile_definitions(self, given: list[str], variables: dict[str, str]) -> None:
+        if given[0] in self.build.targets:
+            self.build.targets[given[0]].definitions.update(_definitions(given[1:]))
+
+    _do_target_compile_options = _do_target_compile_definitions
+
+    def _do_add_definitions(self, given: list[str], variables: dict[str, str]) -> None:
+        self.definitions.update(_definitions(given, only_flags=False))
+
+    _do_add_compile_definitions = _do_add_definitions
+
+    def _do_add_compile_options(self, given: list[str], variables: dict[str, str]) -> None:
+        self.definitions.update(_definitions(given, only_flags=True))
+
+    def _do_add_subdirectory(self, given: list[str], variables: dict[str, str]) -> None:
+        folder = _path(given[0], variables)
+        if os.path.basename(folder) not in ("test", "tests"):
+            self.read(folder, variables)
+
+    def _do_include_directories(self, given: list[str], variables: dict[str, str]) -> None:
+        self.build.includes += [_path(word, variables) for word in given if not word.startswith("$")]
+
+    def _do_target_include_directories(self, given: list[str], variables: dict[str, str]) -> None:
+        words = [re.sub(r"^\$<BUILD_INTERFACE:(.*)>$", r"\1", word) for word in given[1:]]
+        self.build.includes += [
+            _path(w, variables) for w in words if not w.startswith("$<") and w not in _LINK_WORDS
+        ]
+
+    def _do_set_target_properties(self, given: list[str], variables: dict[str, str]) -> None:
+        if "OUTPUT_NAME" in given and "PROPERTIES" in given:
+            name = given[given.index("OUTPUT_NAME") + 1 :][:1]
+            for target in given[: given.index("PROPERTIES")]:
+                self.build.renamed[target] = "".join(name)
+
+    def _do_rclcpp_components_register_node(self, given: list[str], variables: dict[str, str]) -> None:
+        options = dict(zip(given[1::2], given[2::2], strict=False)) if "PLUGIN" in given else {}
+        if "PLUGIN" not in options:
+            options = {w: given[i + 1] for i, w in enumerate(given[:-1]) if w in ("PLUGIN", "EXECUTABLE")}
+        if "PLUGIN" in options:
+            name = options["PLUGIN"].lstrip(":")
+            self.build.plugins[name] = options.get("EXECUTABLE")
+            self.build.plugin_targets[name] = given[0]
+
+    def _do_rclcpp_components_register_nodes(self, given: list[str], variables: dict[str, str]) -> None:
+        for name in given[1:]:
+            if name not in ("EXECUTOR", "RESOURCE_INDEX"):
+                self.build.plugins.setdefault(name.lstrip(":"), None)
+                self.build.plugin_targets[name.lstrip(":")] = given[0]
+
+    def _do_pluginlib_export_plugin_description_file(
+        self, given: list[str], variables: dict[str, str]
+    ) -> None:
+        if len(given) > 1:
+            self.build.plugin_files.append(_path(given[1], variables))
+
+    def _do_generate_parameter_library(self, given: list[str], variables: dict[str, str]) -> None:
+        if len(given) > 1:
+            self.build.parameter_files[given[0]] = _path(given[1], variables)
+
+
+class _Layer(dict[str, str]):
+    """Variables of a loop or macro: new ones here, all others written through."""
+
+    def __init__(self, outer: dict[str, str], own: dict[str, str]):
+        super().__init__({**outer, **own})
+        self._outer, self._own = outer, set(own)
+
+    def __setitem__(self, name: str, value: str) -> None:
+        super().__setitem__(name, value)
+        if name not in self._own:
+            self._outer[name] = value
+
+
+def _block(listed: Sequence[Command], start: int) -> int:
+    name = listed[start][0]
+    depth = 0
+    for index in range(start, len(listed)):
+        depth += (listed[index][0] == name) - (listed[index][0] == _BLOCK_ENDS[name])
+        if depth == 0:
+            return index
+    return len(listed) - 1
+
+
+def _expand(words: list[str], variables: dict[str, str]) -> list[str]:
+    """Variables filled in; lists become several arguments unless they stand in quotes."""
+    found: list[str] = []
+    for word in words:
+        quoted = word.startswith('"')
+        for _ in range(8):
+            filled = _VARIABLE.sub(lambda match: variables.get(match[1], ""), word)
+            if filled == word:
+                break
+            word = filled
+        found += [word[1:]] if quoted else [part for part in word.split(";") if part]
+    return found
+
+
+def _known(condition: list[str]) -> bool | None:
+    words = [word.lstrip('"') for word in condition if word not in ("(", ")")]
+    if words in (
+        ["BUILD_TESTING"],
+        ["CATKIN_ENABLE_TESTING"],
+        ["WIN32"],
+        ["APPLE"],
+        ["MSVC"],
+        ["ANDROID"],
+        ["FALSE"],
+    ):
+        return False
+    if words in (["NOT", "WIN32"], ["UNIX"], ["TRUE"], ["NOT", "APPLE"]):
+        return True
+    return False if "BUILD_TESTING" in words and "NOT" not in words and "OR" not in words else None
+
+
+def _path(word: str, variables: dict[str, str]) -> str:
+    return os.path.normpath(os.path.join(variables.get("CMAKE_CURRENT_SOURCE_DIR", ""), word))
+
+
+def _deep(pattern: str, how: str) -> str:
+    folder, name = os.path.split(pattern)
+    return os.path.join(folder, "**", name) if how == "GLOB_RECURSE" else pattern
+
+
+def _definitions(words: list[str], only_flags: bool = False) -> dict[str, str]:
+    found = {}
+    for word in words:
+        if word.startswith("-D"):
+            word = word[2:]
+        elif only_flags or word.startswith(("-", "$")) or word in _LINK_WORDS:
+            continue
+        name, _, value = word.partition("=")
+        found[name] = value.replace('\\"', '"') or "1"
+    return found

@@ -44,6 +44,7 @@ class Derived : public Base { public: Derived() : Base("derived") {} };
 RCLCPP_COMPONENTS_REGISTER_NODE(demo::Talker)
 """
 MAIN = """
+#include "talker.hpp"
 int main() {
   auto node = rclcpp::Node::make_shared("plain");
   auto client = node->create_client<std_srvs::srv::Empty>("/service");
@@ -64,7 +65,9 @@ def system(tmp_path: Path) -> InferredSystem:
     (tmp_path / "src").mkdir()
     (tmp_path / "package.xml").write_text("<package><name>demo</name></package>", encoding="utf-8")
     (tmp_path / "CMakeLists.txt").write_text(CMAKE, encoding="utf-8")
-    (tmp_path / "src/talker.cpp").write_text(SOURCE, encoding="utf-8")
+    (tmp_path / "src/talker.hpp").write_text(SOURCE.partition("RCLCPP_COMPONENTS")[0], encoding="utf-8")
+    registration = '#include "talker.hpp"\nRCLCPP_COMPONENTS_REGISTER_NODE(demo::Talker)\n'
+    (tmp_path / "src/talker.cpp").write_text(registration, encoding="utf-8")
     (tmp_path / "src/main.cpp").write_text(MAIN, encoding="utf-8")
     return infer_paths([tmp_path])
 
@@ -87,7 +90,7 @@ def test_names_and_types(system: InferredSystem) -> None:
         ("service_client", "member", "std_srvs/srv/Empty"),
     }
     assert [gap.why for gap in talker.gaps] == [
-        "the node is handed to elsewhere::helper, which may create endpoints on it"
+        "the node is handed to elsewhere::helper(), which may make interfaces on it"
     ]
 
 

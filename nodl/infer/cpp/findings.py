@@ -1,0 +1,53 @@
+"""What a run found: nodes with their endpoints and parameters, gaps, places that are dead for a reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.values import BOTTOM, Text, Value, join
+from nodl.node_interface import EndpointKind
+from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.infer.cpp.declarations import Class
+
+Condition = tuple[str, int, str]  # file, line of the #if, symbol: what the preprocessor decides elsewhere
+
+
+@dataclass(frozen=True)
+class FoundEndpoint:
+    kind: EndpointKind
+    name: Text
+    type: str
+    source: SourceRef
+    exact: bool = True
+
+
+@dataclass(eq=False)
+class NodeRecord:
+    """A node under construction."""
+
+    source: SourceRef
+    names: Value = BOTTOM
+    namespaces: Value = BOTTOM
+    lifecycle: bool = False
+    cls: Class | None = None
+    created: bool = False
+    endpoints: dict[FoundEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
+    parameters: dict[str, Value] = field(default_factory=dict)
+    gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
+    arguments: list[tuple[Value, ...]] = field(default_factory=list)
+    use_global_arguments: bool = True
+    overrides: dict[str, Value] = field(default_factory=dict)
+    description: str = ""
+
+    def declare(self, name: str, default: Value) -> None:
+        self.parameters[name] = join(self.parameters.get(name, BOTTOM), default)
+
+    def default(self, name: str) -> Value:
+        """What the program gives for the parameter itself: in its node options, else where it declares it."""
+        return self.overrides.get(name) or self.parameters.get(name, BOTTOM)
+
+    def gap(self, source: SourceRef, why: str) -> None:
+        self.gaps.setdefault((source, why))

@@ -1,0 +1,249 @@
+"""Every place that could make an interface is accounted for: as one, as dead for a reason, or as a gap.
+
+Places are found by their words in the text of the program's files, whatever the grammar made of them: nothing that the
+analysis did not run, or the parser did not understand, is missing without a word.
+"""
+
+from __future__ import annotations
+
+import bisect
+import re
+from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+from nodl.infer.cpp.declarations import Class, FileIndex, Function
+from nodl.infer.cpp.syntax import text
+from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.infer.cpp.machine import Machine
+
+CREATES = re.compile(
+    r"create_(?:publisher|subscription|service|client|server|generic_\w+|sub_node|lifecycle_publisher|camera_publisher|"
+    r"camera_subscription|subscriber)|advertise\w*|createPublisher|createSubscription|createService|createClient|"
+    r"create(?:Shared|Unique|Unmanaged)?Instance|wait_for_message|createSubscriber|subscribeCamera|advertiseCamera|add_publisher"
+)
+_SITE = re.compile(rf"(?<![\w])({CREATES.pattern})(?=\s*[<(])")
+_STRINGS = re.compile(r'"(?:\\.|[^"\\\n])*"')
+
+
+class Site(NamedTuple):
+    file: str
+    offset: int
+    line: int
+    word: str
+
+
+class Answer(NamedTuple):
+    """``reason``: why the place is dead, or what is missing."""
+
+    site: Site
+    dead: bool
+    reason: str
+
+    @property
+    def source(self) -> SourceRef:
+        return SourceRef(self.site.file, self.site.line)
+
+
+def sites_of(index: FileIndex) -> list[Site]:
+    """The places of one file, by the words in its preprocessed text."""
+    found = []
+    source = index.source.text
+    if not _SITE.search(source):
+        return []
+    blanked = _STRINGS.sub(lambda m: '"' + "_" * (len(m[0]) - 2) + '"', source)
+    for match in _SITE.finditer(blanked):
+        offset = len(source[: match.start()].encode())
+        found.append(Site(index.file, offset, source.count("\n", 0, match.start()) + 1, match[1]))
+    return found
+
+
+def account(run: Machine, files: Iterable[FileIndex]) -> list[Answer]:
+    """What became of each place that has no interface and no gap of its own."""
+    answers: list[Answer] = []
+    reachable = reachable_functions(run)
+    for index in files:
+        functions = sorted(index.all_functions, key=lambda f: f.node.start_byte)
+        starts = [function.node.start_byte for function in functions]
+        handled = sorted(run.handled.get(index.file, ()))
+        for site in sites_of(index):
+            answer = _answer(run, index, site, functions, starts, handled, reachable)
+            if answer is not None:
+                answers.append(answer)
+    return answers
+
+
+def _answer(
+    run: Machine, index: FileIndex, site: Site, functions: list[Function], starts: list[int], handled: list[int],
+    reachable: set[Function],
+) -> Answer | None:  # fmt: skip
+    function = _around(site.offset, functions, starts)
+    if function is None:
+        if _is_declaration(index, site) or _is_handled(index, site, handled):
+            return None
+        owner = _class_around(index, site)
+        made = [c for obj in run.made_objects() if obj.cls is not None for c in run.names.ancestry(obj.cls)]
+        if owner is not None and owner not in made:
+            return Answer(site, True, f"the program makes no object of {owner}")
+        return Answer(site, False, f"{site.word} stands where it is not understood")
+    if _is_handled(index, site, handled):
+        return None
+    if function.name == site.word and site.offset < _body_start(function):
+        return None  # the name of the function itself
+    for (file, start, end), why in run.dead.items():
+        if file == index.file and start <= site.offset < end:
+            return Answer(site, True, why)
+    if function not in run.called:
+        if function not in reachable:
+            return Answer(site, True, f"nothing in the program calls {function}")
+        if _is_overridden(run, function):
+            return Answer(site, True, f"every object of the program overrides {function}")
+        return Answer(
+            site, False, f"{site.word}: it was not understood who calls {function}, and for which node"
+        )
+    return Answer(
+        site, False, f"{site.word} was not followed: whether it is reached, and for which node, is not known"
+    )
+
+
+def _class_around(index: FileIndex, site: Site) -> Class | None:
+    inner: Class | None = None
+    for cls in (each for listed in index.classes.values() for each in listed):
+        around = cls.node.start_byte <= site.offset < cls.node.end_byte
+        if around and (inner is None or cls.node.start_byte > inner.node.start_byte):
+            inner = cls
+    return inner
+
+
+def _is_overridden(run: Machine, function: Function) -> bool:
+    """A method that no object has, since its class overrides it, and that nobody calls by its class."""
+    if not function.virtual or not function.owner:
+        return False
+    last = function.owner.rpartition("::")[2]
+    holders = [
+        o.cls for o in run.made_objects() if o.cls and any(c.name == last for c in run.names.ancestry(o.cls))
+    ]
+    if not holders or any(function in run.names.find_methods(cls, function.name) for cls in holders):
+        return False
+    by_class = re.compile(rf"\b{last}\s*::\s*{re.escape(function.name)}\s*\(")
+    return not any(by_class.search(text(each.body)) for each in run.called)
+
+
+def _body_start(function: Function) -> int:
+    return function.body.start_byte if function.body is not None else function.node.end_byte
+
+
+def _around(offset: int, functions: list[Function], starts: list[int]) -> Function | None:
+    position = bisect.bisect_right(starts, offset)
+    best = None
+    for function in functions[max(0, position - 40) : position]:
+        if function.node.start_byte <= offset < function.node.end_byte:
+            best = function
+    return best
+
+
+def _is_handled(index: FileIndex, site: Site, handled: list[int]) -> bool:
+    """A call whose name is this word had its result: the call begins before it and its arguments behind it."""
+    node = index.tree.root_node.descendant_for_byte_range(site.offset, site.offset + 1)
+    starts = set(handled)
+    while node is not None and node.type not in (
+        "compound_statement",
+        "function_definition",
+        "argument_list",
+    ):
+        if (
+            node.type in ("call_expression", "field_initializer", "argument_list")
+            and node.start_byte in starts
+        ):
+            return True
+        node = node.parent
+    return False
+
+
+def _is_declaration(index: FileIndex, site: Site) -> bool:
+    """``create_publisher`` as the name of a method that is only declared, or in a macro that nobody uses."""
+    node = index.tree.root_node.descendant_for_byte_range(site.offset, site.offset + 1)
+    while node is not None:
+        if node.type in (
+            "function_declarator",
+            "using_declaration",
+            "template_parameter_list",
+            "friend_declaration",
+        ):
+            return True
+        if node.type in ("call_expression", "ERROR", "init_declarator"):
+            return False
+        node = node.parent
+    return False
+
+
+# --- who may be called ------------------------------------------------------------------------------------------
+
+
+def reachable_functions(run: Machine) -> set[Function]:
+    """Every function that one of those that ran could call, by its name: more than are called, never fewer.
+
+    A method counts when its class, or one that derives from it, is spoken of in what is reached.
+    """
+    return _Reach(run).reached
+
+
+class _Reach:
+    def __init__(self, run: Machine):
+        self.run = run
+        self.by_name: dict[str, list[Function]] = {}
+        for function in _all_functions(run):
+            self.by_name.setdefault(function.name, []).append(function)
+        self.mentioned: set[str] = set()
+        self.used: set[str] = set()
+        self.reached: set[Function] = set()
+        self.waiting = list(run.called)
+        self.idle: dict[str, list[Function]] = {}  # class -> methods that wait for somebody to speak of it
+        for obj in run.made_objects():
+            if obj.cls is not None:
+                self._use(obj.cls.name)
+        while self.waiting:
+            self._visit(self.waiting.pop())
+
+    def _visit(self, function: Function) -> None:
+        if function in self.reached:
+            return
+        owner = function.owner.rpartition("::")[2]
+        if owner and owner not in self.used and function not in self.run.called:
+            self.idle.setdefault(owner, []).append(function)
+            return
+        self.reached.add(function)
+        self._mention(function.words)
+
+    def _mention(self, words: Iterable[str]) -> None:
+        for word in words:
+            if word in self.mentioned:
+                continue
+            self.mentioned.add(word)
+            self.waiting += self.by_name.get(word, ())
+            if word in self.run.names.classes:
+                self._use(word)
+            for _, _, target, _ in self.run.names.aliases.get(word, ()):
+                self._mention(_WORD.findall(target))
+
+    def _use(self, name: str) -> None:
+        if name in self.used:
+            return
+        self.used.add(name)
+        self.waiting += self.idle.pop(name, ())
+        for cls in self.run.names.classes.get(name, ()):
+            self._mention([name])
+            for written in (*cls.bases, *(field.type for field in cls.fields.values())):
+                self._mention(_WORD.findall(written))
+            for method in (m for table in self.run.names.methods.get(cls, {}).values() for m in table):
+                if method.virtual:  # called through a base
+                    self.waiting.append(method)
+
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def _all_functions(run: Machine) -> Iterator[Function]:
+    for index in run.names.files.values():
+        yield from index.all_functions

@@ -1,0 +1,115 @@
+"""Registers of what libraries do, filled by ``models``. What is in none of them gets no node in silence."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.names import Type
+from nodl.infer.cpp.values import BOTTOM, Obj, Value
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+    from nodl.infer.cpp.machine import Frame, Machine
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call of a library's function. ``given``: the arguments as written."""
+
+    node: Node
+    frame: Frame
+    values: Sequence[Value]
+    types: Sequence[Type]
+    given: Sequence[Node] = ()
+    receiver: Obj | None = None
+
+    def value(self, index: int) -> Value:
+        return self.values[index] if index < len(self.values) else BOTTOM
+
+
+ClassModel = Callable[["Machine", Obj, list[Value], "Node", "Frame"], Value | None]
+FunctionModel = Callable[["Machine", Call], Value]
+
+NODE_BASES: dict[str, ClassModel] = {}
+LIBRARY_CLASSES: dict[str, ClassModel] = {}
+LIBRARY_FUNCTIONS: dict[str, FunctionModel] = {}
+LIBRARY_METHODS: dict[tuple[str, str], FunctionModel] = {}
+NODE_METHODS: dict[str, FunctionModel] = {}
+
+# Classes that make no interface of their own, whoever they get. rclcpp: read in include/rclcpp of humble to rolling.
+_HARMLESS_CLASSES = re.compile(
+    r"(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|sensor_msgs::PointCloud2\w+|tinyxml2|urdf|KDL|angles|grid_map)::.*"
+    r"|rclcpp::(?:Rate|WallRate|GenericRate|Clock|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"
+    r"ParameterValue|NodeOptions|\w*Options|Context|TimerBase|CallbackGroup|MessageInfo|SerializedMessage|Serialization|"
+    r"WaitSet|GuardCondition|PublisherEventCallbacks|SubscriptionEventCallbacks|NetworkFlow\w*|ParameterMap|ParameterType|"
+    r"executors::\w+|Executor|FutureReturnCode|exceptions::.*|QOS\w+|AnySubscriptionCallback|\w*SubscriptionOptions\w*|\w*PublisherOptions\w*)"
+    r"|rclcpp_lifecycle::(?:State|Transition)|rclcpp_components::NodeInstanceWrapper"
+    r"|rclcpp_action::(?:\w*GoalHandle|ResultCode|GoalUUID|.*Options)"
+    r"|tf2::.*|tf2_ros::(?:CreateTimerROS|CreateTimerInterface|AsyncBufferInterface)"
+    r"|rcl\w*_\w+|rcutils_\w+|rmw_\w+|rcpputils::.*|class_loader::.*|builtin_interfaces::.*"
+    r"|\w+::(?:msg|srv|action)::.*|Q[A-Z]\w*|Ui::.*"
+    r"|(?:unsigned |signed |long |short )*(?:bool|int|float|double|char|void|long|short|unsigned|size_t|auto)?"
+    r"|u?int(?:8|16|32|64)_t|uint|byte|FILE|pthread_\w+|timespec|timeval|sigset_t|[A-Z]"
+)
+_HARMLESS_FUNCTIONS = re.compile(
+    r"(?:std|Eigen|cv|boost|tf2|fmt|angles|YAML|nlohmann|pcl|rcpputils|rcutils|ament_index_cpp|KDL|cv_bridge|__builtin)::.*"
+    r"|RCLCPP_\w+|RCUTILS_\w+|ROS_\w+|rc(?:l|utils|pputils)_\w+|rmw_\w+|assert|ASSERT|printf|fprintf|memcpy|memset|signal|sqrt\w*|"
+    r"f?abs|(?:a?sin|a?cos|a?tan2?|exp|log\w*|pow|floor|ceil|round|hypot|fmod|isnan|isinf|strcmp|strlen|atoi|atof|rand|srand|"
+    r"usleep|sleep|exit|min|max|setvbuf|perror|puts|malloc|free|getenv|clamp|swap|isfinite|emplace_back|static_assert|connect|"
+    r"tolower|toupper|isspace|snprintf|sprintf|strtol|strtod|fabsf|doTransform|toMsg|fromMsg|get_logger|now)"
+    r"|rclcpp::(?:ok|shutdown|spin|spin_some|spin_until_future_complete|get_logger|Rate|sleep_for|on_shutdown|"
+    r"expand_topic_or_service_name|to_string|remove_ros_arguments|uninstall_signal_handlers|install_signal_handlers|"
+    r"signal_handlers_installed|contexts::.*|executors::.*|exceptions::.*|get_message_type_support_handle|extend_name_with_sub_namespace|"
+    r"node_interfaces::get_node_(?:base|topics|services|parameters|timers|logging|clock|graph|time_source|waitables|type_descriptions)_interface|create_wall_timer|create_timer|get_typesupport_library|get_typesupport_handle|get_message_typesupport_handle|get_service_typesupport_handle|is_initialized|detail::.*|getLogger)"
+    r"|(?:rclcpp|rclcpp_lifecycle|rclcpp_action)::\w*::\w+::(?:get_instance)"
+    r"|rclcpp::(?!Node$|create_|Async|Sync|wait_for|Generic)\w+(?:::\w+)*"
+    r"|rclcpp_lifecycle::(?:State|Transition)\w*(?:::\w+)*"
+    r"|rclcpp_action::(?:ServerGoalHandle|ClientGoalHandle|Client|Server|to_string|convert|ClientBase|ServerBase)(?:::.*)?"
+    r"|\w+::(?:msg|srv|action)::.*"
+)
+
+
+def is_harmless_class(name: str) -> bool:
+    """Whether objects of this class make no interface, even of nodes that they get."""
+    return _HARMLESS_CLASSES.fullmatch(name) is not None and name not in LIBRARY_CLASSES
+
+
+def is_harmless_function(name: str) -> bool:
+    """Whether this function makes no interface; what it calls back is run all the same."""
+    return _HARMLESS_FUNCTIONS.fullmatch(name) is not None
+
+
+def library_class(*names: str) -> Callable[[ClassModel], ClassModel]:
+    def register(model: ClassModel) -> ClassModel:
+        LIBRARY_CLASSES.update(dict.fromkeys(names, model))
+        return model
+
+    return register
+
+
+def library_function(*names: str) -> Callable[[FunctionModel], FunctionModel]:
+    def register(model: FunctionModel) -> FunctionModel:
+        LIBRARY_FUNCTIONS.update(dict.fromkeys(names, model))
+        return model
+
+    return register
+
+
+def library_method(cls: str, *names: str) -> Callable[[FunctionModel], FunctionModel]:
+    def register(model: FunctionModel) -> FunctionModel:
+        LIBRARY_METHODS.update({(cls, name): model for name in names})
+        return model
+
+    return register
+
+
+def node_method(*names: str) -> Callable[[FunctionModel], FunctionModel]:
+    def register(model: FunctionModel) -> FunctionModel:
+        NODE_METHODS.update(dict.fromkeys(names, model))
+        return model
+
+    return register

@@ -1,0 +1,323 @@
+"""One run of one program: the store, frames, branches, and what is found on the way.
+
+Statements, expressions and calls register how they are run (``statement``, ``expression``); nothing here knows C++'s
+libraries. A place that was run is noted; the ledger later asks about every other place.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.declarations import FileIndex, Function, Scope
+from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
+from nodl.infer.cpp.ledger import CREATES
+from nodl.infer.cpp.names import Names, Type, split_type
+from nodl.infer.cpp.store import Changes, Store
+from nodl.infer.cpp.syntax import line_of, text
+from nodl.infer.cpp.values import (
+    BOTTOM,
+    Atom,
+    Bound,
+    Lambda,
+    Obj,
+    Text,
+    Value,
+    concatenated,
+    join,
+    unknown,
+)
+from nodl.name_template import UnknownPart
+from nodl.node_interface import EndpointKind
+from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
+
+MAX_DEPTH = 60
+MAX_STEPS = 1_500_000
+MAX_RECURSION = 2
+
+StatementHandler = Callable[["Machine", "Node", "Frame"], int]
+ExpressionHandler = Callable[["Machine", "Node", "Frame"], Value]
+STATEMENTS: dict[str, StatementHandler] = {}
+EXPRESSIONS: dict[str, ExpressionHandler] = {}
+
+
+class BudgetExceeded(Exception):
+    """The program is too much for the counted steps."""
+
+
+def statement(*kinds: str) -> Callable[[StatementHandler], StatementHandler]:
+    def register(handler: StatementHandler) -> StatementHandler:
+        STATEMENTS.update(dict.fromkeys(kinds, handler))
+        return handler
+
+    return register
+
+
+def expression(*kinds: str) -> Callable[[ExpressionHandler], ExpressionHandler]:
+    def register(handler: ExpressionHandler) -> ExpressionHandler:
+        EXPRESSIONS.update(dict.fromkeys(kinds, handler))
+        return handler
+
+    return register
+
+
+@dataclass(eq=False)
+class Loop:
+    """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start``."""
+
+    mark: int
+    start: int
+    breaks: list[Changes] = field(default_factory=list)
+    continues: list[Changes] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class Frame:
+    """A call that runs. ``path`` tells apart what is made at one place through different calls."""
+
+    file: FileIndex
+    scope: Scope
+    function: Function | None = None
+    this: Obj | None = None
+    bindings: Mapping[str, Type] = field(default_factory=dict)
+    outer: Frame | None = None  # of a lambda: where its captures live
+    path: tuple[object, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+    types: dict[str, str] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
+    returned: Value = BOTTOM
+    exits: list[Changes] = field(default_factory=list)
+    mark: int = 0
+    loops: list[Loop] = field(default_factory=list)
+    depth: int = 0
+
+    def owner_of(self, name: str) -> Frame | None:
+        """The frame whose variable ``name`` is."""
+        frame: Frame | None = self
+        while frame is not None:
+            if name in frame.names:
+                return frame
+            frame = frame.outer
+        return None
+
+
+@dataclass
+class Settings:
+    """``parameters``: what the launch file sets; ``None`` when there is no launch."""
+
+    parameters: Mapping[str, object] | None = None
+
+
+class Machine:
+    def __init__(self, names: Names, settings: Settings | None = None):
+        self.names = names
+        self.settings = settings or Settings()
+        self.store = Store()
+        self.nodes: dict[NodeRecord, None] = {}
+        self.gaps: dict[tuple[SourceRef, str], None] = {}
+        self.objects: dict[object, Obj] = {}
+        self.records: dict[object, NodeRecord] = {}
+        self.callbacks: dict[object, tuple[Atom, Frame]] = {}
+        self.ran: dict[str, set[int]] = {}  # file -> first bytes of what was run
+        self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
+        self.called: set[Function] = set()
+        self.dead: dict[tuple[str, int, int], str] = {}
+        self.global_arguments: list[Value] = []
+        self.active: list[Function] = []
+        self.steps = 0
+        self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
+        self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
+        self.plugins_used: dict[str, None] = {}
+        self._relevant_names: frozenset[str] | None = None
+
+    # --- running ------------------------------------------------------------------------------------------
+
+    def evaluate(self, node: Node | None, frame: Frame) -> Value:
+        if node is None:
+            return BOTTOM
+        self.steps += 1
+        if self.steps > MAX_STEPS:
+            raise BudgetExceeded
+        handler = EXPRESSIONS.get(node.type)
+        if handler is None:
+            return unknown(f"the C++ {node.type.replace('_', ' ')}")
+        return handler(self, node, frame)
+
+    def execute(self, node: Node, frame: Frame) -> int:
+        self.steps += 1
+        if self.steps > MAX_STEPS:
+            raise BudgetExceeded
+        self.ran.setdefault(frame.file.file, set()).add(node.start_byte)
+        handler = STATEMENTS.get(node.type)
+        if handler is None:
+            self.evaluate(node, frame)
+            return NEXT
+        return handler(self, node, frame)
+
+    def branches(self, alternatives: Sequence[Callable[[], int]]) -> int:
+        """Run each alternative from the present state; continue with any that goes on."""
+        mark = self.store.mark()
+        outcome = 0
+        going: list[Changes] = []
+        for alternative in alternatives:
+            result = alternative()
+            outcome |= result
+            if result & NEXT:
+                going.append(self.store.changes(mark))
+            self.store.undo(mark)
+        if going:
+            self.store.merge(going)
+        return outcome
+
+    def settle(self, mark: int, alternatives: list[Changes], going: bool) -> None:
+        """Join what left early with the present state, if that is reached at all."""
+        if not alternatives:
+            return
+        every = [*alternatives, self.store.changes(mark)] if going else alternatives
+        self.store.undo(mark)
+        self.store.merge(every)
+
+    # --- variables ----------------------------------------------------------------------------------------
+
+    def local(self, frame: Frame, name: str, value: Value, written_type: str = "") -> None:
+        frame.names.add(name)
+        if written_type:
+            frame.types[name] = written_type
+        self.store.set((frame, name), value)
+
+    def type_of(self, written: str, frame: Frame) -> Type:
+        return self.names.resolve(written, frame.scope, frame.file, frame.bindings)
+
+    def obj(self, key: object, kind: Type, **values: object) -> Obj:
+        found = self.objects.get(key)
+        if found is None:
+            found = self.objects[key] = Obj(kind)
+            for name, value in values.items():
+                setattr(found, name, value)
+        return found
+
+    # --- what is found ------------------------------------------------------------------------------------
+
+    def place(self, node: Node, frame: Frame) -> SourceRef:
+        return SourceRef(frame.file.file, line_of(node))
+
+    def gap(self, node: Node, frame: Frame, why: str, record: NodeRecord | None = None) -> None:
+        source = self.place(node, frame)
+        if record is not None:
+            record.gap(source, why)
+        else:
+            self.gaps.setdefault((source, why))
+
+    def handle(self, node: Node, frame: Frame) -> None:
+        """This place has its result: an interface, a gap, or somebody who was followed."""
+        self.handled.setdefault(frame.file.file, set()).add(node.start_byte)
+
+    def kill(self, node: Node, frame: Frame, why: str) -> None:
+        self.dead[(frame.file.file, node.start_byte, node.end_byte)] = why
+
+    def conditions(self, node: Node, frame: Frame) -> tuple[Condition, ...]:
+        line = line_of(node)
+        here = [
+            (frame.file.file, opened, symbol)
+            for first, last, symbol, opened in frame.file.source.uncertain
+            if first <= line <= last
+        ]
+        return (*frame.conditions, *here) if here else frame.conditions
+
+    def endpoint(
+        self, record: NodeRecord, kind: EndpointKind, name: Value, type_name: str, node: Node, frame: Frame
+    ) -> None:
+        source = self.place(node, frame)
+        conditions = self.conditions(node, frame)
+        for atom in concatenated(name or unknown("a name that is never set")):
+            parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
+            own = Text(parts)
+            record.endpoints.setdefault(FoundEndpoint(kind, own, type_name, source), []).append(conditions)
+
+    def later(self, atom: Atom, frame: Frame) -> None:
+        """A closure that somebody outside keeps: it may be called at any time."""
+        if isinstance(atom, Lambda | Bound):
+            key = (atom.node.id, atom.frame.path) if isinstance(atom, Lambda) else (atom.function, atom.this)
+            self.callbacks.setdefault(key, (atom, frame))
+
+    def made_objects(self) -> list[Obj]:
+        return list(self.objects.values())
+
+    def version(self) -> int:
+        """Grows with whatever is found."""
+        return sum(len(record.endpoints) + len(record.gaps) for record in self.nodes) + len(self.gaps)
+
+    # --- who matters --------------------------------------------------------------------------------------
+
+    def makes_interfaces(self, function: Function) -> bool:
+        """Whether ``function``, or anything whose name it mentions, may make an interface or a node."""
+        return bool(self._relevant() & (function.words | {function.name}))
+
+    def subtree_matters(self, node: Node) -> bool:
+        return bool(self._relevant() & frozenset(WORD.findall(text(node))))
+
+    def _relevant(self) -> frozenset[str]:
+        if self._relevant_names is None:
+            self._relevant_names = relevant_names(
+                f for i in self.names.files.values() for f in i.all_functions
+            )
+        return self._relevant_names
+
+    def new_node(self, node: Node, frame: Frame, key: object) -> NodeRecord:
+        record = self.records.get(key)
+        if record is None:
+            record = self.records[key] = NodeRecord(self.place(node, frame))
+            self.nodes[record] = None
+        return record
+
+
+WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def relevant_names(functions: Iterable[Function]) -> frozenset[str]:
+    """Words that make an interface or a node, and the names of all functions that lead to them."""
+    listed = [(function, function.words) for function in functions]
+    relevant = set(LIBRARY_WORDS) | {w for _, words in listed for w in words if CREATES.fullmatch(w)}
+    while True:
+        more = {
+            f.name
+            for f, words in listed
+            if f.name not in relevant and f.name not in _COMMON_NAMES and words & relevant
+        }
+        if not more:
+            return frozenset(relevant)
+        relevant |= more
+
+
+# Methods of containers and of everything: following them by name alone would make every function relevant.
+_COMMON_NAMES = frozenset(
+    {"get", "push_back", "insert", "find", "at", "size", "begin", "end", "main", "reset", "str", "operator()"}
+)
+LIBRARY_WORDS = frozenset({"pluginlib"})
+
+
+def template_arguments(node: Node | None) -> list[Node]:
+    """Those of ``f<A, B>`` and ``x.f<A>`` and ``a::f<A>``."""
+    while node is not None and node.type in ("field_expression", "qualified_identifier", "dependent_name"):
+        inner = node.child_by_field_name("field") or node.child_by_field_name("name")
+        node = inner if inner is not None else (node.named_children[0] if node.named_children else None)
+    listed = (
+        node.child_by_field_name("arguments")
+        if node is not None and node.type.startswith("template_")
+        else None
+    )
+    return [child for child in listed.named_children if child.type != "comment"] if listed is not None else []
+
+
+def is_reference(written: str) -> bool:
+    return written.rstrip().endswith(("&", "*"))
+
+
+__all__ = ["Frame", "Machine", "Scope", "join", "split_type"]

@@ -1,0 +1,260 @@
+"""Nodes of rclcpp and rclcpp_lifecycle: their constructors and what they say of themselves.
+
+Source: rclcpp/include/rclcpp/node.hpp, rclcpp_lifecycle/lifecycle_node.hpp, node_options.hpp (humble to rolling).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.findings import NodeRecord
+from nodl.infer.cpp.libraries import (
+    LIBRARY_CLASSES,
+    NODE_BASES,
+    Call,
+    library_class,
+    library_method,
+    node_method,
+)
+from nodl.infer.cpp.machine import Frame, Machine
+from nodl.infer.cpp.names import Type
+from nodl.infer.cpp.values import (
+    BOTTOM,
+    NodePart,
+    Obj,
+    Param,
+    Seq,
+    Text,
+    Value,
+    concatenated,
+    join,
+    literal,
+    truth,
+    unknown,
+)
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+OPTIONS = "rclcpp::NodeOptions"
+
+
+def become_node(
+    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame, *, lifecycle: bool
+) -> NodeRecord:
+    """``this`` is a node from now on: ``Node(name, options)`` or ``Node(name, namespace, options)``."""
+    record = run.new_node(node, frame, this)
+    if not record.created:
+        record.created = True
+        record.cls = this.cls
+        record.source = run.place(node, frame)
+        record.lifecycle = lifecycle
+        record.description = this.type.name
+    this.node, this.is_node = record, True
+    name = arguments[0] if arguments else BOTTOM
+    rest = arguments[1:]
+    record.names = join(record.names, name or unknown("a name that is not given"))
+    if rest and not _is_options(rest[0]):
+        record.namespaces = join(record.namespaces, rest[0])
+        rest = rest[1:]
+    for value in rest:
+        for atom in value:
+            if isinstance(atom, Obj) and atom.type.name == OPTIONS:
+                _read_options(run, record, atom, node, frame)
+    if lifecycle and len(rest) > 1 and truth(rest[1]) is False:
+        record.lifecycle = False
+    for condition in run.conditions(node, frame):
+        record.gap(record.source, f"this node is made only where the build says {condition[2]}")
+    return record
+
+
+def _is_options(value: Value) -> bool:
+    return any(isinstance(atom, Obj) and atom.type.name == OPTIONS for atom in value) or any(
+        not isinstance(atom, Text | Param | Obj) and "options" in str(getattr(atom, "why", "")).lower()
+        for atom in value
+    )
+
+
+def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, frame: Frame) -> None:
+    for atom in run.store.get((options, "arguments")) or BOTTOM:
+        if isinstance(atom, Seq) and not atom.open:
+            if atom.items not in record.arguments:
+                record.arguments.append(atom.items)
+        else:
+            record.gap(
+                run.place(node, frame), "remap rules given in code (NodeOptions.arguments) are not known"
+            )
+    if truth(run.store.get((options, "use_global_arguments")) or BOTTOM) is False:
+        record.use_global_arguments = False
+    statistics = run.store.get((options, "enable_topic_statistics"))
+    if statistics and truth(statistics) is not False:
+        record.gap(
+            run.place(node, frame), "topic statistics of the whole node: give them with each subscription"
+        )
+    for atom in run.store.get((options, "overrides")) or BOTTOM:
+        if isinstance(atom, Seq):
+            for item in atom.items:
+                _override(record, item)
+
+
+def _override(record: NodeRecord, item: Value) -> None:
+    for atom in item:
+        pair = atom.data.get("arguments", []) if isinstance(atom, Obj) else list(getattr(atom, "items", ()))
+        if len(pair) == 2:
+            for name in pair[0]:
+                if isinstance(name, Text) and all(isinstance(p, str) for p in name.parts):
+                    record.overrides["".join(str(p) for p in name.parts)] = pair[1]
+
+
+def _plain_node(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
+    become_node(run, this, arguments, node, frame, lifecycle=False)
+    return None
+
+
+def _lifecycle_node(
+    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
+) -> Value | None:
+    become_node(run, this, arguments, node, frame, lifecycle=True)
+    return None
+
+
+NODE_BASES["rclcpp::Node"] = LIBRARY_CLASSES["rclcpp::Node"] = _plain_node
+NODE_BASES["rclcpp_lifecycle::LifecycleNode"] = LIBRARY_CLASSES["rclcpp_lifecycle::LifecycleNode"] = (
+    _lifecycle_node
+)
+
+
+# --- what a node says of itself ---------------------------------------------------------------------------------
+
+
+def _self(run: Machine, call: Call) -> Value:
+    return (call.receiver,) if call.receiver is not None else BOTTOM
+
+
+for _name in (
+    "shared_from_this",
+    "weak_from_this",
+    "get_node_base_interface",
+    "get_node_topics_interface",
+    "get_node_services_interface",
+    "get_node_parameters_interface",
+    "get_node_timers_interface",
+    "get_node_graph_interface",
+    "get_node_clock_interface",
+    "get_node_logging_interface",
+    "get_node_waitables_interface",
+    "get_node_time_source_interface",
+    "get_node_type_descriptions_interface",
+):
+    node_method(_name)(_self)
+
+
+def _says(what: str) -> None:
+    def answer(run: Machine, call: Call) -> Value:
+        record = call.receiver.node if call.receiver is not None else None
+        return (Text((NodePart(record, what),)),) if record is not None else unknown("the name of a node")
+
+    node_method({"name": "get_name", "ns": "get_namespace", "fqn": "get_fully_qualified_name"}[what])(answer)
+
+
+for _what in ("name", "ns", "fqn"):
+    _says(_what)
+
+
+@node_method("get_effective_namespace", "get_sub_namespace")
+def _namespaces(run: Machine, call: Call) -> Value:
+    record = call.receiver.node if call.receiver is not None else None
+    return (Text((NodePart(record, "ns"),)),) if record is not None else unknown("a namespace")
+
+
+@node_method("create_sub_node")
+def _sub_node(run: Machine, call: Call) -> Value:
+    """Relative names of a sub-node stand below its sub-namespace."""
+    key = ("sub", call.frame.file.file, call.node.start_byte, call.frame.path)
+    made = run.obj(key, Type("rclcpp::Node"), heap=True)
+    if call.receiver is not None:
+        made.node, made.is_node = call.receiver.node, True
+        outer = call.receiver.data.get("prefix")
+        made.data["prefix"] = concatenated(outer, literal("/"), call.value(0)) if outer else call.value(0)
+    return (made,)
+
+
+def _nothing(run: Machine, call: Call) -> Value:
+    for value in call.values:
+        for atom in value:
+            run.later(atom, call.frame)
+    return unknown("a value that rclcpp gives")
+
+
+# Methods that make no interface: rclcpp/node.hpp, rclcpp_lifecycle/lifecycle_node.hpp. Callbacks are run.
+node_method(
+    "get_logger", "now", "get_clock", "create_wall_timer", "create_timer", "create_callback_group",
+    "for_each_callback_group",
+    "get_graph_event", "wait_for_graph_change", "count_publishers", "count_subscribers", "count_clients",
+    "count_services",
+    "get_publishers_info_by_topic", "get_subscriptions_info_by_topic", "get_topic_names_and_types", "get_node_names",
+    "get_service_names_and_types", "get_service_names_and_types_by_node", "get_node_options",
+    "add_on_set_parameters_callback",
+    "add_pre_set_parameters_callback", "add_post_set_parameters_callback", "remove_on_set_parameters_callback",
+    "remove_pre_set_parameters_callback", "remove_post_set_parameters_callback", "set_on_parameters_set_callback",
+    "get_clients_info_by_service", "get_servers_info_by_service", "assert_liveliness", "get_callback_groups",
+    "callback_group_in_node", "get_rcl_node_handle", "get_shared_rcl_node_handle", "get_context",
+    "get_default_callback_group",
+    "get_notify_guard_condition", "get_associated_with_executor_atomic", "resolve_topic_or_service_name",
+    "get_parameter_overrides", "list_parameters", "describe_parameter", "describe_parameters", "get_parameter_types",
+    "undeclare_parameter", "trigger_transition", "configure", "activate", "deactivate", "cleanup", "shutdown",
+    "get_current_state",
+    "get_available_states", "get_available_transitions", "get_transition_graph", "register_on_configure",
+    "register_on_activate", "register_on_deactivate", "register_on_cleanup", "register_on_shutdown",
+    "register_on_error",
+    "on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown", "on_error",
+    "get_fully_qualified_node_name",
+    "add_managed_entity", "add_timer_handle", "add_publisher_handle", "get_node_names_and_namespaces", "use_count",
+    "expired", "node_name", "get_state", "get_subnode_namespace", "get_subscription_names_and_types_by_node",
+)(_nothing)  # fmt: skip
+
+
+# --- options ------------------------------------------------------------------------------------------------------
+
+
+@library_class(OPTIONS)
+def _options(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
+    for atom in arguments[0] if arguments else BOTTOM:
+        if isinstance(atom, Obj) and atom.type.name == OPTIONS:
+            return (atom,)
+    return None
+
+
+def _setter(run: Machine, call: Call) -> Value:
+    """``options.arguments({...})`` and kin return the options."""
+    name = _called(call)
+    if call.receiver is None:
+        return BOTTOM
+    if not call.values:
+        return run.store.get((call.receiver, name)) or unknown(f"the {name} of node options")
+    if name == "append_parameter_override":
+        pair = (Seq((call.value(0), call.value(1))),)
+        before = run.store.get((call.receiver, "overrides")) or BOTTOM
+        items = [item for atom in before if isinstance(atom, Seq) for item in atom.items]
+        run.store.set((call.receiver, "overrides"), (Seq((*items, pair)),))
+    else:
+        key = "overrides" if name == "parameter_overrides" else name
+        run.store.set((call.receiver, key), call.value(0))
+    return (call.receiver,)
+
+
+def _called(call: Call) -> str:
+    from nodl.infer.cpp.syntax import text
+
+    function = call.node.child_by_field_name("function")
+    return text(function.child_by_field_name("field")) if function is not None else ""
+
+
+library_method(
+    OPTIONS, "arguments", "parameter_overrides", "append_parameter_override", "use_global_arguments", "context",
+    "enable_rosout", "use_intra_process_comms", "enable_topic_statistics", "start_parameter_services",
+    "start_parameter_event_publisher", "clock_type", "clock_qos", "use_clock_thread", "parameter_event_qos",
+    "rosout_qos",
+    "parameter_event_publisher_options", "allow_undeclared_parameters", "enable_logger_service",
+    "automatically_declare_parameters_from_overrides", "allocator", "get_rcl_node_options",
+)(_setter)  # fmt: skip

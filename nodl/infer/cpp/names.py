@@ -1,0 +1,414 @@
+"""The names of one program: which class, function, constant or type a text means where it stands. Pure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import NamedTuple, TypeVar
+
+from nodl.infer.cpp.declarations import Class, FileIndex, Function, Global, Scope
+
+_NOISE = re.compile(r"\b(?:const|volatile|typename|struct|class|static|constexpr|inline|mutable|enum)\b")
+_WRAPPERS = frozenset({
+    "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",
+    "std::reference_wrapper",
+    "std::atomic", "tl::optional", "boost::optional",
+})  # fmt: skip
+_POINTER_MEMBERS = frozenset({
+    "SharedPtr", "UniquePtr", "WeakPtr", "ConstSharedPtr", "ConstUniquePtr", "ConstWeakPtr", "Ptr", "ConstPtr",
+    "SharedPtrConst",
+})  # fmt: skip
+
+
+_INTERFACES = re.compile(r"/(?:msg|srv|action)/")
+# Header folders whose classes make no node of their own: rclcpp's family is modelled, others know nothing of ROS.
+KNOWN_HEADERS = frozenset({
+    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcl_interfaces", "rcutils",
+    "rmw", "rcpputils",
+    "pluginlib", "class_loader", "message_filters", "tf2_ros", "tf2", "tf2_geometry_msgs", "tf2_eigen",
+    "tf2_sensor_msgs", "tf2_kdl",
+    "image_transport", "diagnostic_updater", "bondcpp", "bond", "cv_bridge", "ament_index_cpp",
+    "realtime_tools", "urdf", "kdl",
+    "laser_geometry", "interactive_markers", "camera_info_manager", "image_geometry", "angles",
+    "rosidl_runtime_cpp", "kdl_parser",
+    "rosidl_runtime_c", "rosidl_typesupport_cpp", "rosidl_typesupport_introspection_cpp", "Eigen", "opencv2",
+    "boost", "pcl", "yaml-cpp", "nlohmann",
+    "sys", "linux", "netinet", "arpa", "gtest", "gmock", "benchmark", "ompl", "ceres", "pcl_conversions",
+    "urdf_parser", "suitesparse",
+    "filters", "resource_retriever", "tracetools", "tinyxml2", "behaviortree_cpp", "behaviortree_cpp_v3",
+    "nanoflann", "geographic_msgs", "GeographicLib",
+    "eigen3_cmake_module", "rsl", "fmt", "parameter_traits", "control_toolbox", "urdf_model", "sdf",
+    "lifecycle_msgs", "OGRE", "tbb", "xtensor",
+    "Magick++", "GraphicsMagick", "console_bridge", "ruckig", "octomap", "fcl", "grid_map_core",
+    "libstatistics_collector",
+})  # fmt: skip
+
+
+class Type(NamedTuple):
+    """``name`` qualified as far as known, without template arguments. ``pointer``: nothing is made by declaring one."""
+
+    name: str
+    arguments: tuple[Type, ...] = ()
+    pointer: bool = False
+
+    @property
+    def last(self) -> str:
+        return self.name.rpartition("::")[2]
+
+    def __str__(self) -> str:
+        inner = f"<{', '.join(map(str, self.arguments))}>" if self.arguments else ""
+        return self.name + inner
+
+
+NO_TYPE = Type("")
+
+
+@lru_cache(maxsize=8192)
+def split_type(written: str) -> tuple[str, tuple[str, ...], str, bool]:
+    """Name, template arguments, what follows them (``::SharedPtr``), whether it is a pointer."""
+    cleaned = _NOISE.sub(" ", written).strip()
+    pointer = cleaned.endswith("*") or cleaned.rstrip("&").rstrip().endswith("*")
+    cleaned = re.sub(r"\s+", " ", cleaned.rstrip("&* ")).strip().replace(" ::", "::").replace(":: ", "::")
+    start = cleaned.find("<")
+    if start < 0:
+        return cleaned.lstrip(":"), (), "", pointer
+    depth, arguments, last = 0, [], start + 1
+    for position in range(start, len(cleaned)):
+        character = cleaned[position]
+        depth += (character in "<(") - (character in ">)")
+        if (character == "," and depth == 1) or depth == 0:
+            arguments.append(cleaned[last:position].strip())
+            last = position + 1
+            if depth == 0:
+                return (
+                    cleaned[:start].strip().lstrip(":"),
+                    tuple(filter(None, arguments)),
+                    cleaned[last:],
+                    pointer,
+                )
+    return cleaned[:start].strip().lstrip(":"), (), "", pointer
+
+
+class Names:
+    """``files``: the sources and headers of the program. ``visible``: file -> every file that it includes."""
+
+    def __init__(self, files: Iterable[FileIndex]):
+        self.files = {index.file: index for index in files}
+        self._visible: dict[str, frozenset[str]] = {}
+        self._types: dict[tuple[str, Scope, str], Type] = {}
+        self.classes: dict[str, list[Class]] = {}
+        self.functions: dict[str, list[Function]] = {}
+        self.declared: dict[str, list[Function]] = {}
+        self.globals: dict[str, list[Global]] = {}
+        self.aliases: dict[str, list[tuple[FileIndex, str, str, Scope]]] = {}
+        self.enumerators: dict[str, str] = {}
+        self.depends: frozenset[str] = frozenset()  # what the packages of the program depend on
+        self.plugins: dict[str, str] = {}  # lookup name or class -> class
+        for index in self.files.values():
+            self._add(index)
+        self._attach()
+
+    def _add(self, index: FileIndex) -> None:
+        _extend(self.classes, index.classes)
+        _extend(self.functions, index.functions)
+        _extend(self.declared, index.declared)
+        _extend(self.globals, index.globals)
+        for qualified, (target, scope) in index.aliases.items():
+            last = qualified.rpartition("::")[2]
+            self.aliases.setdefault(last, []).append((index, qualified, target, scope))
+        self.enumerators.update(index.enumerators)
+
+    def _attach(self) -> None:
+        """Methods defined outside of their class."""
+        self.methods: dict[Class, dict[str, list[Function]]] = {}
+        for each in (c for found in self.classes.values() for c in found):
+            self.methods[each] = {name: [*found] for name, found in each.methods.items()}
+        for name in list(self.functions):
+            for function in self.functions[name]:
+                if function.owner:
+                    cls = self.find_class(
+                        function.owner,
+                        function.scope[: len(function.scope) - len(function.owner.split("::"))],
+                        function.file,
+                    )
+                    if cls is not None:
+                        self.methods[cls].setdefault(name, []).append(function)
+                        _complete(function, cls.declared.get(name, ()))
+                else:
+                    _complete(function, self.declared.get(name, ()))
+
+    def visible(self, file: str) -> frozenset[str]:
+        if file not in self._visible:
+            found = {file}
+            waiting = [file]
+            while waiting:
+                index = self.files.get(waiting.pop())
+                for name in index.source.includes if index else ():
+                    if name not in found:
+                        found.add(name)
+                        waiting.append(name)
+            self._visible[file] = frozenset(found)
+        return self._visible[file]
+
+    # --- classes and functions --------------------------------------------------------------------------
+
+    def find_class(self, name: str, scope: Scope, file: FileIndex) -> Class | None:
+        last = name.rpartition("::")[2]
+        listed = self.classes.get(last)
+        if not listed:
+            return None
+        for qualified in self._candidates(name, scope, file):
+            matches = [each for each in listed if each.qualified == qualified]
+            if matches:
+                return self._nearest(matches, file)
+        if "::" in name:
+            matches = [each for each in listed if each.qualified.endswith("::" + name)]
+            return matches[0] if len(matches) == 1 else None
+        return None
+
+    def _candidates(self, name: str, scope: Scope, file: FileIndex) -> Iterable[str]:
+        name = name.lstrip(":")
+        for length in range(len(scope), -1, -1):
+            yield "::".join((*scope[:length], name))
+        for each in sorted(self.visible(file.file)):
+            for used in self.files[each].using if each in self.files else ():
+                yield f"{used}::{name}"
+                for length in range(len(scope), 0, -1):
+                    yield "::".join((*scope[:length], used, name))
+
+    def _nearest(self, matches: list[Class], file: FileIndex) -> Class:
+        own = [each for each in matches if each.file.file == file.file]
+        seen = [each for each in matches if each.file.file in self.visible(file.file)]
+        return (own or seen or matches)[-1 if own else 0]
+
+    def find_functions(self, name: str, scope: Scope, file: FileIndex) -> list[Function]:
+        """Free functions, the nearest namespace first; those of the same file before others."""
+        listed = [each for each in self.functions.get(name.rpartition("::")[2], ()) if self._is_free(each)]
+        if not listed:
+            return []
+        target = self._alias_prefix(name, scope, file)
+        for qualified in self._candidates(target, scope, file):
+            matches = [each for each in listed if "::".join((*each.scope, each.name)) == qualified]
+            if matches:
+                own = [each for each in matches if each.file.file == file.file]
+                return own or matches
+        return []
+
+    def _is_free(self, function: Function) -> bool:
+        if not function.owner:
+            return True
+        outer = function.scope[: len(function.scope) - len(function.owner.split("::"))]
+        return self.find_class(function.owner, outer, function.file) is None
+
+    def _alias_prefix(self, name: str, scope: Scope, file: FileIndex) -> str:
+        first, separator, rest = name.partition("::")
+        if not separator:
+            return name
+        target = self.alias(first, scope, file)
+        return f"{target[0]}::{rest}" if target else name
+
+    def find_global(self, name: str, scope: Scope, file: FileIndex) -> Global | None:
+        listed = self.globals.get(name.rpartition("::")[2])
+        if not listed:
+            return None
+        target = self._alias_prefix(name, scope, file)
+        for qualified in self._candidates(target, scope, file):
+            matches = [each for each in listed if "::".join((*each.scope, each.name)) == qualified]
+            if matches:
+                with_value = [each for each in matches if each.value is not None] or matches
+                own = [each for each in with_value if each.file.file == file.file]
+                seen = [each for each in with_value if each.file.file in self.visible(file.file)]
+                return (own or seen or with_value)[0]
+        return None
+
+    def bases(self, cls: Class) -> list[tuple[str, Class | None]]:
+        """The bases as written, with the class where its source is in reach."""
+        found = []
+        for written in cls.bases:
+            kind = self.resolve(written, cls.scope, cls.file)
+            found.append((written, self.class_of(kind, cls.scope, cls.file)))
+        return found
+
+    def class_of(self, kind: Type, scope: Scope, file: FileIndex) -> Class | None:
+        return self.find_class(kind.name, scope, file)
+
+    def ancestry(self, cls: Class) -> list[Class]:
+        """The class and its bases, nearest first."""
+        order = [cls]
+        for _, base in self.bases(cls):
+            if base is not None and base is not cls:
+                order += (
+                    [each for each in self.ancestry(base) if each not in order] if len(order) < 40 else []
+                )
+        return order
+
+    def find_methods(self, cls: Class, name: str) -> list[Function]:
+        for each in self.ancestry(cls):
+            found = self.methods.get(each, {}).get(name)
+            if found:
+                return found
+        return []
+
+    def declarations(self, cls: Class, name: str) -> list[Function]:
+        return [d for each in self.ancestry(cls) for d in each.declared.get(name, ())]
+
+    def foreign_header(self, name: str, file: FileIndex) -> str:
+        """The header, of a ROS library that nobody has reviewed, that a class may come from; empty if there is none."""
+        found = ""
+        for each in sorted(self.visible(file.file)):
+            index = self.files.get(each)
+            for header in index.source.foreign if index is not None else ():
+                folder = header.partition("/")[0]
+                if "/" in header and self.is_foreign(folder, each) and not _INTERFACES.search(header):
+                    if name.partition("::")[0] == folder:
+                        return header
+                    found = found or ("" if "::" in name else header)
+        if not found and "::" in name and name.partition("::")[0] in self.depends:
+            return f"package {name.partition('::')[0]}"
+        if not found and re.search(r"(?:^|::)\w*Node$", name):
+            return "no header in reach defines it"
+        return found
+
+    def is_foreign(self, folder: str, file: str) -> bool:
+        """Whether a folder of headers belongs to a package that the sources depend on and nobody has reviewed."""
+        return folder not in KNOWN_HEADERS and (not self.depends or folder in self.depends)
+
+    def plugin(self, name: str) -> str | None:
+        """The class that pluginlib makes for a lookup name."""
+        return self.plugins.get(name)
+
+    def plugin_type(self, name: str) -> Type:
+        return Type(name.replace("/", "::"))
+
+    # --- types ------------------------------------------------------------------------------------------
+
+    def alias(self, name: str, scope: Scope, file: FileIndex) -> tuple[str, Scope, FileIndex] | None:
+        listed = self.aliases.get(name.rpartition("::")[2])
+        if not listed:
+            return None
+        for qualified in self._candidates(name, scope, file):
+            matches = [each for each in listed if each[1] == qualified]
+            if matches:
+                own = [each for each in matches if each[0] is file] or [
+                    each for each in matches if each[0].file in self.visible(file.file)
+                ]
+                index, _, target, inner = (own or matches)[-1 if own else 0]
+                return target, inner, index
+        return None
+
+    def resolve(
+        self,
+        written: str,
+        scope: Scope,
+        file: FileIndex,
+        bindings: Mapping[str, Type] | None = None,
+        depth: int = 0,
+    ) -> Type:
+        """The type that ``written`` means, aliases followed and template parameters filled in."""
+        key = (file.file, scope, written)
+        if not bindings and key in self._types:
+            return self._types[key]
+        found = self._resolve(written, scope, file, bindings or {}, depth)
+        if not bindings:
+            self._types[key] = found
+        return found
+
+    def _resolve(
+        self, written: str, scope: Scope, file: FileIndex, bindings: Mapping[str, Type], depth: int
+    ) -> Type:
+        name, given, rest, pointer = split_type(written)
+        if depth > 12:
+            return Type(name, (), pointer)
+        if rest.startswith("::"):
+            outer = self._resolve(f"{name}<{', '.join(given)}>", scope, file, bindings, depth + 1)
+            return self._member(outer, rest[2:], pointer, scope, file)
+        if name in bindings and not given:
+            return bindings[name]._replace(pointer=pointer or bindings[name].pointer)
+        first, separator, tail = name.partition("::")
+        if separator and first in bindings:
+            return self._member(bindings[first], tail, pointer, scope, file)
+        arguments = tuple(self.resolve(each, scope, file, bindings, depth + 1) for each in given)
+        if name in _WRAPPERS and arguments:
+            return arguments[0]._replace(pointer=True)
+        target = self.alias(name, scope, file)
+        if target is not None and target[0] != written:
+            inner = self.resolve(target[0], target[1], target[2], None, depth + 1)
+            if bindings and not given:
+                inner = self._resolve(target[0], target[1], target[2], bindings, depth + 1)
+            return inner._replace(pointer=pointer or inner.pointer, arguments=arguments or inner.arguments)
+        return self._qualified(name, arguments, pointer, scope, file, bindings, depth)
+
+    def _qualified(
+        self, name: str, arguments: tuple[Type, ...], pointer: bool, scope: Scope, file: FileIndex,
+        bindings: Mapping[str, Type], depth: int,
+    ) -> Type:  # fmt: skip
+        cls = self.find_class(name, scope, file)
+        if cls is not None:
+            return Type(cls.qualified, arguments, pointer)
+        head, separator, last = name.rpartition("::")
+        if separator and last in _POINTER_MEMBERS:
+            inner = self.resolve(head, scope, file, bindings, depth + 1)
+            return inner._replace(pointer=True)
+        if separator:
+            prefix = self.resolve(head, scope, file, bindings, depth + 1).name
+            if prefix != head:
+                return (
+                    self.resolve(f"{prefix}::{last}", scope, file, None, depth + 1)._replace(
+                        arguments=arguments, pointer=pointer
+                    )
+                    if depth < 6
+                    else Type(f"{prefix}::{last}", arguments, pointer)
+                )
+            if (found := self._used(head, scope, file)) is not None:
+                return Type(f"{found}::{last}", arguments, pointer)
+        return Type(name, arguments, pointer)
+
+    def _used(self, head: str, scope: Scope, file: FileIndex) -> str | None:
+        """``msg`` under ``using namespace std_msgs``."""
+        if head not in ("msg", "srv", "action"):
+            return None
+        used = [
+            u
+            for each in sorted(self.visible(file.file))
+            if each in self.files
+            for u in self.files[each].using
+        ]
+        packages = [u for u in used if u.endswith("_msgs") or u.endswith("_interfaces")]
+        return f"{packages[0]}::{head}" if len(packages) == 1 else None
+
+    def _member(self, outer: Type, rest: str, pointer: bool, scope: Scope, file: FileIndex) -> Type:
+        """A type named inside of another: ``Foo<T>::SharedPtr``, ``ActionT::Goal``."""
+        if rest in _POINTER_MEMBERS:
+            return outer._replace(pointer=True)
+        cls = self.find_class(outer.name, scope, file)
+        if cls is not None:
+            bound = dict(zip(cls.templates, outer.arguments, strict=False))
+            return self.resolve(rest, cls.scope, cls.file, bound)._replace(pointer=pointer)
+        return Type(f"{outer.name}::{rest}", (), pointer)
+
+
+Declared = TypeVar("Declared")
+
+
+def _extend(table: dict[str, list[Declared]], own: Mapping[str, list[Declared]]) -> None:
+    for name, found in own.items():
+        table.setdefault(name, []).extend(found)
+
+
+def _complete(function: Function, declared: Iterable[Function]) -> None:
+    """What only the declaration of a function says: default arguments, ``virtual``, ``override``."""
+    for each in declared:
+        if len(each.parameters) != len(function.parameters):
+            continue
+        function.virtual = function.virtual or each.virtual
+        for own, other in zip(function.parameters, each.parameters, strict=False):
+            own.default = own.default or other.default
+
+
+def ros_type(kind: Type) -> str:
+    """``std_msgs::msg::String`` as ``std_msgs/msg/String``; empty for what is not an interface type."""
+    steps = kind.name.split("::")
+    if len(steps) == 3 and steps[1] in ("msg", "srv", "action") and steps[2]:
+        return "/".join(steps)
+    return ""

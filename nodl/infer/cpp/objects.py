@@ -1,0 +1,565 @@
+"""Objects: how declarations and constructors make them, what a container holds, who is a node.
+
+The constructor of a class runs its bases, its members in the order of their declaration and its body, as C++ does.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.declarations import Class, Function, Parameter
+from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
+from nodl.infer.cpp.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.names import KNOWN_HEADERS, NO_TYPE, Type
+from nodl.infer.cpp.syntax import children, line_of, text
+from nodl.infer.cpp.values import (
+    BOTTOM,
+    Bound,
+    Group,
+    Lambda,
+    Map,
+    Obj,
+    Param,
+    Seq,
+    Text,
+    Unknown,
+    Value,
+    as_parts,
+    join,
+    literal,
+    unknown,
+)
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+_SEQUENCES = frozenset({
+    "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
+    "vector", "std::multiset", "std::queue", "std::stack",
+})  # fmt: skip
+_MAPS = frozenset({"std::map", "std::unordered_map", "std::multimap", "map"})
+_TEXTS = frozenset(
+    {
+        "std::string",
+        "string",
+        "std::string_view",
+        "std::stringstream",
+        "std::ostringstream",
+        "std::filesystem::path",
+    }
+)
+_SCALARS = frozenset({
+    "bool", "int", "float", "double", "char", "size_t", "std::size_t", "unsigned", "long", "short", "auto",
+    "uint8_t", "uint16_t", "uint32_t", "uint64_t", "int8_t", "int16_t", "int32_t", "int64_t", "unsigned int",
+    "std::atomic_bool", "std::chrono::milliseconds", "std::chrono::seconds",
+})  # fmt: skip
+
+
+def declared_value(
+    run: Machine, node: Node, written: str, value: Node | None, pointer: bool, frame: Frame
+) -> Value:
+    """What ``T x``, ``T x = v``, ``T x(v)``, ``T x{v}`` makes."""
+    kind = run.type_of(written, frame)
+    if value is None:
+        return BOTTOM if pointer or kind.pointer else default_value(run, node, kind, frame)
+    if pointer or kind.pointer or _is_auto(written) or kind.name in _SCALARS:
+        return initial_value(run, value, frame, pointer or (_is_auto(written) and "&" in written))
+    if value.type not in ("argument_list", "initializer_list"):
+        found = copied(run, run.evaluate(value, frame), node, frame)
+        return converted(run, kind, found, node, frame)
+    return made(run, node, kind, children(value), frame)
+
+
+def _is_auto(written: str) -> bool:
+    return "auto" in written.split() or written.startswith("decltype")
+
+
+def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = False) -> Value:
+    if value.type in ("argument_list", "initializer_list"):
+        inner = children(value)
+        if len(inner) == 1:
+            return run.evaluate(inner[0], frame)
+        return BOTTOM if not inner else run.evaluate(value, frame)
+    found = run.evaluate(value, frame)
+    return found if reference else copied(run, found, value, frame)
+
+
+def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
+    """``Foo x = y``: the object itself, or a Foo made of y."""
+    cls = run.names.class_of(kind, frame.scope, frame.file)
+    if cls is None or any(isinstance(atom, Obj) for atom in value):
+        return value
+    if any(isinstance(atom, Seq | Group) for atom in value) or not run.names.find_methods(cls, cls.name):
+        return value
+    return construct(run, kind, [value], node, frame)
+
+
+def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
+    """An object of ``kind`` from arguments in parentheses or braces."""
+    cls = run.names.class_of(kind, frame.scope, frame.file)
+    if cls is None and kind.name in _SEQUENCES:
+        items = [run.evaluate(each, frame) for each in given]
+        if (
+            len(given) == 1
+            and given[0].type != "initializer_list"
+            and any(isinstance(a, Seq) for a in items[0])
+        ):
+            return items[0]
+        if (
+            node.type == "declaration"
+            and any(
+                c.type == "init_declarator" and text(c).rstrip().endswith(")") for c in node.named_children
+            )
+            and len(given) == 2
+        ):
+            return (Seq((items[1],), open=True),)
+        return (Seq(tuple(items)),)
+    if cls is None and kind.name in _MAPS:
+        return as_map([run.evaluate(each, frame) for each in given])
+    if cls is None and (kind.name in _TEXTS or kind.name in _SCALARS):
+        return run.evaluate(given[0], frame) if given else default_value(run, node, kind, frame)
+    if cls is not None and is_aggregate(run, cls) and given:
+        return _aggregate(run, node, kind, cls, given, frame)
+    return construct(run, kind, [run.evaluate(each, frame) for each in given], node, frame)
+
+
+def as_map(items: Sequence[Value]) -> Value:
+    entries = []
+    for value in items:
+        for atom in value:
+            if isinstance(atom, Group | Seq) and len(atom.items) == 2:
+                entries.append((atom.items[0], atom.items[1]))
+            elif isinstance(atom, Map):
+                return value
+            else:
+                return unknown("entries of a map")
+    return (Map(tuple(entries)),)
+
+
+def is_aggregate(run: Machine, cls: Class) -> bool:
+    return not run.names.find_methods(cls, cls.name) and cls.name not in cls.declared
+
+
+def _aggregate(
+    run: Machine, node: Node, kind: Type, cls: Class, given: Sequence[Node], frame: Frame
+) -> Value:
+    (made_object,) = construct(run, kind, [], node, frame)
+    names = [f.name for f in cls.fields.values() if not f.static]
+    for position, item in enumerate(given):
+        name, value = names[position] if position < len(names) else "", item
+        if item.type == "initializer_pair":
+            designator = item.child_by_field_name("designator")
+            name, value = text(designator).lstrip("."), item.child_by_field_name("value") or item
+        if name:
+            member = cls.fields.get(name)
+            inner = (
+                run.type_of(member.type, _class_frame(run, made_object, cls, frame)) if member else NO_TYPE
+            )
+            given_value = (
+                made(run, value, inner, children(value), frame)
+                if value.type == "initializer_list" and inner.name
+                else run.evaluate(value, frame)
+            )
+            run.store.set((made_object, name), given_value)
+    return (made_object,)
+
+
+def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
+    """What a declaration without initial value holds."""
+    if kind.name in _TEXTS:
+        return literal("")
+    if kind.name in _SEQUENCES:
+        return (Seq(()),)
+    if kind.name in _MAPS:
+        return (Map(()),)
+    if kind.name in _SCALARS or not kind.name:
+        return unknown("a value that is not set")
+    if kind.name in ("std::function", "std::pair", "std::tuple", "std::mutex"):
+        return BOTTOM
+    return construct(run, kind, [], node, frame)
+
+
+# --- constructors ---------------------------------------------------------------------------------------------
+
+
+def construct(
+    run: Machine, kind: Type, arguments: Sequence[Value], node: Node, frame: Frame, *, heap: bool = False
+) -> Value:
+    """An object of ``kind``: by its source, by the table of libraries, or one of which nothing is known."""
+    cls = run.names.class_of(kind, frame.scope, frame.file)
+    key = ("object", frame.file.file, node.start_byte, node.end_byte, frame.path, kind)
+    made_object = run.obj(key, kind, cls=cls, heap=heap)
+    run.handle(node, frame)
+    if cls is not None:
+        _start_fields(run, made_object, cls)
+        construct_class(run, made_object, cls, kind, arguments, node, frame)
+        return (made_object,)
+    model = LIBRARY_CLASSES.get(kind.name)
+    if model is not None:
+        found = model(run, made_object, list(arguments), node, frame)
+        return (made_object,) if found is None else found
+    if not is_harmless_class(kind.name):
+        handed_over(run, f"the constructor of {kind.name}", arguments, node, frame)
+        _unmodelled(run, kind, node, frame)
+    made_object.data["arguments"] = list(arguments)
+    return (made_object,)
+
+
+def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame) -> None:
+    """A class of a ROS library that is neither in reach nor in the table may make a node of its own."""
+    if kind.name.partition("::")[0] in KNOWN_HEADERS:
+        return
+    header = run.names.foreign_header(kind.name, frame.file)
+    if header:
+        run.gap(
+            node, frame, f"the class {kind.name} is not in reach ({header}): it may be a node or make one"
+        )
+
+
+def _start_fields(run: Machine, made_object: Obj, cls: Class) -> None:
+    for each in run.names.ancestry(cls):
+        for name, member in each.fields.items():
+            if not member.static:
+                run.store.set((made_object, name), BOTTOM)
+
+
+def construct_class(
+    run: Machine, this: Obj, cls: Class, kind: Type, arguments: Sequence[Value], node: Node, frame: Frame
+) -> None:
+    """Run the constructor of ``cls`` (a base or the class itself) on ``this``."""
+    bindings = dict(zip(cls.templates, kind.arguments, strict=False))
+    this.bindings[cls] = bindings
+    constructor = chosen(
+        run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
+    )
+    inner = _class_frame(run, this, cls, frame)
+    if constructor is not None:
+        if run.active.count(constructor) > MAX_RECURSION or frame.depth > MAX_DEPTH:
+            run.gap(node, frame, f"the constructor of {cls.name} calls itself")
+            return
+        inner.function, inner.file, inner.scope = constructor, constructor.file, constructor.scope
+        run.called.add(constructor)
+        run.active.append(constructor)
+    inner.depth = frame.depth + 1
+    inner.path = (*frame.path[-24:], (frame.file.file, node.start_byte))
+    inner.conditions = run.conditions(node, frame)
+    inner.mark = run.store.mark()
+    if constructor is not None:
+        bind_parameters(run, constructor, arguments, inner)
+    written = list(constructor.initialisers) if constructor else []
+    given = {_member_name(name): value for name, value in written}
+    delegate = next((value for name, value in written if _is_delegate(run, cls, name, inner)), None)
+    if delegate is not None:
+        values = [run.evaluate(each, inner) for each in children(delegate)]
+        construct_class(run, this, cls, kind, values, delegate, inner)
+    else:
+        _bases(run, this, cls, given, arguments, node, inner)
+        _members(run, this, cls, given, node, inner)
+    if constructor is not None and constructor.body is not None:
+        outcome = run.execute(constructor.body, inner)
+        run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+    if constructor is not None:
+        run.active.pop()
+    elif arguments and cls.name in cls.declared:
+        handed_over(
+            run, f"the constructor of {cls.name}, whose source is not in reach", arguments, node, frame
+        )
+        run.gap(node, frame, f"the source of the constructor of {cls.name} is not in reach")
+
+
+def _is_delegate(run: Machine, cls: Class, written: str, inner: Frame) -> bool:
+    """Whether an initialiser names the class itself, not a base or member of the same last name."""
+    plain = written.partition("<")[0]
+    if plain.rpartition("::")[2] != cls.name or cls.name in cls.fields:
+        return False
+    same = [base for base in cls.bases if _member_name(base) == cls.name]
+    return not same or ("::" in plain and not any(base.partition("<")[0].endswith(plain) for base in same))
+
+
+def _class_frame(run: Machine, this: Obj, cls: Class, frame: Frame) -> Frame:
+    return Frame(cls.file, cls.scope, None, this, this.bindings.get(cls, {}), path=frame.path)
+
+
+def _member_name(name: str) -> str:
+    return name.partition("<")[0].rpartition("::")[2]
+
+
+def _bases(
+    run: Machine,
+    this: Obj,
+    cls: Class,
+    given: dict[str, Node],
+    arguments: Sequence[Value],
+    node: Node,
+    inner: Frame,
+) -> None:
+    for written in cls.bases:
+        kind = run.names.resolve(written, cls.scope, cls.file, this.bindings.get(cls))
+        name = _member_name(written)
+        where = given.get(name) or given.get(kind.last) or _alias_initialiser(run, cls, kind, given, inner)
+        if where is not None:
+            run.handle(where, inner)
+            values = [run.evaluate(each, inner) for each in children(where)]
+        else:
+            values = list(arguments) if cls.inherits_constructors else []
+        base = run.names.class_of(kind, cls.scope, cls.file)
+        if base is not None and base is not cls:
+            construct_class(run, this, base, kind, values, where or node, inner)
+        else:
+            foreign_base(
+                run,
+                this,
+                cls,
+                kind,
+                values,
+                where or node,
+                inner if where is not None else Frame(cls.file, cls.scope, path=inner.path),
+            )
+
+
+def _alias_initialiser(
+    run: Machine, cls: Class, kind: Type, given: dict[str, Node], inner: Frame
+) -> Node | None:
+    for name, where in given.items():
+        if name not in cls.fields and run.type_of(name, inner).name == kind.name:
+            return where
+    return None
+
+
+def foreign_base(
+    run: Machine, this: Obj, cls: Class, kind: Type, values: Sequence[Value], node: Node, frame: Frame
+) -> None:
+    """A base whose source is not in reach: of a node, of a library that is known, or a gap."""
+    this.foreign_base = kind.name
+    model = NODE_BASES.get(kind.name) or LIBRARY_CLASSES.get(kind.name)
+    if model is not None:
+        model(run, this, list(values), node, frame)
+    elif not is_harmless_class(kind.name):
+        place = frame if frame.file is not cls.file else Frame(cls.file, cls.scope)
+        run.gap(
+            node if frame.file is not cls.file else cls.node,
+            place,
+            f"the base class {kind} of {cls.name} is not known: it may be a node or make interfaces",
+            this.node,
+        )
+        handed_over(run, f"the constructor of {kind}", values, node, frame, ignore=this)
+
+
+def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: Node, inner: Frame) -> None:
+    for name, member in cls.fields.items():
+        if member.static:
+            continue
+        where = given.get(name)
+        frame = (
+            inner
+            if where is not None
+            else Frame(
+                cls.file,
+                cls.scope,
+                None,
+                this,
+                inner.bindings,
+                path=inner.path,
+                conditions=inner.conditions,
+                depth=inner.depth,
+            )
+        )
+        value = where if where is not None else member.default
+        if value is not None:
+            run.handle(value, frame)
+        at = value if value is not None else member.node
+        kind = run.names.resolve(member.type, cls.scope, cls.file, this.bindings.get(cls))
+        pointer = member.pointer or kind.pointer
+        if value is not None and not pointer and value.type in ("argument_list", "initializer_list"):
+            found = made(run, at, kind, children(value), frame)
+        elif value is not None and (pointer or member.type == "auto"):
+            found = initial_value(run, value, frame, True)
+        elif value is not None:
+            found = converted(run, kind, run.evaluate(value, frame), at, frame)
+        elif pointer:
+            found = BOTTOM
+        else:
+            keyed = Frame(
+                cls.file,
+                cls.scope,
+                None,
+                this,
+                inner.bindings,
+                path=(*inner.path, name),
+                depth=inner.depth,
+                conditions=inner.conditions,
+            )
+            found = default_value(run, member.node, kind, keyed)
+        run.store.set((this, name), found)
+
+
+def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:
+    """The overload that takes so many arguments; of several, the one whose parameters look like them."""
+    fitting = [each for each in functions if _takes(each, len(arguments))]
+    if len(fitting) <= 1:
+        return fitting[0] if fitting else (functions[0] if len(functions) == 1 else None)
+    return max(fitting, key=lambda each: sum(map(_likeness, each.parameters, arguments)))
+
+
+def _takes(function: Function, count: int) -> bool:
+    required = sum(1 for p in function.parameters if p.default is None and "..." not in p.type)
+    return function.variadic or required <= count <= len(function.parameters)
+
+
+def _likeness(parameter: Parameter, value: Value) -> int:
+    """How well an argument fits a parameter, by their looks."""
+    atom = value[0] if value else None
+    kind = parameter.type
+    is_text = "string" in kind or "char" in kind
+    is_generic = (
+        re.fullmatch(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?", kind) is not None and "Descriptor" not in kind
+    )
+    if isinstance(atom, Text):
+        return 3 if is_text else (1 if is_generic else -3)
+    if isinstance(atom, Obj):
+        names = {atom.type.last, *(c.name for c in atom.bindings)}
+        if atom.node is not None and ("Node" in kind or "node" in kind):
+            return 3
+        return (
+            3 if any(name and name in kind for name in names) else (1 if is_generic else -3 if is_text else 0)
+        )
+    if isinstance(atom, bool):
+        return 3 if "bool" in kind else (1 if is_generic else -2)
+    if isinstance(atom, int | float):
+        return 2 if re.search(r"int|double|float|size_t|long", kind) else (1 if is_generic else -2)
+    if isinstance(atom, Lambda | Bound):
+        return 2 if "function" in kind or "allback" in kind else (1 if is_generic else -2)
+    if isinstance(atom, Seq | Map):
+        return 2 if re.search(r"vector|array|list|map|set", kind) else (1 if is_generic else -2)
+    return 0
+
+
+def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value], inner: Frame) -> None:
+    inner.function = function
+    for index, parameter in enumerate(function.parameters):
+        if index < len(arguments):
+            value = arguments[index]
+            if not parameter.type.rstrip().endswith(("&", "*")):
+                value = copied(run, value, function.node, inner)
+        else:
+            value = unknown(f"the argument {parameter.name}")
+            if parameter.default is not None:
+                place = Frame(
+                    function.file, function.scope, None, inner.this, inner.bindings, path=inner.path
+                )
+                value = run.evaluate(parameter.default, place)
+        if parameter.name:
+            run.local(inner, parameter.name, value, parameter.type)
+
+
+# --- nodes ----------------------------------------------------------------------------------------------------
+
+
+def nodes_in(run: Machine, value: Value) -> list[Obj]:
+    """The nodes (or interfaces of nodes) that ``value`` may be or hold in plain containers."""
+    found: list[Obj] = []
+    for atom in value:
+        if isinstance(atom, Obj) and atom.node is not None:
+            found.append(atom)
+        elif isinstance(atom, Seq | Group):
+            found += [obj for item in atom.items for obj in nodes_in(run, item)]
+    return found
+
+
+def handed_over(
+    run: Machine,
+    whom: str,
+    arguments: Sequence[Value],
+    node: Node,
+    frame: Frame,
+    *,
+    ignore: Obj | None = None,
+) -> None:
+    """Somebody who is not known gets these values: a node among them is a gap, closures may be called at any time."""
+    for value in arguments:
+        for obj in nodes_in(run, value):
+            if obj is not ignore and obj.node is not None:
+                run.gap(
+                    node, frame, f"the node is handed to {whom}, which may make interfaces on it", obj.node
+                )
+                break
+        for atom in value:
+            run.later(atom, frame)
+
+
+def copied(run: Machine, value: Value, node: Node, frame: Frame) -> Value:
+    """Structures are copied by value; nodes, pointers and all else stay who they are."""
+    if not any(
+        isinstance(atom, Obj) and not atom.heap and atom.cls is not None and atom.node is None
+        for atom in value
+    ):
+        return value
+    return tuple(_copy(run, atom, node, frame) for atom in value)
+
+
+def _copy(run: Machine, atom: object, node: Node, frame: Frame) -> object:
+    if not isinstance(atom, Obj) or atom.heap or atom.cls is None or atom.node is not None:
+        return atom
+    names = [name for each in run.names.ancestry(atom.cls) for name in each.fields]
+    values = {name: run.store.get((atom, name)) for name in names}
+    if any(nodes_in(run, value or BOTTOM) for value in values.values()):
+        return atom
+    key = ("copy", atom, frame.file.file, node.start_byte, frame.path)
+    twin = run.obj(key, atom.type, cls=atom.cls, bindings=atom.bindings, foreign_base=atom.foreign_base)
+    for name, value in values.items():
+        if value is not None:
+            run.store.set((twin, name), value)
+    return twin
+
+
+def iterated(run: Machine, subject: Value, node: Node, frame: Frame) -> tuple[list[Value], bool]:
+    """What a loop over ``subject`` goes through; whether that is exactly known."""
+    if len(subject) == 1:
+        items, exact = items_of(run, subject[0])
+        return items, exact
+    found: list[Value] = []
+    for atom in subject:
+        found += items_of(run, atom)[0]
+    return found or [unknown("an element of something that is not known")], False
+
+
+def items_of(run: Machine, atom: object) -> tuple[list[Value], bool]:
+    if isinstance(atom, Seq):
+        return list(atom.items), not atom.open
+    if isinstance(atom, Map):
+        return [(Group(entry),) for entry in atom.entries], not atom.open
+    if isinstance(atom, Group):
+        return list(atom.items), True
+    if isinstance(atom, Param):
+        return parameter_items(run, atom)
+    why = atom.why if isinstance(atom, Unknown) else "an element of something that is not known"
+    return [unknown(why)], False
+
+
+def parameter_items(run: Machine, atom: Param) -> tuple[list[Value], bool]:
+    """The elements of a list that a parameter gives: those of the launch file, else of its default."""
+    given = run.settings.parameters
+    if given is not None and isinstance(given.get(atom.name), list | tuple):
+        listed = given[atom.name]
+        run.consulted[atom.name] = listed
+        values = listed if isinstance(listed, list | tuple) else []
+        return [
+            (Param(atom.record, atom.name, index, literal(str(each))),) for index, each in enumerate(values)
+        ], True
+    default = tuple(each for each in atom.default if isinstance(each, Seq) and not each.open)
+    if default and len(default) == len(atom.default):
+        if given is None:
+            run.from_default[atom.name] = None
+        run.consulted.setdefault(atom.name, None)
+        longest = max(default, key=lambda each: len(each.items))
+        if len(default) == 1:
+            return [
+                (Param(atom.record, atom.name, index, item),) for index, item in enumerate(longest.items)
+            ], True
+        return [item for each in default for item in each.items], False
+    return [unknown(f"an element of parameter {atom.name}")], False
+
+
+__all__ = ["as_parts", "join", "line_of"]

@@ -1,0 +1,269 @@
+"""What the preprocessor leaves of a C++ file, line by line: the half of it that decides interfaces.
+
+Macros that the sources in reach define are expanded, conditionals over known symbols are decided. What depends on a
+symbol that is not known keeps its directives; those lines are remembered as ``uncertain``. Pure, but for the
+``include`` that is handed in.
+"""
+
+from __future__ import annotations
+
+import itertools
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from nodl.infer.cpp.macros import Macro, decided, expanded
+
+Include = Callable[
+    [str, bool], "Preprocessed | None"
+]  # name as written, in quotes -> the file, None if not in reach
+
+_TOKENS = re.compile(
+    r'R"(?P<d>[^\s()\\]{0,16})\((?:.|\n)*?\)(?P=d)"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|//[^\n]*|/\*(?:.|\n)*?\*/'
+)
+_DIRECTIVE = re.compile(r"\s*#\s*(\w+)\s*(.*)")
+_DEFINE = re.compile(r"(\w+)(\(([^)]*)\))?\s*(.*)", re.DOTALL)
+_INCLUDE = re.compile(r'([<"])([^>"]+)[>"]')
+_EXPORT = re.compile(
+    r"\b[A-Z][A-Z0-9_]*_(?:PUBLIC|EXPORT|API|LOCAL|DLL|IMPORT|PUBLIC_TYPE|VISIBILITY|DECL|SYMBOL)\b(?!\s*\()"
+)
+_BEFORE_CLASS_NAME = re.compile(
+    r"\b(class|struct)(\s+)([A-Za-z_]\w*)(\s*\([^()]*\))?(?=\s+[A-Za-z_]\w*(?:\s*::\s*\w+)*\s*(?:final\s*)?[:{<])"
+)
+_DISAMBIGUATOR = re.compile(
+    r"(?<=->)\s*template\b|(?<=\.)\s*template\b|(?<=::)\s*template\b|\btypename\b(?=\s+[\w:]+::)"
+)
+_BARE_MACRO = re.compile(r"[ \t]*([A-Z][A-Z0-9_]{2,})\s*(\([^()\n]*\))?[ \t]*;?[ \t]*\Z")
+_ATTRIBUTE = re.compile(
+    r"\[\[[^\[\]]*\]\]|__attribute__\s*\(\([^()]*(?:\([^()]*\))?[^()]*\)\)|\balignas\s*\([^()]*\)|\b__declspec\s*\([^()]*\)"
+)
+_HARMLESS_MACROS = re.compile(
+    r"(?:Q_|RCLCPP_|RCUTILS_|RCPPUTILS_|PLUGINLIB_|CLASS_LOADER_|EIGEN_|BOOST_|TEST|CERES_|CREATE_LOGGER|"
+    r"GENERATE_|COMPOSITION_|YAML_|TRACETOOLS_|TRACEPOINT|ROSIDL_|DIAGNOSTIC_|NOLINT|POINT_CLOUD_REGISTER|G2O_)"
+)  # fmt: skip
+
+
+# <cinttypes>: formats between string literals, which the grammar does not take for texts
+_STANDARD = {f"PRI{form}{size}": '""' for form in "diuxX" for size in ("8", "16", "32", "64", "PTR")}
+
+
+@dataclass
+class Preprocessed:
+    """``text`` has the lines of the file. ``uncertain``: first line, last line, condition and line of the ``#if``."""
+
+    file: str
+    text: str = ""
+    macros: dict[str, Macro] = field(default_factory=dict)
+    includes: list[str] = field(default_factory=list)  # files in reach
+    foreign: dict[str, int] = field(default_factory=dict)  # headers that are not, with their line
+    uncertain: list[tuple[int, int, str, int]] = field(default_factory=list)
+    unknown_macros: list[tuple[int, str]] = field(default_factory=list)
+    dead: list[tuple[int, int, str]] = field(default_factory=list)
+
+
+def preprocess(
+    file: str, source: str, symbols: Mapping[str, str], complete: bool, include: Include
+) -> Preprocessed:
+    """``symbols``: what the build defines; ``complete``: nothing else is defined on the command line."""
+    return _Pass(file, symbols, complete, include).run(source)
+
+
+@dataclass
+class _Conditional:
+    line: int
+    parent: bool
+    taken: bool  # a branch before was certainly taken
+    state: bool | None  # of this branch
+    written: bool  # the directives stay in the text
+    condition: str
+    start: int = 0
+
+
+class _Pass:
+    def __init__(self, file: str, symbols: Mapping[str, str], complete: bool, include: Include):
+        self.result = Preprocessed(file)
+        self.macros = {name: Macro(None, value) for name, value in {**_STANDARD, **symbols}.items()}
+        self.complete = complete
+        self.include = include
+        self.stack: list[_Conditional] = []
+        self.undecided: set[str] = set()
+
+    def run(self, source: str) -> Preprocessed:
+        lines = _without_comments(source).split("\n")
+        self.guard = _guard_of(lines)
+        out: list[str] = []
+        index = 0
+        while index < len(lines):
+            line, first = lines[index], index
+            if line.lstrip().startswith("#"):
+                while line.endswith("\\") and index + 1 < len(lines):
+                    index += 1
+                    line = line[:-1] + " " + lines[index]
+                out.append(self._directive(line, first + 1))
+                out.extend("" for _ in range(index - first))
+            else:
+                out.append(line if self._active() else "")
+            index += 1
+        self.result.text = self._tidied("\n".join(out))
+        self.result.macros = self.macros
+        return self.result
+
+    def _active(self) -> bool:
+        return not self.stack or (self.stack[-1].parent and self.stack[-1].state is not False)
+
+    def _directive(self, line: str, number: int) -> str:
+        match = _DIRECTIVE.match(line)
+        if match is None:
+            return ""
+        word, rest = match[1], match[2].strip()
+        if word in ("if", "ifdef", "ifndef"):
+            return self._open(word, rest, number, line)
+        if word in ("elif", "else", "endif"):
+            return self._next(word, rest, number, line) if self.stack else ""
+        if self._active():
+            if word == "define":
+                self._define(rest)
+            elif word == "undef":
+                self.macros.pop(rest, None)
+            elif word == "include":
+                self._include(rest, number)
+        return ""
+
+    def _open(self, word: str, rest: str, number: int, line: str) -> str:
+        parent = self._active()
+        condition = {"ifdef": f"defined({rest})", "ifndef": f"!defined({rest})"}.get(word, rest)
+        state: bool | None = False
+        if parent:
+            state = True if rest == self.guard else self._decide(condition)
+        written = parent and state is None
+        self.stack.append(_Conditional(number, parent, state is True, state, written, condition, number))
+        return f"#if {_symbol(condition)}" if written else ""
+
+    def _next(self, word: str, rest: str, number: int, line: str) -> str:
+        top = self.stack[-1]
+        self._close(top, number)
+        if word == "endif":
+            self.stack.pop()
+            return "#endif" if top.written else ""
+        top.start = number
+        before = top.state
+        if not top.parent or top.taken:
+            top.state = False
+        elif word == "else":
+            top.state = None if top.written else True
+            top.condition = f"else of {top.condition}"
+        else:
+            top.state = self._decide(rest)
+            top.condition = rest
+            if top.state is True and top.written:
+                top.taken, top.state = True, None
+            elif top.state is True:
+                top.taken = True
+        if not top.written:
+            if top.state is None and before is False:
+                top.written = True
+                return f"#if {_symbol(rest)}"
+            return ""
+        return "#else" if top.state is not False else ""
+
+    def _close(self, top: _Conditional, number: int) -> None:
+        if top.parent and top.state is None:
+            self.result.uncertain.append((top.start + 1, number - 1, top.condition, top.line))
+        elif top.parent and top.state is False:
+            self.result.dead.append((top.start + 1, number - 1, top.condition))
+
+    def _decide(self, condition: str) -> bool | None:
+        return decided(condition, self.macros, self.complete, self._has_include)
+
+    def _has_include(self, name: str) -> bool | None:
+        return True if self.include(name, False) is not None else None
+
+    def _define(self, rest: str) -> None:
+        match = _DEFINE.match(rest)
+        if match is None:
+            return
+        parameters = [part.strip() for part in match[3].split(",")] if match[2] else None
+        uncertain = any(each.state is None for each in self.stack)
+        self.macros[match[1]] = Macro(parameters, match[4].strip(), uncertain)
+
+    def _include(self, rest: str, number: int) -> None:
+        match = _INCLUDE.search(rest)
+        if match is None:
+            return
+        found = self.include(match[2], match[1] == '"')
+        if found is None:
+            self.result.foreign.setdefault(match[2], number)
+            return
+        self.result.includes.append(found.file)
+        for name, macro in found.macros.items():
+            self.macros.setdefault(name, macro)
+
+    def _tidied(self, source: str) -> str:
+        """Macros expanded; what only the compiler and linker read, such as export macros, blanked."""
+        source = expanded(source, {n: m for n, m in self.macros.items() if n != self.guard})
+        source = _EXPORT.sub(_blank, source)
+        source = _ATTRIBUTE.sub(_blank, source)
+        source = _DISAMBIGUATOR.sub(_blank, source)
+        source = _BEFORE_CLASS_NAME.sub(self._class_macro, source)
+        return self._bare_macros(source)
+
+    def _class_macro(self, match: re.Match[str]) -> str:
+        whole = match[0]
+        return match[1] + re.sub(r"[^\n]", " ", whole[len(match[1]) :])
+
+    def _bare_macros(self, source: str) -> str:
+        """A macro that stands alone on its line, as ``Q_OBJECT`` does, confuses the grammar."""
+        lines = source.split("\n")
+        before = ";"
+        for index, line in enumerate(lines):
+            match = _BARE_MACRO.match(line)
+            if (
+                match
+                and before in ";{}:#"
+                and not match[1].startswith(("PLUGINLIB_EXPORT", "RCLCPP_COMPONENTS_REG", "CLASS_LOADER_REG"))
+            ):
+                if not _HARMLESS_MACROS.match(match[1]) and not _follows(lines, index):
+                    self.result.unknown_macros.append((index + 1, match[1]))
+                if not line.rstrip().endswith(";"):
+                    lines[index] = ""
+            stripped = lines[index].strip()
+            if stripped:
+                before = "#" if stripped.startswith("#") else stripped[-1]
+        return "\n".join(lines)
+
+
+def _follows(lines: list[str], index: int) -> bool:
+    """Whether the next text goes on with the same declaration: then it was an attribute."""
+    for line in lines[index + 1 :]:
+        if line.strip():
+            return bool(re.match(r"\s*(?:[a-z_]\w*[\s:<*&]|~|[A-Z]\w*\s*\()", line))
+    return False
+
+
+def _blank(match: re.Match[str]) -> str:
+    return re.sub(r"[^\n]", " ", match[0])
+
+
+def _symbol(condition: str) -> str:
+    return re.sub(r"[^\w]", "_", condition)[:60] or "X"
+
+
+def _without_comments(source: str) -> str:
+    def kept(match: re.Match[str]) -> str:
+        found = match[0]
+        return re.sub(r"[^\n]", " ", found) if found.startswith(("//", "/*")) else found
+
+    return _TOKENS.sub(kept, source.replace("\r\n", "\n"))
+
+
+def _guard_of(lines: list[str]) -> str:
+    words = [line.split() for line in lines if line.lstrip().startswith("#")][:3]
+    for first, second in itertools.pairwise(words):
+        if (
+            first[0] == "#ifndef"
+            and second[0] == "#define"
+            and first[1:2] == second[1:2]
+            and len(second) == 2
+        ):
+            return first[1]
+    return ""

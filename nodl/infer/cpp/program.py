@@ -1,0 +1,371 @@
+"""Programs: one main or component with the sources that it is built from, run to its findings. Reads files."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import nodl.infer.cpp.calls
+import nodl.infer.cpp.models
+import nodl.infer.cpp.statements  # noqa: F401  (registers how statements run)
+from nodl.infer.cpp.cmake import Target
+from nodl.infer.cpp.declarations import Class, FileIndex, Function, index_file
+from nodl.infer.cpp.findings import NodeRecord
+from nodl.infer.cpp.ledger import CREATES, Answer, account
+from nodl.infer.cpp.machine import BudgetExceeded, Frame, Machine, Settings
+from nodl.infer.cpp.names import Names, Type
+from nodl.infer.cpp.objects import construct
+from nodl.infer.cpp.preprocess import Preprocessed, preprocess
+from nodl.infer.cpp.project import SourcePackage, Workspace, sources_of
+from nodl.infer.cpp.syntax import line_of
+from nodl.infer.cpp.values import BOTTOM, Bound, Lambda, Obj, Seq, Value, unknown
+from nodl.source_ref import SourceRef
+
+MAX_ROUNDS = 4
+MAX_FILE_SIZE = 2_000_000
+_REGISTERED = re.compile(
+    r"(?:RCLCPP_COMPONENTS_REGISTER_NODE|CLASS_LOADER_REGISTER_CLASS)\s*\(\s*([\w:<>, ]+?)\s*[,)]"
+)
+_EXPORTED = re.compile(r"PLUGINLIB_EXPORT_CLASS\s*\(\s*([\w:<>, ]+?)\s*,\s*([\w:<> ]+?)\s*\)")
+
+
+@dataclass
+class Findings:
+    """What one program makes. ``classes``: the node classes that it makes objects of."""
+
+    nodes: list[NodeRecord] = field(default_factory=list)
+    gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
+    answers: list[Answer] = field(default_factory=list)
+    classes: set[str] = field(default_factory=set)
+    files: tuple[str, ...] = ()
+    consulted: dict[str, object] = field(default_factory=dict)
+    from_default: tuple[str, ...] = ()
+
+
+class Sources:
+    """Files of one workspace, each preprocessed and indexed once for each set of definitions."""
+
+    def __init__(self, workspace: Workspace):
+        self.workspace = workspace
+        self._preprocessed: dict[tuple[str, str], Preprocessed | None] = {}
+        self._indexed: dict[tuple[str, str], FileIndex] = {}
+        self.unreadable: dict[str, str] = {}
+
+    def preprocessed(self, file: str, symbols: Mapping[str, str], complete: bool) -> Preprocessed | None:
+        key = (file, repr(sorted(symbols.items())) + str(complete))
+        if key not in self._preprocessed:
+            self._preprocessed[key] = None  # a file that includes itself
+            source = self._read(file)
+            if source is not None:
+
+                def include(name: str, quoted: bool) -> Preprocessed | None:
+                    found = self.workspace.header(name, file, quoted)
+                    return (
+                        self.preprocessed(found, symbols, complete)
+                        if found and not _is_modelled(name)
+                        else None
+                    )
+
+                self._preprocessed[key] = preprocess(file, source, symbols, complete, include)
+        return self._preprocessed[key]
+
+    def _read(self, file: str) -> str | None:
+        try:
+            if os.path.getsize(file) > MAX_FILE_SIZE:
+                self.unreadable[file] = "this file is over 2 MB and was not read"
+                return None
+            with open(file, encoding="utf-8", errors="replace") as stream:
+                return stream.read()
+        except OSError as error:
+            self.unreadable[file] = f"this file cannot be read: {error.strerror}"
+            return None
+
+    def index(self, file: str, symbols: Mapping[str, str], complete: bool) -> FileIndex | None:
+        key = (file, repr(sorted(symbols.items())) + str(complete))
+        if key not in self._indexed:
+            source = self.preprocessed(file, symbols, complete)
+            if source is None:
+                return None
+            self._indexed[key] = index_file(source)
+        return self._indexed[key]
+
+    def closure(self, files: Iterable[str], symbols: Mapping[str, str], complete: bool) -> list[FileIndex]:
+        """``files``, what they include, and the library sources of other packages that define what they include."""
+        found: dict[str, FileIndex] = {}
+        waiting = list(dict.fromkeys(files))
+        packages: set[str] = set()
+        own = self.workspace.package_of(waiting[0]) if waiting else None
+        while waiting:
+            file = waiting.pop(0)
+            if file in found:
+                continue
+            index = self.index(file, symbols, complete)
+            if index is None:
+                continue
+            found[file] = index
+            waiting += index.source.includes
+            package = self.workspace.package_of(file)
+            if package is not None and package is not own and package.name not in packages:
+                packages.add(package.name)
+                waiting += library_sources(package)
+        return list(found.values())
+
+
+def _is_modelled(name: str) -> bool:
+    """Headers of rclcpp and kin are known by their models, also where they are installed."""
+    return name.partition("/")[0] in _MODELLED or name.endswith((".h.inc",))
+
+
+_MODELLED = frozenset({
+    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcutils", "rmw", "rcpputils",
+    "pluginlib",
+    "class_loader", "message_filters", "tf2_ros", "tf2", "image_transport", "diagnostic_updater", "bondcpp", "bond",
+    "rosidl_runtime_cpp", "rosidl_typesupport_cpp", "cv_bridge", "ament_index_cpp", "realtime_tools",
+    "laser_geometry",
+    "interactive_markers", "camera_info_manager",
+})  # fmt: skip
+
+
+def library_sources(package: SourcePackage) -> list[str]:
+    libraries = [t for t in package.build.targets.values() if not t.executable]
+    return list(dict.fromkeys(file for target in libraries for file in target.sources))
+
+
+# --- running ----------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where a program starts: ``main`` of its files, or the constructor of a class."""
+
+    files: tuple[str, ...]
+    cls: str = ""
+    main: bool = True
+    symbols: tuple[tuple[str, str], ...] = ()
+    complete: bool = False
+    place: str = ""  # the package's folder, for what has no file
+
+
+def run_program(
+    sources: Sources, entry: Entry, settings: Settings | None = None, plugins: Iterable[str] = ()
+) -> Findings:
+    """Everything that the program may make. Raises ``CppSupportMissing``."""
+    symbols = dict(entry.symbols)
+    files = sources.closure([*entry.files, *plugins], symbols, entry.complete)
+    names = Names(files)
+    names.plugins = {key: found[0][0].type for key, found in sources.workspace.plugin_classes.items()}
+    missing = [name for name in _possible_plugins(sources, names) if name not in {i.file for i in files}]
+    if missing:
+        files = sources.closure([*entry.files, *plugins, *missing], symbols, entry.complete)
+        plugin_names = names.plugins
+        names = Names(files)
+        names.plugins = plugin_names
+    names.depends = frozenset().union(
+        *(p.depends for i in files if (p := sources.workspace.package_of(i.file)) is not None)
+    )
+    run = Machine(names, settings)
+    try:
+        _start(run, entry)
+        _callbacks(run)
+    except (BudgetExceeded, RecursionError):
+        run.gaps.setdefault(
+            (
+                SourceRef(entry.files[0] if entry.files else ""),
+                "this program is too large to be followed to its end",
+            )
+        )
+    return _findings(run, sources)
+
+
+def _possible_plugins(sources: Sources, names: Names) -> list[str]:
+    """Sources of plugins whose base class a loader of the program asks for."""
+    wanted: set[str] = set()
+    for index in names.files.values():
+        for match in re.finditer(r"ClassLoader\s*<\s*([\w:]+)\s*>", index.source.text):
+            wanted.add(match[1].rpartition("::")[2])
+    found: list[str] = []
+    for entries in sources.workspace.plugin_classes.values():
+        for each, package in entries:
+            if each.base.rpartition("::")[2] in wanted:
+                found += library_sources(package)
+    return list(dict.fromkeys(found))
+
+
+def _start(run: Machine, entry: Entry) -> None:
+    _globals(run, entry)
+    if entry.cls:
+        _construct_entry(run, entry)
+    if entry.main:
+        for file in entry.files:
+            for function in run.names.functions.get("main", ()):
+                if function.file.file == file:
+                    _run_main(run, function)
+
+
+def _globals(run: Machine, entry: Entry) -> None:
+    """Variables outside of functions are made before main."""
+    from nodl.infer.cpp.expressions import constant
+
+    for file in entry.files:
+        index = run.names.files.get(file)
+        for listed in list(index.globals.values()) if index is not None else []:
+            for each in listed:
+                kind = run.names.resolve(each.type, each.scope, each.file)
+                if run.names.class_of(kind, each.scope, each.file) is not None or each.value is not None:
+                    constant(run, "::".join((*each.scope, each.name)), Frame(each.file, each.scope))
+
+
+def _run_main(run: Machine, function: Function) -> None:
+    from nodl.infer.cpp.calls import invoke
+
+    arguments: list[Value] = [
+        unknown("the number of arguments"),
+        (Seq((unknown("an argument of the program"),), open=True),),
+    ]
+    frame = Frame(function.file, function.scope)
+    invoke(run, function, None, arguments[: len(function.parameters)], function.node, frame, ())
+
+
+def _construct_entry(run: Machine, entry: Entry) -> None:
+    index = next((run.names.files[f] for f in entry.files if f in run.names.files), None)
+    if index is None:
+        run.gaps.setdefault(
+            (SourceRef(entry.place), f"the source of component {entry.cls} was not found in its package")
+        )
+        return
+    cls = run.names.find_class(entry.cls, (), index)
+    if cls is None:
+        run.gaps.setdefault(
+            (SourceRef(index.file), f"the class {entry.cls} was not found in the sources of its library")
+        )
+        return
+    frame = Frame(cls.file, ())
+    constructors = run.names.find_methods(cls, cls.name)
+    options = run.obj(("options", cls), Type("rclcpp::NodeOptions"))
+    one = [
+        c
+        for c in constructors
+        if [p for p in c.parameters if "NodeOptions" in p.type]
+        and len([p for p in c.parameters if p.default is None]) <= 1
+    ]
+    arguments: list[Value] = [(options,)] if one or cls.inherits_constructors else []
+    if not one and constructors and all(any(p.default is None for p in c.parameters) for c in constructors):
+        best = min(constructors, key=lambda c: len(c.parameters))
+        arguments = [
+            (options,) if "NodeOptions" in p.type else unknown(f"the argument {p.name}")
+            for p in best.parameters
+        ]
+    elif one and "NodeOptions" not in one[0].parameters[0].type:
+        arguments = []
+    construct(run, Type(cls.qualified), arguments, cls.node, frame, heap=True)
+
+
+def _callbacks(run: Machine) -> None:
+    """What the outside may call, in any order and any number of times, until nothing changes."""
+    done: dict[object, int] = {}
+    for _ in range(MAX_ROUNDS):
+        before = len(run.callbacks), run.version()
+        _overrides(run)
+        for key in list(run.callbacks):
+            atom, frame = run.callbacks[key]
+            done[key] = done.get(key, 0) + 1
+            if done[key] <= MAX_ROUNDS:
+                _call_back(run, atom, frame)
+        if (len(run.callbacks), run.version()) == before:
+            return
+
+
+def _call_back(run: Machine, atom: object, frame: Frame) -> None:
+    from nodl.infer.cpp.calls import call_lambda, invoke
+
+    if isinstance(atom, Lambda):
+        if run.subtree_matters(atom.node):
+            run.branches([lambda: _one(call_lambda(run, atom, [], atom.node, atom.frame)), lambda: 1])
+    elif isinstance(atom, Bound) and run.makes_interfaces(atom.function):
+        given = [unknown(f"the argument {p.name}") for p in atom.function.parameters]
+        run.branches(
+            [
+                lambda: _one(invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())),
+                lambda: 1,
+            ]
+        )
+    elif isinstance(atom, Bound):
+        run.called.add(atom.function)
+
+
+def _one(value: Value) -> int:
+    return 1
+
+
+_HOOKS = frozenset({"on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown", "on_error"})
+
+
+def _overrides(run: Machine) -> None:
+    """Methods that the library's base class calls: overrides of classes whose base is not in reach."""
+    for obj in list(run.made_objects()):
+        if obj.cls is None or not (obj.foreign_base or obj.is_node):
+            continue
+        for cls in run.names.ancestry(obj.cls):
+            for name, methods in run.names.methods.get(cls, {}).items():
+                for method in methods:
+                    if (method.virtual or name in _HOOKS) and method in run.names.find_methods(obj.cls, name):
+                        run.callbacks.setdefault(
+                            (method, obj), (Bound(method, obj), Frame(method.file, method.scope, None, obj))
+                        )
+
+
+def _findings(run: Machine, sources: Sources) -> Findings:
+    findings = Findings()
+    findings.nodes = [record for record in run.nodes if record.created]
+    findings.gaps = dict(run.gaps)
+    own = list(run.names.files.values())
+    findings.answers = account(run, own)
+    for index in own:
+        _text_gaps(run, index, findings)
+    for file, why in sources.unreadable.items():
+        findings.gaps.setdefault((SourceRef(file), why))
+    findings.classes = {obj.cls.qualified for obj in run.made_objects() if obj.cls is not None}
+    findings.files = tuple(run.names.files)
+    findings.consulted = dict(run.consulted)
+    findings.from_default = tuple(run.from_default)
+    return findings
+
+
+def _text_gaps(run: Machine, index: FileIndex, findings: Findings) -> None:
+    """What the parser did not understand, and macros that nobody in reach defines."""
+    ran = {f for f in run.called if f.file is index}
+    if not ran:
+        return
+    for _, line, written in index.errors:
+        if CREATES.search(written):
+            findings.gaps.setdefault((SourceRef(index.file, line), "this C++ could not be parsed"))
+    for line, name in index.source.unknown_macros:
+        findings.gaps.setdefault(
+            (
+                SourceRef(index.file, line),
+                f"the macro {name} is not in reach: what it stands for is not known",
+            )
+        )
+
+
+def registered_components(index: FileIndex) -> list[str]:
+    """Classes that a file registers as components."""
+    return [match[1].replace(" ", "").lstrip(":") for match in _REGISTERED.finditer(index.source.text)]
+
+
+def exported_plugins(index: FileIndex) -> list[tuple[str, str]]:
+    return [(m[1].lstrip(":"), m[2].lstrip(":")) for m in _EXPORTED.finditer(index.source.text)]
+
+
+def target_entry(target: Target, package: SourcePackage, workspace: Workspace) -> Entry:
+    """The program of an executable target."""
+    files = sources_of(target, package.build)
+    commands = workspace.compile_commands
+    known = next((commands[os.path.realpath(f)] for f in files if os.path.realpath(f) in commands), None)
+    symbols = known if known is not None else target.definitions
+    return Entry(tuple(files), symbols=tuple(sorted(symbols.items())), complete=known is not None)
+
+
+__all__ = ["BOTTOM", "Class", "Obj", "line_of"]

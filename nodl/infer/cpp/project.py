@@ -1,0 +1,204 @@
+"""The sources in reach: packages with their builds, include folders, plugin descriptions. Reads files."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shlex
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from nodl.infer.cpp.cmake import Build, Target, read_build
+
+_TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^>]*)?>\s*([\w\-.]+)\s*</")
+_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
+_EXPORT = re.compile(r'<(\w+)\s+plugin\s*=\s*"([^"]+)"')
+_CLASS = re.compile(r"<class\b((?:\s+[\w:]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))+)\s*/?>")
+_ATTRIBUTE = re.compile(r"([\w:]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+_SKIPPED = frozenset({"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"})
+
+
+@dataclass(frozen=True)
+class PluginClass:
+    """An entry of a plugin description file: looked up by ``name``, made as ``type``, used as ``base``."""
+
+    name: str
+    type: str
+    base: str
+    file: str
+
+
+@dataclass
+class SourcePackage:
+    name: str
+    folder: str
+    depends: frozenset[str] = frozenset()
+
+    @cached_property
+    def build(self) -> Build:
+        return read_build(self.folder)
+
+    @cached_property
+    def plugins(self) -> list[PluginClass]:
+        files = list(self.build.plugin_files)
+        manifest = _read(os.path.join(self.folder, "package.xml"))
+        files += [p.replace("${prefix}", self.folder) for _, p in _EXPORT.findall(manifest)]
+        return [each for file in dict.fromkeys(files) for each in plugin_classes(file)]
+
+    @cached_property
+    def include_folders(self) -> list[str]:
+        usual = [os.path.join(self.folder, "include"), os.path.join(self.folder, "include", self.name)]
+        found = [*self.build.includes, *usual, os.path.join(self.folder, "src"), self.folder]
+        return [folder for folder in dict.fromkeys(found) if os.path.isdir(folder)]
+
+
+@dataclass
+class Workspace:
+    """Packages whose sources are in reach, and installed prefixes whose headers are."""
+
+    packages: dict[str, SourcePackage] = field(default_factory=dict)
+    prefixes: tuple[str, ...] = ()
+    build_folders: tuple[str, ...] = ()
+    _found: dict[tuple[str, str], str | None] = field(default_factory=dict)
+
+    def package_of(self, file: str) -> SourcePackage | None:
+        best: SourcePackage | None = None
+        for package in self.packages.values():
+            inside = file.startswith(package.folder + os.sep)
+            if inside and (best is None or len(package.folder) > len(best.folder)):
+                best = package
+        return best
+
+    def header(self, name: str, from_file: str, quoted: bool) -> str | None:
+        """The file that ``#include`` means: beside the file, in its package, in others, in the prefixes."""
+        if quoted:
+            beside = os.path.normpath(os.path.join(os.path.dirname(from_file), name))
+            if os.path.isfile(beside):
+                return beside
+        package = self.package_of(from_file)
+        key = (package.name if package else "", name)
+        if key not in self._found:
+            self._found[key] = self._search(name, package)
+        return self._found[key]
+
+    def _search(self, name: str, package: SourcePackage | None) -> str | None:
+        own = package.include_folders if package else []
+        first = self.packages.get(name.partition("/")[0])
+        others = first.include_folders if first else []
+        for folder in (*own, *others, *self._all_folders, *self._installed(name)):
+            path = os.path.normpath(os.path.join(folder, name))
+            if os.path.isfile(path):
+                return path
+        return None
+
+    @cached_property
+    def _all_folders(self) -> list[str]:
+        return [
+            f
+            for p in self.packages.values()
+            for f in p.include_folders
+            if f.startswith(os.path.join(p.folder, "include"))
+        ]
+
+    def _installed(self, name: str) -> Iterable[str]:
+        package = name.partition("/")[0]
+        for prefix in self.prefixes:
+            yield os.path.join(prefix, "include", package)
+            yield os.path.join(prefix, "include")
+
+    @cached_property
+    def plugin_classes(self) -> dict[str, list[tuple[PluginClass, SourcePackage]]]:
+        """By lookup name and by class."""
+        found: dict[str, list[tuple[PluginClass, SourcePackage]]] = {}
+        for package in self.packages.values():
+            for each in package.plugins:
+                for key in dict.fromkeys((each.name, each.type)):
+                    found.setdefault(key, []).append((each, package))
+        return found
+
+    @cached_property
+    def compile_commands(self) -> dict[str, dict[str, str]]:
+        """Definitions of each compiled file, where a build left ``compile_commands.json``."""
+        found: dict[str, dict[str, str]] = {}
+        for folder in self.build_folders:
+            for path in (
+                Path(folder, "compile_commands.json"),
+                *sorted(Path(folder).glob("*/compile_commands.json")),
+            ):
+                try:
+                    entries = json.loads(path.read_text(encoding="utf-8"))
+                except (OSError, ValueError):
+                    continue
+                for entry in entries if isinstance(entries, list) else []:
+                    words = entry.get("arguments") or shlex.split(entry.get("command", ""))
+                    file = os.path.normpath(os.path.join(entry.get("directory", ""), entry.get("file", "")))
+                    found[os.path.realpath(file)] = _defined(words)
+        return found
+
+
+def _defined(words: Sequence[str]) -> dict[str, str]:
+    given = [word[2:] for word in words if word.startswith("-D")]
+    return {name: value or "1" for name, _, value in (word.partition("=") for word in given)}
+
+
+def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
+    """Every package below ``roots``; folders that colcon would ignore are left out."""
+    found: dict[str, SourcePackage] = {}
+    for root in roots:
+        for folder, folders, names in os.walk(root):
+            if "COLCON_IGNORE" in names or "AMENT_IGNORE" in names:
+                folders[:] = []
+            elif "package.xml" in names:
+                folders[:] = []
+                package = read_source_package(folder)
+                found.setdefault(package.name, package)
+            else:
+                folders[:] = sorted(f for f in folders if f not in _SKIPPED and not f.startswith("."))
+    return found
+
+
+def read_source_package(folder: str) -> SourcePackage:
+    manifest = re.sub(r"<!--(?:.|\n)*?-->", "", _read(os.path.join(folder, "package.xml")))
+    match = _NAME.search(manifest)
+    return SourcePackage(
+        match[1] if match else os.path.basename(folder), folder, frozenset(_TAG.findall(manifest))
+    )
+
+
+def plugin_classes(file: str) -> list[PluginClass]:
+    """The classes of a plugin description file; none when it cannot be read."""
+    found = []
+    for match in _CLASS.finditer(re.sub(r"<!--(?:.|\n)*?-->", "", _read(file))):
+        values = {m[1]: m[2] if m[2] is not None else m[3] for m in _ATTRIBUTE.finditer(match[1])}
+        if "type" in values:
+            name = values.get("name") or values["type"]
+            found.append(
+                PluginClass(name, values["type"].lstrip(":"), values.get("base_class_type", ""), file)
+            )
+    return found
+
+
+def sources_of(target: Target, build: Build) -> list[str]:
+    """The target's own sources and those of the libraries of its package that it links."""
+    order, waiting = [target.name], [target]
+    while waiting:
+        current = waiting.pop()
+        names = list(current.links)
+        if current.automatic:
+            names += [t.name for t in build.targets.values() if not t.executable]
+        for name in names:
+            linked = build.targets.get(name.rpartition("::")[2])
+            if linked is not None and linked.name not in order:
+                order.append(linked.name)
+                waiting.append(linked)
+    return list(dict.fromkeys(file for name in order for file in build.targets[name].sources))
+
+
+def _read(path: str) -> str:
+    try:
+        return Path(path).read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        return ""

@@ -1,0 +1,170 @@
+"""Findings of a program become ``NodeInterface`` values: names as templates, with certainty and place. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
+from nodl.infer.cpp.program import Findings
+from nodl.infer.cpp.values import NodePart, Text, Value, concatenated, plain
+from nodl.infer.results import certainty_of, remapped
+from nodl.name_template import NameTemplate, Part, UnknownPart
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
+from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+
+
+def interfaces_of(
+    findings: Findings, package: str | None, executable: str | None, plugin: str | None
+) -> list[NodeInterface]:
+    """One interface for each node and each name that it may have; gaps of the whole program go to the first."""
+    found: list[NodeInterface] = []
+    for record in findings.nodes:
+        found += _of_node(record, findings, package, executable, plugin)
+    if found:
+        found[0] = found[0]._replace(gaps=tuple(dict.fromkeys((*found[0].gaps, *program_gaps(findings)))))
+    return found
+
+
+def program_gaps(findings: Findings) -> list[Gap]:
+    """What belongs to no single node, and every place without a result."""
+    gaps = [Gap(source, why) for source, why in findings.gaps]
+    gaps += [Gap(answer.source, answer.reason) for answer in findings.answers if not answer.dead]
+    return list(dict.fromkeys(gaps))
+
+
+def _of_node(
+    record: NodeRecord, findings: Findings, package: str | None, executable: str | None, plugin: str | None
+) -> list[NodeInterface]:
+    gaps = [Gap(source, why) for source, why in record.gaps]
+    gaps += _conditional_gaps(record)
+    rules = _rules(record, gaps)
+    endpoints = tuple(dict.fromkeys(e for found, when in record.endpoints.items() if _is_certain(found, when, record)
+                                    for e in _endpoint(found, record)))  # fmt: skip
+    names: list[str | None] = [*_texts(record.names, record)]
+    if not names or len(names) < len(record.names):
+        gaps.append(Gap(record.source, "the name of this node is made at run time"))
+        names = names or [None]
+    namespaces: list[str | None] = ["/" + text.lstrip("/") for text in _texts(record.namespaces, record)]
+    if record.namespaces and len(namespaces) < len(record.namespaces):
+        gaps.append(Gap(record.source, "the namespace of this node is made at run time"))
+    interfaces = []
+    for name in dict.fromkeys(names):
+        for namespace in dict.fromkeys(namespaces or ["/"]):
+            interface = NodeInterface(
+                package=package, executable=executable, plugin=plugin, name=name, namespace=namespace,
+                endpoints=endpoints, source=record.source, library=ClientLibrary.RCLCPP, lifecycle=record.lifecycle,
+                parameters=tuple(sorted(record.parameters)), gaps=tuple(dict.fromkeys(gaps)),
+            )  # fmt: skip
+            interfaces.append(remapped(interface, rules) if rules.local else interface)
+    return interfaces
+
+
+def _texts(value: Value, record: NodeRecord) -> list[str]:
+    found = []
+    for atom in value:
+        for template in _templates(atom, record):
+            filled = template.fill({})
+            if filled.is_literal:
+                found.append(filled.text)
+    return list(dict.fromkeys(found))
+
+
+def _endpoint(found: FoundEndpoint, record: NodeRecord) -> list[Endpoint]:
+    return [
+        Endpoint(found.kind, template, found.type, found.source, _certainty(template, found))
+        for template in _templates(found.name, record)
+    ]
+
+
+def _certainty(template: NameTemplate, found: FoundEndpoint) -> Certainty:
+    certainty = certainty_of(template)
+    return Certainty.FROM_DEFAULT if certainty is Certainty.EXACT and not found.exact else certainty
+
+
+def _templates(atom: object, record: NodeRecord) -> list[NameTemplate]:
+    texts = [atom] if isinstance(atom, Text) else list(concatenated((atom,)))
+    return [NameTemplate(tuple(_parts(each, record))) for each in texts if isinstance(each, Text)]
+
+
+def _parts(text: Text, record: NodeRecord) -> Iterable[Part]:
+    found: list[Part] = []
+    for index, part in enumerate(text.parts):
+        made = _node_part(part, record, index == 0) if isinstance(part, NodePart) else part
+        if isinstance(made, str) and found and isinstance(found[-1], str):
+            found[-1] += made
+        else:
+            found.append(made)
+    return found
+
+
+def _node_part(part: NodePart, record: NodeRecord, first: bool) -> Part:
+    if part.record is record:
+        if part.what == "fqn":
+            return "~" if first else "{ns}/{node}"
+        return "{node}" if part.what == "name" else "{ns}"
+    names = [plain(each) for each in part.record.names]
+    known = names[0] if len(names) == 1 else None
+    return UnknownPart(
+        f"the {part.what} of node {known or 'that is not known'}, which the launch file may change"
+    )
+
+
+# --- what the build decides -------------------------------------------------------------------------------------
+
+
+def _is_certain(found: FoundEndpoint, when: list[tuple[Condition, ...]], record: NodeRecord) -> bool:
+    """Made whatever the build says: without a condition, or on every side of one."""
+    if any(not conditions for conditions in when):
+        return True
+    same = [c for other, given in record.endpoints.items() if _alike(other, found) for c in given]
+    if any(not conditions for conditions in same):
+        return True
+    sides: dict[tuple[str, int], set[str]] = {}
+    for conditions in same:
+        if len(conditions) == 1:
+            file, line, symbol = conditions[0]
+            sides.setdefault((file, line), set()).add(symbol)
+    return any(
+        any(s.startswith("else of ") for s in symbols) and len(symbols) > 1 for symbols in sides.values()
+    )
+
+
+def _alike(first: FoundEndpoint, second: FoundEndpoint) -> bool:
+    return (first.kind, first.name, first.type) == (second.kind, second.name, second.type)
+
+
+def _conditional_gaps(record: NodeRecord) -> list[Gap]:
+    gaps = []
+    for found, when in record.endpoints.items():
+        if not _is_certain(found, when, record):
+            for template in _templates(found.name, record):
+                symbol = when[0][-1][2]
+                gaps.append(
+                    Gap(
+                        found.source,
+                        f"{found.kind.value.replace('_', ' ')} {template} is made only where the build says "
+                        f"{symbol}",
+                    )
+                )
+    return gaps
+
+
+# --- remap rules in code ----------------------------------------------------------------------------------------
+
+
+def _rules(record: NodeRecord, gaps: list[Gap]) -> RemapRules:
+    rules: list[ParsedRule] = []
+    for words in record.arguments:
+        known = [_texts(word, record) for word in words]
+        for index, word in enumerate(known[:-1]):
+            if word in (["-r"], ["--remap"]):
+                if len(known[index + 1]) != 1:
+                    gaps.append(Gap(record.source, "a remap rule given in code is not known"))
+                    continue
+                try:
+                    rules.append(parse_rule(known[index + 1][0]))
+                except InvalidRemapRuleError as error:
+                    gaps.append(Gap(record.source, str(error)))
+        if any(len(each) != 1 for each in known) and not any(each in (["-r"], ["--remap"]) for each in known):
+            gaps.append(Gap(record.source, "arguments given in code are not known"))
+    return RemapRules(tuple(rules), ())

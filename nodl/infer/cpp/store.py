@@ -1,0 +1,54 @@
+"""Cells with values, and a trail of what was written: branches are run, undone and joined. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from nodl.infer.cpp.values import BOTTOM, Value, join
+
+Cell = tuple[object, str]
+Changes = dict[Cell, Value]
+_ABSENT: Value = (("absent",),)
+
+
+class Store:
+    def __init__(self) -> None:
+        self._cells: dict[Cell, Value] = {}
+        self._trail: list[tuple[Cell, Value]] = []
+
+    def get(self, cell: Cell) -> Value | None:
+        return self._cells.get(cell)
+
+    def set(self, cell: Cell, value: Value) -> None:
+        old = self._cells.get(cell, _ABSENT)
+        if old is not value:
+            self._trail.append((cell, old))
+            self._cells[cell] = value
+
+    def mark(self) -> int:
+        return len(self._trail)
+
+    def changes(self, mark: int) -> Changes:
+        """What was written since ``mark``, as it is now."""
+        return {cell: self._cells[cell] for cell, _ in self._trail[mark:] if cell in self._cells}
+
+    def before(self, cell: Cell, mark: int) -> Value:
+        """The value that ``cell`` had at ``mark``."""
+        for each, old in self._trail[mark:]:
+            if each == cell:
+                return BOTTOM if old is _ABSENT else old
+        return self._cells.get(cell, BOTTOM)
+
+    def undo(self, mark: int) -> None:
+        while len(self._trail) > mark:
+            cell, old = self._trail.pop()
+            if old is _ABSENT:
+                self._cells.pop(cell, None)
+            else:
+                self._cells[cell] = old
+
+    def merge(self, alternatives: Sequence[Changes]) -> None:
+        """Continue with any of ``alternatives``, each made from the present state."""
+        for cell in dict.fromkeys(cell for changes in alternatives for cell in changes):
+            present = self._cells.get(cell, BOTTOM)
+            self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))

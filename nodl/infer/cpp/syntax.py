@@ -1,0 +1,78 @@
+"""C++ text as a tree: the parser (tree-sitter, extra ``cpp``) and the few questions that everybody asks of a tree."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tree_sitter import Node, Parser, Tree
+
+
+class CppSupportMissing(Exception):
+    """tree-sitter is not installed: ``pip install enclave-launch[cpp]``."""
+
+
+@lru_cache(maxsize=1)
+def _parser() -> Parser:
+    try:
+        import tree_sitter_cpp
+        from tree_sitter import Language, Parser
+    except ImportError as error:
+        raise CppSupportMissing(
+            "C++ sources need the extra cpp: pip install 'enclave-launch[cpp]'"
+        ) from error
+    return Parser(Language(tree_sitter_cpp.language()))
+
+
+def parse(source: bytes) -> Tree:
+    """The tree of ``source``. Raises ``CppSupportMissing``."""
+    return _parser().parse(source)
+
+
+@lru_cache(maxsize=4096)
+def parse_expression(source: str) -> Node | None:
+    """The tree of one expression that stands for itself: the body of a macro, the arguments of a declaration."""
+    root = parse(f"auto x_ = {source};".encode()).root_node
+    for node in walk(root):
+        if node.type == "init_declarator":
+            return node.child_by_field_name("value")
+    return None
+
+
+def text(node: Node | None) -> str:
+    """What the source says; the empty text for no node."""
+    return node.text.decode("utf-8", "replace") if node is not None and node.text is not None else ""
+
+
+def line_of(node: Node) -> int:
+    return int(node.start_point[0]) + 1
+
+
+def children(node: Node | None) -> list[Node]:
+    """The named children without comments."""
+    if node is None:
+        return []
+    return [child for child in node.named_children if child.type != "comment"]
+
+
+def walk(node: Node) -> Iterator[Node]:
+    """``node`` and everything below it, in order."""
+    stack = [node]
+    while stack:
+        current = stack.pop()
+        yield current
+        stack.extend(reversed(current.named_children))
+
+
+def unwrapped(node: Node | None) -> Node | None:
+    """``node`` without parentheses and ``dependent_name`` around it."""
+    while node is not None and node.type in (
+        "parenthesized_expression",
+        "dependent_name",
+        "condition_clause",
+    ):
+        inner = children(node)
+        node = inner[-1] if inner else None
+    return node

@@ -1,0 +1,242 @@
+"""C++ files in, their nodes out: executables and components of their packages, nodes nobody makes. Reads files."""
+
+from __future__ import annotations
+
+import dataclasses
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from nodl.infer.cpp.machine import Settings
+from nodl.infer.cpp.program import (
+    Entry,
+    Findings,
+    Sources,
+    registered_components,
+    run_program,
+    target_entry,
+)
+from nodl.infer.cpp.project import SourcePackage, Workspace, find_packages, sources_of
+from nodl.infer.cpp.results import interfaces_of, program_gaps
+from nodl.node_interface import Gap, NodeInterface
+from nodl.source_ref import SourceRef
+
+_SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
+_TESTS = frozenset({"test", "tests", "testing", "benchmark", "examples", "example", "mock"})
+
+
+@dataclass(frozen=True)
+class Key:
+    """Under which name launch starts a program."""
+
+    package: str | None
+    executable: str | None = None
+    plugin: str | None = None
+
+
+@dataclass
+class Inferred:
+    nodes: list[NodeInterface] = field(default_factory=list)
+    gaps: list[Gap] = field(default_factory=list)
+    dead: list[Gap] = field(default_factory=list)
+
+
+def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferred:
+    """The nodes of ``files``. Raises ``CppSupportMissing``."""
+    workspace = workspace_of(files, prefixes)
+    sources = Sources(workspace)
+    given = set(files)
+    result = Inferred()
+    made: set[str] = set()
+    seen: set[str] = set()
+    for key, entry in programs(workspace, sources, given):
+        findings = run_program(sources, entry)
+        made |= findings.classes
+        seen |= set(findings.files)
+        _add(result, findings, key)
+    for key, entry in _left_over(workspace, sources, files, made):
+        findings = run_program(sources, entry)
+        if entry.main or not findings.classes <= made:
+            made |= findings.classes
+            _add(result, findings, key, None if entry.main else entry.cls)
+    return result
+
+
+def _add(result: Inferred, findings: Findings, key: Key, unmade: str | None = None) -> None:
+    nodes = interfaces_of(findings, key.package, key.executable, key.plugin)
+    result.nodes += nodes
+    if not nodes:
+        result.gaps += program_gaps(findings)
+    result.dead += [Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead]
+    del unmade
+
+
+def workspace_of(files: Iterable[str], prefixes: Sequence[str] = ()) -> Workspace:
+    """The packages that ``files`` lie in, and those beside them in the same source space."""
+    own: dict[str, None] = {}
+    roots: dict[str, None] = {}
+    builds: dict[str, None] = {}
+    for file in files:
+        package = _package_folder(Path(file))
+        if package is None:
+            continue
+        own.setdefault(str(package))
+        space = _source_space(package)
+        roots.setdefault(str(space if space is not None else package))
+        if space is not None:
+            builds.setdefault(str(space.parent / "build"))
+    return Workspace(find_packages((*own, *roots)), tuple(prefixes), tuple(builds))
+
+
+def _package_folder(file: Path) -> Path | None:
+    return next((folder for folder in file.parents if (folder / "package.xml").is_file()), None)
+
+
+def _source_space(package: Path) -> Path | None:
+    """``src`` of a colcon workspace, or the repository that holds the package beside others."""
+    for folder in package.parents:
+        if folder.name == "src":
+            return folder
+        if (folder / ".git").exists():
+            return folder
+    siblings = [p for p in package.parent.glob("*/package.xml") if p.parent != package]
+    return package.parent if siblings else None
+
+
+def programs(workspace: Workspace, sources: Sources, given: set[str]) -> list[tuple[Key, Entry]]:
+    """Every executable and component that one of the given files belongs to."""
+    found: list[tuple[Key, Entry]] = []
+    touched = [p for p in workspace.packages.values() if any(f.startswith(p.folder + os.sep) for f in given)]
+    for package in touched:
+        found += package_programs(package, workspace, sources, given)
+    return found
+
+
+def package_programs(
+    package: SourcePackage, workspace: Workspace, sources: Sources, given: set[str] | None = None
+) -> list[tuple[Key, Entry]]:
+    found: list[tuple[Key, Entry]] = []
+    build = package.build
+    for target in build.targets.values():
+        entry = target_entry(target, package, workspace)
+        wanted = given is None or any(file in given for file in entry.files)
+        if target.executable and wanted:
+            found.append((Key(package.name, build.renamed.get(target.name, target.name)), entry))
+    for name, key in components(package, sources).items():
+        entry = _component_entry(name, package, workspace, sources)
+        if given is None or any(file in given for file in entry.files):
+            found.append((key, entry))
+    return found
+
+
+def components(package: SourcePackage, sources: Sources) -> dict[str, Key]:
+    """By CMake and by the macro in the source."""
+    found = {name: Key(package.name, executable, name) for name, executable in package.build.plugins.items()}
+    for target in package.build.targets.values():
+        for file in target.sources:
+            index = sources.index(file, dict(target.definitions), False)
+            for name in registered_components(index) if index is not None else ():
+                if name not in found:
+                    found[name] = Key(package.name, None, name)
+    return found
+
+
+def _component_entry(name: str, package: SourcePackage, workspace: Workspace, sources: Sources) -> Entry:
+    build = package.build
+    target = build.targets.get(build.plugin_targets.get(name, ""))
+    if target is None:
+        target = next(
+            (
+                t
+                for t in build.targets.values()
+                for f in t.sources
+                if (i := sources.index(f, dict(t.definitions), False)) and name in registered_components(i)
+            ),
+            None,
+        )
+    if target is None or not target.sources:
+        files = [
+            f
+            for f in _all_sources(package)
+            if (i := sources.index(f, {}, False)) and name in registered_components(i)
+        ]
+        return Entry(tuple(files), cls=name, main=False, place=package.folder)
+    return dataclasses.replace(target_entry(target, package, workspace), cls=name, main=False)
+
+
+def _all_sources(package: SourcePackage) -> list[str]:
+    return [str(path) for path in sorted(Path(package.folder).rglob("*")) if path.suffix in _SOURCES]
+
+
+def _left_over(
+    workspace: Workspace, sources: Sources, files: Sequence[str], made: set[str]
+) -> Iterable[tuple[Key, Entry]]:
+    """Files of no target: their mains and components; then node classes that no program makes."""
+    built = {f for p in workspace.packages.values() for t in p.build.targets.values() for f in t.sources}
+    loose = [file for file in files if file not in built and not _is_test(file, workspace)]
+    by_folder: dict[str, list[str]] = {}
+    for file in loose:
+        package = workspace.package_of(file)
+        by_folder.setdefault(package.name if package else "", []).append(file)
+    for name, listed in by_folder.items():
+        package_name = name or None
+        indexed = {file: sources.index(file, {}, False) for file in listed}
+        for file, index in indexed.items():
+            if index is not None and "main" in index.functions:
+                others = [f for f in listed if "main" not in getattr(indexed[f], "functions", {})]
+                yield Key(package_name), Entry((file, *others))
+        for file, index in indexed.items():
+            for cls in registered_components(index) if index is not None else ():
+                yield (
+                    Key(package_name, None, cls),
+                    Entry((file, *(f for f in listed if f != file)), cls=cls, main=False),
+                )
+    yield from _unmade(workspace, sources, files, made)
+
+
+def _unmade(
+    workspace: Workspace, sources: Sources, files: Sequence[str], made: set[str]
+) -> Iterable[tuple[Key, Entry]]:
+    from nodl.infer.cpp.libraries import NODE_BASES
+    from nodl.infer.cpp.names import Names
+
+    indexes = [
+        i for f in files if not _is_test(f, workspace) and (i := sources.index(f, {}, False)) is not None
+    ]
+    names = Names(indexes)
+    parents = {
+        base.qualified
+        for listed in names.classes.values()
+        for cls in listed
+        for _, base in names.bases(cls)
+        if base
+    }
+    for index in indexes:
+        for cls in [c for listed in index.classes.values() for c in listed]:
+            bases = {
+                names.resolve(w, each.scope, each.file).name
+                for each in names.ancestry(cls)
+                for w in each.bases
+            }
+            if not bases & set(NODE_BASES) or cls.qualified in parents | made or cls.templates:
+                continue
+            package = workspace.package_of(index.file)
+            own = [f for f in files if workspace.package_of(f) is package]
+            yield (
+                Key(package.name if package else None),
+                Entry(_with_first(index.file, own), cls=cls.qualified, main=False),
+            )
+
+
+def _with_first(file: str, files: Sequence[str]) -> tuple[str, ...]:
+    return (file, *(each for each in files if each != file and each.endswith(_SOURCES)))
+
+
+def _is_test(file: str, workspace: Workspace) -> bool:
+    package = workspace.package_of(file)
+    relative = os.path.relpath(file, package.folder) if package else os.path.basename(file)
+    return any(part in _TESTS for part in Path(relative).parts[:-1])
+
+
+__all__ = ["Settings", "SourceRef", "sources_of"]

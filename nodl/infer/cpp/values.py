@@ -1,0 +1,212 @@
+"""What an expression may be: alternatives, each a text, number, object, container, closure or unknown. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from nodl.name_template import ParameterPart, Part, UnknownPart
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+    from nodl.infer.cpp.declarations import Class, Function
+    from nodl.infer.cpp.findings import NodeRecord
+    from nodl.infer.cpp.machine import Frame
+    from nodl.infer.cpp.names import Type
+
+MAX_ALTERNATIVES = 32
+Atom = Any  # one of the classes below, or bool, int, float
+Value = tuple[Atom, ...]
+BOTTOM: Value = ()
+
+
+class NodePart(NamedTuple):
+    """What a node says of itself: its ``name``, ``ns`` or ``fqn``."""
+
+    record: NodeRecord
+    what: str
+
+
+class Text(NamedTuple):
+    """A text; its parts are literals, parameters, names of nodes and what is not known."""
+
+    parts: tuple[Part | NodePart, ...]
+
+
+class Unknown(NamedTuple):
+    why: str
+
+
+class Const(NamedTuple):
+    """An enumerator, by its qualified name."""
+
+    name: str
+
+
+class Param(NamedTuple):
+    """The value of a parameter of a node, still under its name.
+
+    ``item``: an element of a list; ``known``: that element as the launch file or the default gives it.
+    """
+
+    record: NodeRecord
+    name: str
+    item: int | None = None
+    known: Value = ()
+
+    @property
+    def default(self) -> Value:
+        """What the program declares, at any time."""
+        return self.known or self.record.default(self.name)
+
+
+class Seq(NamedTuple):
+    """A vector, array or list. ``open``: the items may come any number of times."""
+
+    items: tuple[Value, ...]
+    open: bool = False
+
+
+class Map(NamedTuple):
+    entries: tuple[tuple[Value, Value], ...]
+    open: bool = False
+
+
+class Group(NamedTuple):
+    """A pair, tuple or braced list of unlike things."""
+
+    items: tuple[Value, ...]
+
+
+class Bound(NamedTuple):
+    """A function, on an object if it is a method."""
+
+    function: Function
+    this: Obj | None
+
+
+class Lambda(NamedTuple):
+    node: Node
+    frame: Frame
+
+
+@dataclass(eq=False, slots=True)
+class Obj:
+    """An object by the place where it is made. ``cls`` is ``None`` for classes of libraries.
+
+    ``node``: the node that it is or stands for (``rclcpp::Node``, an interface of one).
+    """
+
+    type: Type
+    cls: Class | None = None
+    node: NodeRecord | None = None
+    bindings: dict[Class, dict[str, Type]] = field(default_factory=dict)
+    data: dict[str, Any] = field(default_factory=dict)  # of library classes
+    heap: bool = False
+    foreign_base: str = ""
+    is_node: bool = False  # the node itself; else something that belongs to it
+
+    def __repr__(self) -> str:
+        return f"<{self.type.name}>"
+
+
+def join(*values: Value) -> Value:
+    """The alternatives of all; too many become one that is not known."""
+    first = values[0] if values else BOTTOM
+    if all(value is first or value == first for value in values[1:]):
+        return first
+    found = tuple(dict.fromkeys(atom for value in values for atom in value))
+    if len(found) <= MAX_ALTERNATIVES:
+        return found
+    objects = tuple(atom for atom in found if isinstance(atom, Obj))[:MAX_ALTERNATIVES]
+    return (*objects, Unknown("too many possible values"))
+
+
+def unknown(why: str) -> Value:
+    return (Unknown(why),)
+
+
+def literal(value: str) -> Value:
+    return (Text((value,)) if value else Text(()),)
+
+
+def as_parts(atom: Atom) -> tuple[Part | NodePart, ...]:
+    """An alternative as a piece of text."""
+    if isinstance(atom, Text):
+        return atom.parts
+    if isinstance(atom, bool):
+        return ("1" if atom else "0",)
+    if isinstance(atom, int):
+        return (str(atom),)
+    if isinstance(atom, float):
+        return (f"{atom:f}",)
+    if isinstance(atom, Param):
+        return _parameter_parts(atom)
+    if isinstance(atom, Unknown):
+        return (UnknownPart(atom.why),)
+    return (UnknownPart("a value that is not a text"),)
+
+
+def _parameter_parts(param: Param) -> tuple[Part, ...]:
+    texts = [plain(each) for each in param.default]
+    default = texts[0] if len(texts) == 1 else None
+    return (ParameterPart(param.name, default, param.item),)
+
+
+def concatenated(*values: Value) -> Value:
+    """Every way to put one alternative of each behind another."""
+    results: list[tuple[Part | NodePart, ...]] = [()]
+    for value in values:
+        pieces = [piece for atom in value for piece in spread(atom)] or [
+            (UnknownPart("a text that is never set"),)
+        ]
+        results = [(*head, *piece) for head in results for piece in pieces]
+        if len(results) > MAX_ALTERNATIVES:
+            return unknown("too many possible texts")
+    return tuple(dict.fromkeys(Text(melted(parts)) for parts in results))
+
+
+def spread(atom: Atom) -> list[tuple[Part | NodePart, ...]]:
+    """``as_parts``, once for each default of a parameter."""
+    if isinstance(atom, Param) and len(atom.default) > 1:
+        return [as_parts(atom._replace(known=(each,))) for each in atom.default]
+    return [as_parts(atom)]
+
+
+def melted(parts: Iterable[Part | NodePart]) -> tuple[Part | NodePart, ...]:
+    found: list[Part | NodePart] = []
+    for part in parts:
+        if part == "":
+            continue
+        if isinstance(part, str) and found and isinstance(found[-1], str):
+            found[-1] += part
+        else:
+            found.append(part)
+    return tuple(found)
+
+
+def plain(atom: Atom) -> str | None:
+    """The text of a literal; ``None`` if it is not one."""
+    if isinstance(atom, Text) and all(isinstance(part, str) for part in atom.parts):
+        return "".join(str(part) for part in atom.parts)
+    if isinstance(atom, bool):
+        return "true" if atom else "false"
+    if isinstance(atom, int | float):
+        return str(atom)
+    return None
+
+
+def truth(value: Value) -> bool | None:
+    """Whether ``value`` is certainly true or false."""
+    found = {_truth(atom) for atom in value}
+    return found.pop() if len(found) == 1 else None
+
+
+def _truth(atom: Atom) -> bool | None:
+    if isinstance(atom, bool | int | float):
+        return bool(atom)
+    if isinstance(atom, Lambda | Bound):
+        return True
+    return None

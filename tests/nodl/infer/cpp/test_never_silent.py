@@ -1,0 +1,266 @@
+"""Every place that could make an interface ends as one, as dead for a reason, or as a gap."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.workspace import HEAD, gaps, in_class, infer, names, package
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+FOUND = {
+    "in the constructor": in_class('create_publisher<std_msgs::msg::String>("a", 1);'),
+    "through this": in_class('this->create_subscription<std_msgs::msg::String>("a", 1, cb);'),
+    "in a method that the constructor calls": in_class(
+        "init();", 'void init() { create_publisher<std_msgs::msg::String>("a", 1); }'
+    ),
+    "in a default member initialiser": in_class(
+        "", 'rclcpp::PublisherBase::SharedPtr p_{create_publisher<std_msgs::msg::String>("a", 1)};'
+    ),
+    "in a default argument of the constructor": in_class(
+        "", "", before=""
+    ).replace("Demo() :", 'explicit Demo(std::string t = "a") :').replace(
+        "{  }", "{ create_publisher<std_msgs::msg::String>(t, 1); }"
+    ),
+    "of a class behind an export macro": in_class('create_publisher<std_msgs::msg::String>("a", 1);').replace(
+        "class Demo", "class DEMO_API Demo"
+    ),
+    "of a base class in another file's namespace": HEAD
+    + """
+namespace base { class B : public rclcpp::Node { public: explicit B(std::string n) : rclcpp::Node(n) {
+  create_publisher<std_msgs::msg::String>("a", 1); } }; }
+class D : public base::B { public: D() : B("n") {} };
+int main() { auto d = std::make_shared<D>(); }
+""",
+    "of a class template": HEAD
+    + """
+template <typename T> class B : public rclcpp::Node { public: B() : rclcpp::Node("n") {
+  create_publisher<T>("a", 1); } };
+int main() { auto d = std::make_shared<B<std_msgs::msg::String>>(); }
+""",
+    "through a mixin that gets the node": HEAD
+    + """
+struct Mixin { explicit Mixin(rclcpp::Node * n) : node_(n) {} void start() {
+  node_->create_publisher<std_msgs::msg::String>("a", 1); } rclcpp::Node * node_; };
+class D : public rclcpp::Node, public Mixin { public: D() : Node("n"), Mixin(this) { start(); } };
+int main() { D d; }
+""",
+    "by the free function": in_class('rclcpp::create_publisher<std_msgs::msg::String>(*this, "a", 1);'),
+    "by the free function with interfaces": in_class(
+        'rclcpp::create_publisher<std_msgs::msg::String>(get_node_topics_interface(), "a", 1);'
+    ),
+    "by a helper class that gets the node": in_class(
+        "helper_ = std::make_unique<Helper>(this);",
+        "std::unique_ptr<Helper> helper_;",
+        before="struct Helper { explicit Helper(rclcpp::Node * n) { "
+        'n->create_publisher<std_msgs::msg::String>("a", 1); } };',
+    ),
+    "by a helper function with a reference": in_class(
+        "help(*this);",
+        before='void help(rclcpp::Node & n) { n.create_publisher<std_msgs::msg::String>("a", 1); }\n',
+    ),
+    "by a class that owns its node": HEAD
+    + """
+class App { public: App() : n_(std::make_shared<rclcpp::Node>("n")) {
+  n_->create_publisher<std_msgs::msg::String>("a", 1); } std::shared_ptr<rclcpp::Node> n_; };
+int main() { App app; }
+""",
+    "by a plain base that holds the node": HEAD
+    + """
+class Base { protected: rclcpp::Node::SharedPtr node_; };
+class App : public Base { public: App() { node_ = rclcpp::Node::make_shared("n");
+  node_->create_publisher<std_msgs::msg::String>("a", 1); } };
+int main() { App app; }
+""",
+    "in a timer's lambda": in_class(
+        "create_wall_timer(1s, [this]() { create_publisher<std_msgs::msg::String>(\"a\", 1); });"
+    ),
+    "in a bound method": in_class(
+        "t_ = create_wall_timer(1s, std::bind(&Demo::on, this));",
+        'void on() { create_publisher<std_msgs::msg::String>("a", 1); }',
+    ),
+    "in a callback that a callback registers": in_class(
+        "create_wall_timer(1s, [this]() { create_wall_timer(1s, std::bind(&Demo::on, this)); });",
+        'void on() { create_publisher<std_msgs::msg::String>("a", 1); }',
+    ),
+    "on configure": in_class("").replace("rclcpp::Node", "rclcpp_lifecycle::LifecycleNode").replace(
+        ": Node(", ": LifecycleNode("
+    ).replace(
+        "int main", "int unused_; int main"
+    ).replace(
+        "};\nint unused_",
+        'CallbackReturn on_configure(const rclcpp_lifecycle::State &) override { '
+        'create_publisher<std_msgs::msg::String>("a", 1); return CallbackReturn::SUCCESS; } };\nint unused_',
+    ),
+    "through a macro with arguments": in_class("PUB(a);").replace(
+        HEAD, HEAD + "#define PUB(topic) create_publisher<std_msgs::msg::String>(#topic, 1)\n"
+    ),
+    "through shared_from_this": in_class(
+        "", "void init() { auto n = shared_from_this(); n->create_publisher<std_msgs::msg::String>(\"a\", 1); }"
+    ).replace("rclcpp::spin(std::make_shared<Demo>());", "auto d = std::make_shared<Demo>(); d->init();"),
+    "through a weak pointer": in_class(
+        "h_.start(weak_from_this());",
+        "Helper h_;",
+        before="struct Helper { void start(rclcpp::Node::WeakPtr w) { auto n = w.lock(); "
+        'n->create_publisher<std_msgs::msg::String>("a", 1); } };',
+    ),
+    "through a generic lambda": in_class(
+        "auto make = [this](const std::string & t) { return create_publisher<std_msgs::msg::String>(t, 1); };"
+        'make("a");'
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("source", FOUND.values(), ids=FOUND.keys())
+def test_an_interface_is_found(source: str, tmp_path: Path) -> None:
+    system = infer(tmp_path, source)
+    assert names(system) == ["a"]
+    assert gaps(system) == []
+
+
+GAPS = {
+    "the base class is not known": (
+        HEAD + 'class D : public acme::Base { public: D() : Base("n") {'
+        '  create_publisher<std_msgs::msg::String>("a", 1); } };'
+        "int main() { auto d = std::make_shared<D>(); }",
+        "the base class acme::Base of D is not known",
+    ),
+    "the node goes to a library that is not modelled": (
+        in_class("acme::attach(this);"),
+        "the node is handed to acme::attach()",
+    ),
+    "an object of a library gets the node": (
+        in_class("x_ = std::make_shared<acme::Thing>(shared_from_this());", "std::shared_ptr<acme::Thing> x_;"),
+        "the node is handed to the constructor of acme::Thing",
+    ),
+    "a member of a library gets the node": (
+        in_class("", "acme::Thing x_{this};"),
+        "the node is handed to the constructor of acme::Thing",
+    ),
+    "a method of an unknown object gets the node": (
+        in_class("auto x = acme::make(); x->attach(this);"),
+        "the node is handed to x->attach()",
+    ),
+    "whose node it is is not known": (
+        HEAD + "void f(rclcpp::Node * n);\n"
+        'int main() { auto n = acme::node(); n->create_publisher<std_msgs::msg::String>("a", 1); }',
+        "the node that n->create_publisher() makes an interface on is not known",
+    ),
+    "the source of a method is elsewhere": (
+        in_class("init();", "void init();"),
+        "the source of Demo::init() is not in reach",
+    ),
+    "the source of a helper is elsewhere": (
+        in_class("help(*this);", before="void help(rclcpp::Node & n);"),
+        "the node is handed to help()",
+    ),
+    "who calls the method is not known": (
+        in_class("std::vector<Demo *> all; acme::fill(all); for (auto d : all) { d->init(); }",
+                 'void init() { create_publisher<std_msgs::msg::String>("a", 1); }'),
+        "init",
+    ),
+    "a macro of somebody else": (
+        in_class("", "  ACME_MAKES_THINGS(this)\n"),
+        "ACME_MAKES_THINGS",
+    ),
+    "the program is a node of somebody else": (
+        HEAD + "#include <acme/driver_node.hpp>\nint main() { rclcpp::spin(std::make_shared<acme::DriverNode>()); }",
+        "acme::DriverNode",
+    ),
+    "a plugin whose name is not known": (
+        in_class("loader_.createSharedInstance(acme::name());", "pluginlib::ClassLoader<acme::Base> loader_;"),
+        "which acme::Base plugin is loaded is not known",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("source", "why"), GAPS.values(), ids=GAPS.keys())
+def test_what_is_not_known_is_a_gap(source: str, why: str, tmp_path: Path) -> None:
+    found = gaps(infer(tmp_path, source))
+    assert any(why in each for each in found), found
+
+
+NOT_MADE = {
+    "behind a return": in_class('return; create_publisher<std_msgs::msg::String>("a", 1);'),
+    "behind a throw": in_class('throw 1; create_publisher<std_msgs::msg::String>("a", 1);'),
+    "in a branch that is never taken": in_class(
+        'if (false) { create_publisher<std_msgs::msg::String>("a", 1); }'
+    ),
+    "behind a constant of another value": in_class(
+        'if (mode_ == Mode::B) { create_publisher<std_msgs::msg::String>("a", 1); }',
+        "Mode mode_ = Mode::A;",
+        before="enum class Mode { A, B };\n",
+    ),
+    "in a method that nobody calls": in_class(
+        "", 'void unused() { create_publisher<std_msgs::msg::String>("a", 1); }'
+    ),
+    "in a function of another program": in_class(
+        "",
+        before='static void unused(rclcpp::Node & n) { n.create_publisher<std_msgs::msg::String>("a", 1); }\n',
+    ),
+    "under #if 0": in_class('\n#if 0\ncreate_publisher<std_msgs::msg::String>("a", 1);\n#endif\n'),
+    "for another platform": in_class(
+        '\n#ifdef _WIN32\ncreate_publisher<std_msgs::msg::String>("a", 1);\n#endif\n'
+    ),
+    "in a comment": in_class('/* create_publisher<std_msgs::msg::String>("a", 1); */'),
+    "in a text": in_class('const char * help = "create_publisher<T>(topic)";'),
+    "in a loop over nothing": in_class(
+        "for (auto t : std::vector<std::string>{}) { create_publisher<std_msgs::msg::String>(t, 1); }"
+    ),
+    "by the overridden method of a base": HEAD
+    + """
+class B : public rclcpp::Node { public: explicit B() : rclcpp::Node("n") {} void start() { init(); }
+  virtual void init() { create_publisher<std_msgs::msg::String>("a", 1); } };
+class D : public B { void init() override {} };
+int main() { auto d = std::make_shared<D>(); d->start(); }
+""",
+}
+
+
+@pytest.mark.parametrize("source", NOT_MADE.values(), ids=NOT_MADE.keys())
+def test_what_never_runs_is_not_invented(source: str, tmp_path: Path) -> None:
+    system = infer(tmp_path, source)
+    assert names(system) == []
+    assert gaps(system) == []
+
+
+def test_a_branch_that_only_the_build_decides_is_a_gap(tmp_path: Path) -> None:
+    source = in_class('\n#ifdef WITH_DEBUG\ncreate_publisher<std_msgs::msg::String>("a", 1);\n#endif\n')
+    system = infer(tmp_path, source)
+    assert names(system) == []
+    assert gaps(system) == ["publisher a is made only where the build says defined(WITH_DEBUG)"]
+
+
+def test_what_both_sides_of_such_a_branch_make_is_certain(tmp_path: Path) -> None:
+    source = in_class(
+        '\n#ifdef NEW\ncreate_publisher<std_msgs::msg::String>("a", rclcpp::QoS(1));\n#else\n'
+        'create_publisher<std_msgs::msg::String>("a", 1);\n#endif\n'
+    )
+    system = infer(tmp_path, source)
+    assert set(names(system)) == {"a"}
+    assert gaps(system) == []
+
+
+def test_a_definition_of_the_target_decides_the_branch(tmp_path: Path) -> None:
+    from nodl.infer import infer_paths
+
+    source = in_class('\n#ifdef WITH_DEBUG\ncreate_publisher<std_msgs::msg::String>("a", 1);\n#endif\n')
+    cmake = "add_executable(node src/main.cpp)\ntarget_compile_definitions(node PRIVATE WITH_DEBUG)"
+    system = infer_paths([package(tmp_path / "demo", {"src/main.cpp": source}, cmake)])
+    assert names(system) == ["a"]
+    assert gaps(system) == []
+
+
+def test_classes_of_one_name_in_two_files_stay_two(tmp_path: Path) -> None:
+    from nodl.infer import infer_paths
+
+    one = in_class('create_publisher<std_msgs::msg::String>("one", 1);')
+    two = in_class('create_publisher<std_msgs::msg::String>("two", 1);').replace('Node("n")', 'Node("m")')
+    cmake = "add_executable(first src/one.cpp)\nadd_executable(second src/two.cpp)"
+    system = infer_paths([package(tmp_path / "demo", {"src/one.cpp": one, "src/two.cpp": two}, cmake)])
+    assert {(n.executable, n.name, *(str(e.name) for e in n.endpoints)) for n in system.nodes} == {
+        ("first", "n", "one"),
+        ("second", "m", "two"),
+    }
