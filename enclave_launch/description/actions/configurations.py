@@ -9,55 +9,33 @@ from enclave_launch.description.action import Action
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
+from enclave_launch.description.templates import TemplateAction, template
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
-    from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
+    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 @expose_action("let")
-class SetLaunchConfiguration(Action):
+class SetLaunchConfiguration(TemplateAction):
     """Set a launch configuration, for the rest of the scope it is in."""
 
-    def __init__(self, name: SomeSubstitutionsType, value: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__name = normalize_to_list_of_substitutions(name)
-        self.__value = normalize_to_list_of_substitutions(value)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
-        name = parser.parse_substitution(entity.get_attr("name"))
-        value = parser.parse_substitution(entity.get_attr("value"))
-        _, kwargs = super().parse(entity, parser)
-        return cls, {**kwargs, "name": name, "value": value}
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
-
-    @property
-    def value(self) -> list[Substitution]:
-        return self.__value
+    name = template()
+    value = template()
 
     def execute(self, context: LaunchContext) -> None:
-        value = perform_substitutions(context, self.__value)
-        context.launch_configurations[perform_substitutions(context, self.__name)] = value
+        value = perform_substitutions(context, self.value)
+        context.launch_configurations[perform_substitutions(context, self.name)] = value
 
 
-class UnsetLaunchConfiguration(Action):
+class UnsetLaunchConfiguration(TemplateAction):
     """Remove a launch configuration; absent ones are fine."""
 
-    def __init__(self, name: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__name = normalize_to_list_of_substitutions(name)
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
+    name = template()
 
     def execute(self, context: LaunchContext) -> None:
-        context.launch_configurations.pop(perform_substitutions(context, self.__name), None)
+        context.launch_configurations.pop(perform_substitutions(context, self.name), None)
 
 
 class PushLaunchConfigurations(Action):

@@ -13,99 +13,47 @@ from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.substitution import (
-    SomeSubstitutionsType,
     Substitution,
-    normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.description.templates import TemplateAction, template
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
 from enclave_launch.ros_rules.distro import Feature
 
 
+def _read_flag(value: Any) -> Any:
+    return normalize_typed_substitution(value, bool)
+
+
 @expose_action("set_env")
-class SetEnvironmentVariable(Action):
+class SetEnvironmentVariable(TemplateAction):
     """Set an environment variable, for the rest of the scope it is in."""
 
-    def __init__(self, name: SomeSubstitutionsType, value: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__name = normalize_to_list_of_substitutions(name)
-        self.__value = normalize_to_list_of_substitutions(value)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["name"] = parser.parse_substitution(entity.get_attr("name"))
-        kwargs["value"] = parser.parse_substitution(entity.get_attr("value"))
-        return cls, kwargs
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
-
-    @property
-    def value(self) -> list[Substitution]:
-        return self.__value
+    name = template()
+    value = template()
 
     def execute(self, context: LaunchContext) -> None:
-        value = perform_substitutions(context, self.__value)
-        context.environment[perform_substitutions(context, self.__name)] = value
+        value = perform_substitutions(context, self.value)
+        context.environment[perform_substitutions(context, self.name)] = value
 
 
 @expose_action("append_env")
-class AppendEnvironmentVariable(Action):
+class AppendEnvironmentVariable(TemplateAction):
     """Join a value to an environment variable, at its end or front; an unset one is simply set.
 
     A variable that is set but empty still gets the separator.
     """
 
-    def __init__(
-        self,
-        name: SomeSubstitutionsType,
-        value: SomeSubstitutionsType,
-        prepend: bool | SomeSubstitutionsType = False,
-        separator: SomeSubstitutionsType = os.pathsep,
-        **kwargs: Any,
-    ) -> None:
-        super().__init__(**kwargs)
-        self.__name = normalize_to_list_of_substitutions(name)
-        self.__value = normalize_to_list_of_substitutions(value)
-        self.__prepend: Any = normalize_typed_substitution(prepend, bool)
-        self.__separator = normalize_to_list_of_substitutions(separator)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["name"] = parser.parse_substitution(entity.get_attr("name"))
-        kwargs["value"] = parser.parse_substitution(entity.get_attr("value"))
-        prepend = entity.get_attr("prepend", optional=True, data_type=bool, can_be_str=True)
-        if prepend is not None:
-            kwargs["prepend"] = parser.parse_if_substitutions(prepend)
-        separator = entity.get_attr("separator", optional=True)
-        if separator is not None:
-            kwargs["separator"] = parser.parse_substitution(separator)
-        return cls, kwargs
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
-
-    @property
-    def value(self) -> list[Substitution]:
-        return self.__value
-
-    @property
-    def prepend(self) -> Any:
-        return self.__prepend
-
-    @property
-    def separator(self) -> list[Substitution]:
-        return self.__separator
+    name = template()
+    value = template()
+    prepend = template(default=False, read=_read_flag, data_type=bool)
+    separator = template(default=os.pathsep)
 
     def execute(self, context: LaunchContext) -> None:
-        name = perform_substitutions(context, self.__name)
-        value = perform_substitutions(context, self.__value)
-        prepend = perform_typed_substitution(context, self.__prepend, bool)
-        separator = perform_substitutions(context, self.__separator)
+        name = perform_substitutions(context, self.name)
+        value = perform_substitutions(context, self.value)
+        prepend = perform_typed_substitution(context, self.prepend, bool)
+        separator = perform_substitutions(context, self.separator)
         present = context.environment.get(name)
         if present is not None:
             value = value + separator + present if prepend else present + separator + value
@@ -113,25 +61,13 @@ class AppendEnvironmentVariable(Action):
 
 
 @expose_action("unset_env")
-class UnsetEnvironmentVariable(Action):
+class UnsetEnvironmentVariable(TemplateAction):
     """Remove an environment variable; absent ones are fine."""
 
-    def __init__(self, name: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__name = normalize_to_list_of_substitutions(name)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["name"] = parser.parse_substitution(entity.get_attr("name"))
-        return cls, kwargs
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
+    name = template()
 
     def execute(self, context: LaunchContext) -> None:
-        context.environment.pop(perform_substitutions(context, self.__name), None)
+        context.environment.pop(perform_substitutions(context, self.name), None)
 
 
 class PushEnvironment(Action):
@@ -160,29 +96,20 @@ class ResetEnvironment(Action):
         context._reset_environment()
 
 
-# ``set_ros_log_dir``: where processes started from here on write their logs. Not in humble.
-
-
 @expose_action("set_ros_log_dir", feature=Feature.SET_ROS_LOG_DIR)
-class SetROSLogDir(Action):
-    """Joins the value to the log directory in force and puts it into ``ROS_LOG_DIR``."""
+class SetROSLogDir(TemplateAction):
+    """Join the value to the log directory in force, in ``ROS_LOG_DIR``: where processes started from here on write
+    their logs. Not in humble.
+    """
 
-    def __init__(self, new_log_dir: SomeSubstitutionsType, **kwargs: Any):
-        super().__init__(**kwargs)
-        self.__log_dir = normalize_to_list_of_substitutions(new_log_dir)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetROSLogDir], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["new_log_dir"] = parser.parse_substitution(entity.get_attr("new_log_dir"))
-        return cls, kwargs
+    new_log_dir = template()
 
     @property
     def log_dir(self) -> list[Substitution]:
-        return self.__log_dir
+        return self.new_log_dir  # type: ignore[no-any-return]
 
     def execute(self, context: LaunchContext) -> None:
-        directory = perform_substitutions(context, self.__log_dir)
+        directory = perform_substitutions(context, self.new_log_dir)
         current = context.environment.get("ROS_LOG_DIR", _default_log_directory(context.environment))
         joined = os.path.join(current, directory)
         if not os.path.isabs(joined):

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
+from enclave_launch.description.templates import TemplateAction, template
 from enclave_launch.diagnostics import log_level_missing
 from enclave_launch.host.current import current_host, current_release
 from enclave_launch.ros_rules.distro import Feature
@@ -15,27 +16,15 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.entity import Entity
     from enclave_launch.description.markup.parser import Parser
-    from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
+    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
-class LogInfo(Action):
+class LogInfo(TemplateAction):
     """Log a message as ``launch.user``."""
 
     level_name = "INFO"
 
-    def __init__(self, *, msg: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__msg = normalize_to_list_of_substitutions(msg)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["msg"] = parser.parse_substitution(entity.get_attr("message"))
-        return cls, kwargs
-
-    @property
-    def msg(self) -> list[Substitution]:
-        return self.__msg
+    msg = template(attribute="message", keyword_only=True)
 
     def log_level(self, context: LaunchContext) -> str:
         """The name of the level, upper case."""
@@ -47,7 +36,7 @@ class LogInfo(Action):
         from enclave_launch.description.logging import get_logger
 
         level = logging.getLevelName(self.log_level(context))
-        get_logger("launch.user").log(level, "%s", perform_substitutions(context, self.__msg))
+        get_logger("launch.user").log(level, "%s", perform_substitutions(context, self.msg))
 
 
 @expose_action("log")
@@ -65,9 +54,9 @@ _LEVELS = ("NOTSET", "DEBUG", "INFO", "WARN", "WARNING", "ERROR", "FATAL", "CRIT
 class Log(LogInfo):
     """Log a message at a level that may be a substitution."""
 
-    def __init__(self, *, msg: SomeSubstitutionsType, level: SomeSubstitutionsType, **kwargs: Any) -> None:
-        super().__init__(msg=msg, **kwargs)
-        self.__level = normalize_to_list_of_substitutions(level)
+    def __init__(self, *, level: SomeSubstitutionsType, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.level = normalize_to_list_of_substitutions(level)
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
@@ -79,12 +68,8 @@ class Log(LogInfo):
         kwargs["level"] = parser.parse_substitution("INFO" if level is None else level)
         return cls, kwargs
 
-    @property
-    def level(self) -> list[Substitution]:
-        return self.__level
-
     def log_level(self, context: LaunchContext) -> str:
-        level = perform_substitutions(context, self.__level).upper()
+        level = perform_substitutions(context, self.level).upper()
         if level not in _LEVELS:
             raise KeyError(f"Invalid log level '{level}', expected: {list(_LEVELS)}")
         return level

@@ -18,11 +18,11 @@ from enclave_launch.description.parameters.types import ParameterName, Parameter
 from enclave_launch.description.remap_rules import PlacedRule
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
-    Substitution,
     SubstitutionFailure,
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.description.templates import TemplateAction, template
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute, prefix_namespace, push_enclave_scope
@@ -31,41 +31,20 @@ from nodl.names import InvalidNameError, validate_namespace
 
 @expose_action("push_ros_namespace")
 @expose_action("push-ros-namespace")
-class PushROSNamespace(Action):
+class PushROSNamespace(TemplateAction):
     """Joins ``namespace`` to the launch configuration ``ros_namespace``; only a scoped group pops it.
 
     ``enclave`` goes to the enclave scope instead of the namespace (Security Enclaves article,
     ``<push_ros_namespace namespace="foo" enclave="bar"/>``).
     """
 
-    def __init__(
-        self, namespace: SomeSubstitutionsType, *, enclave: SomeSubstitutionsType | None = None, **kwargs: Any
-    ):
-        super().__init__(**kwargs)
-        self.__namespace = normalize_to_list_of_substitutions(namespace)
-        self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[PushROSNamespace], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["namespace"] = parser.parse_substitution(entity.get_attr("namespace"))
-        enclave = entity.get_attr("enclave", optional=True)
-        if enclave is not None:
-            kwargs["enclave"] = parser.parse_substitution(enclave)
-        return cls, kwargs
-
-    @property
-    def namespace(self) -> list[Substitution]:
-        return self.__namespace
-
-    @property
-    def enclave(self) -> list[Substitution] | None:
-        return self.__enclave
+    namespace = template()
+    enclave = template(default=None, keyword_only=True)
 
     def execute(self, context: LaunchContext) -> None:
         """Raises ``SubstitutionFailure`` when the joined namespace is not valid."""
-        pushed = perform_substitutions(context, self.__namespace)
-        enclave = None if self.__enclave is None else perform_substitutions(context, self.__enclave)
+        pushed = perform_substitutions(context, self.namespace)
+        enclave = None if self.enclave is None else perform_substitutions(context, self.enclave)
         previous = context.launch_configurations.get("ros_namespace")
         namespace = make_namespace_absolute(prefix_namespace(previous, pushed))
         try:
@@ -82,67 +61,36 @@ class PushROSNamespace(Action):
 PushRosNamespace = PushROSNamespace  # the older name, the only one in humble
 
 
-# ``push_ros_enclave``: the enclave scope of what follows, without touching the namespace.
-#
-# Not part of upstream's launch_ros: the second of the two alternatives in the Security Enclaves article.
-
-
 @expose_action("push_ros_enclave")
 @expose_action("push-ros-enclave")
-class PushRosEnclave(Action):
-    """A relative ``enclave`` nests in the scope in force, an absolute one replaces it."""
+class PushRosEnclave(TemplateAction):
+    """The enclave scope of what follows: a relative ``enclave`` nests in the one in force, an absolute one replaces it.
 
-    def __init__(self, enclave: SomeSubstitutionsType, **kwargs: Any):
-        super().__init__(**kwargs)
-        self.__enclave = normalize_to_list_of_substitutions(enclave)
+    The namespace stays. Not in upstream's launch_ros: the second alternative in the Security Enclaves article.
+    """
 
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[PushRosEnclave], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["enclave"] = parser.parse_substitution(entity.get_attr("enclave"))
-        return cls, kwargs
-
-    @property
-    def enclave(self) -> list[Substitution]:
-        return self.__enclave
+    enclave = template()
 
     def execute(self, context: LaunchContext) -> None:
-        push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.__enclave))
+        push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.enclave))
 
 
 @expose_action("set_remap")
-class SetRemap(Action):
+class SetRemap(TemplateAction):
     """Appends to the list in the launch configuration ``ros_remaps``.
 
     A scope copies the dictionary, not the list: a rule set in a group leaks out of it when the list
     existed before, exactly as in launch.
     """
 
-    def __init__(self, src: SomeSubstitutionsType, dst: SomeSubstitutionsType, **kwargs: Any):
-        super().__init__(**kwargs)
-        self.__src = normalize_to_list_of_substitutions(src)
-        self.__dst = normalize_to_list_of_substitutions(dst)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetRemap], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["src"] = parser.parse_substitution(entity.get_attr("from"))
-        kwargs["dst"] = parser.parse_substitution(entity.get_attr("to"))
-        return cls, kwargs
-
-    @property
-    def src(self) -> list[Substitution]:
-        return self.__src
-
-    @property
-    def dst(self) -> list[Substitution]:
-        return self.__dst
+    src = template(attribute="from")
+    dst = template(attribute="to")
 
     def execute(self, context: LaunchContext) -> None:
         rule = PlacedRule.at(
             location_of(self, context),
-            perform_substitutions(context, self.__src),
-            perform_substitutions(context, self.__dst),
+            perform_substitutions(context, self.src),
+            perform_substitutions(context, self.dst),
         )
         context.launch_configurations.setdefault("ros_remaps", []).append(rule)
 
@@ -179,30 +127,19 @@ class SetParameter(Action):
 
 
 @expose_action("set_parameters_from_file")
-class SetParametersFromFile(Action):
+class SetParametersFromFile(TemplateAction):
     """Appends the path to ``global_params``. Whether the file exists is checked where it is used."""
 
-    def __init__(self, filename: SomeSubstitutionsType, **kwargs: Any):
-        super().__init__(**kwargs)
-        self._input_file = normalize_to_list_of_substitutions(filename)
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetParametersFromFile], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["filename"] = parser.parse_substitution(entity.get_attr("filename"))
-        return cls, kwargs
+    filename = template()
 
     def execute(self, context: LaunchContext) -> None:
-        path = perform_substitutions(context, self._input_file)
+        path = perform_substitutions(context, self.filename)
         context.launch_configurations.setdefault("global_params", []).append(path)
-
-
-# ``set_use_sim_time``: the clock of launch's own node (for ``ros_timer``), not of the nodes it starts.
 
 
 @expose_action("set_use_sim_time")
 class SetUseSimTime(Action):
-    """Launched nodes get ``use_sim_time`` through ``SetParameter`` instead."""
+    """The clock of launch's own node (for ``ros_timer``). Launched nodes get ``use_sim_time`` by ``SetParameter``."""
 
     def __init__(self, value: bool | SomeSubstitutionsType, **kwargs: Any):
         super().__init__(**kwargs)

@@ -15,6 +15,7 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.description.templates import TemplateSubstitution, described, template
 from enclave_launch.diagnostics import command_stderr
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
@@ -29,37 +30,23 @@ _MODES = ("fail", "ignore", "warn", "capture")
 
 
 @expose_substitution("command")
-class Command(Substitution):
+class Command(TemplateSubstitution):
     """What a command writes to stdout, unstripped. Run without a shell, each time it is performed.
 
     ``on_stderr``: ``fail`` when it writes there, ``warn``, ``ignore``, or ``capture`` it with stdout.
     """
 
-    def __init__(self, command: SomeSubstitutionsType, *, on_stderr: SomeSubstitutionsType = "fail") -> None:
-        self.__command = normalize_to_list_of_substitutions(command)
-        self.__on_stderr = normalize_to_list_of_substitutions(on_stderr)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if not 1 <= len(data) <= 2:
-            raise ValueError("command substitution expects 1 or 2 arguments")
-        return cls, dict(zip(("command", "on_stderr"), data, strict=False))
-
-    @property
-    def command(self) -> list[Substitution]:
-        return self.__command
-
-    @property
-    def on_stderr(self) -> list[Substitution]:
-        return self.__on_stderr
+    command = template()
+    on_stderr = template(default="fail", keyword_only=True)
+    refusal = (ValueError, "command substitution expects 1 or 2 arguments")
 
     def describe(self) -> str:
-        return f"Command({' + '.join(sub.describe() for sub in self.__command)})"
+        return f"Command({described(self.command)})"
 
     def perform(self, context: LaunchContext) -> str:
-        text = perform_substitutions(context, self.__command)
+        text = perform_substitutions(context, self.command)
         words = shlex.split(text)
-        mode = perform_substitutions(context, self.__on_stderr)
+        mode = perform_substitutions(context, self.on_stderr)
         if mode not in _MODES:
             raise SubstitutionFailure(
                 "expected 'on_stderr' to be one of: 'fail', 'ignore', 'warn' or 'capture'"
@@ -155,27 +142,17 @@ def _names(modules: list[str]) -> dict[str, Any]:
 
 
 @expose_substitution("file-content", feature=Feature.FILE_CONTENT)
-class FileContent(Substitution):
+class FileContent(TemplateSubstitution):
     """The text of a file, unstripped."""
 
-    def __init__(self, path: SomeSubstitutionsType) -> None:
-        self.__path = normalize_to_list_of_substitutions(path)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if len(data) != 1:
-            raise AttributeError("file content substitutions expect 1 argument")
-        return cls, {"path": data[0]}
-
-    @property
-    def path(self) -> list[Substitution]:
-        return self.__path
+    path = template()
+    refusal = (AttributeError, "file content substitutions expect 1 argument")
 
     def describe(self) -> str:
-        return f"FileContent({', '.join(sub.describe() for sub in self.__path)})"
+        return f"FileContent({', '.join(sub.describe() for sub in self.path)})"
 
     def perform(self, context: LaunchContext) -> str:
-        path = perform_substitutions(context, self.__path)
+        path = perform_substitutions(context, self.path)
         try:
             with open(path) as file:
                 return file.read()
@@ -184,27 +161,17 @@ class FileContent(Substitution):
 
 
 @expose_substitution("find-exec")
-class FindExecutable(Substitution):
+class FindExecutable(TemplateSubstitution):
     """The path of a program on the ``PATH``."""
 
-    def __init__(self, *, name: SomeSubstitutionsType) -> None:
-        self.__name = normalize_to_list_of_substitutions(name)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if len(data) != 1:
-            raise AttributeError("find-exec substitution expects 1 argument")
-        return cls, {"name": data[0]}
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
+    name = template(keyword_only=True)
+    refusal = (AttributeError, "find-exec substitution expects 1 argument")
 
     def describe(self) -> str:
-        return f"FindExec({' + '.join(sub.describe() for sub in self.__name)})"
+        return f"FindExec({described(self.name)})"
 
     def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self.__name)
+        name = perform_substitutions(context, self.name)
         path = context.host.find_program(name)
         if path is None:
             raise SubstitutionFailure(f"executable '{name}' not found on the PATH")

@@ -14,6 +14,7 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.description.templates import TemplateSubstitution, template
 from enclave_launch.description.typed_values import is_substitution, perform_typed_substitution
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
@@ -39,53 +40,29 @@ def _text(value: bool) -> str:
 
 
 @expose_substitution("not")
-class NotSubstitution(Substitution):
-    def __init__(self, value: SomeSubstitutionsType) -> None:
-        self.__value = normalize_to_list_of_substitutions(value)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> Parsed:
-        if len(data) != 1:
-            raise TypeError("not substitution expects 1 argument")
-        return cls, {"value": data[0]}
-
-    @property
-    def value(self) -> list[Substitution]:
-        return self.__value
+class NotSubstitution(TemplateSubstitution):
+    value = template()
+    refusal = (TypeError, "not substitution expects 1 argument")
 
     def describe(self) -> str:
-        return f"NotSubstitution({self.__value})"
+        return f"NotSubstitution({self.value})"
 
     def perform(self, context: LaunchContext) -> str:
-        return _text(not perform_boolean(context, self.__value))
+        return _text(not perform_boolean(context, self.value))
 
 
-class _Binary(Substitution):
+class _Binary(TemplateSubstitution):
     """Both operands are always performed."""
 
-    def __init__(self, left: SomeSubstitutionsType, right: SomeSubstitutionsType) -> None:
-        self.__left = normalize_to_list_of_substitutions(left)
-        self.__right = normalize_to_list_of_substitutions(right)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> Parsed:
-        if len(data) != 2:
-            raise TypeError("and substitution expects 2 arguments")
-        return cls, {"left": data[0], "right": data[1]}
-
-    @property
-    def left(self) -> list[Substitution]:
-        return self.__left
-
-    @property
-    def right(self) -> list[Substitution]:
-        return self.__right
+    left = template()
+    right = template()
+    refusal = (TypeError, "and substitution expects 2 arguments")
 
     def describe(self) -> str:
-        return f"{type(self).__name__}({self.__left} {self.__right})"
+        return f"{type(self).__name__}({self.left} {self.right})"
 
     def _operands(self, context: LaunchContext) -> tuple[bool, bool]:
-        return perform_boolean(context, self.__left), perform_boolean(context, self.__right)
+        return perform_boolean(context, self.left), perform_boolean(context, self.right)
 
 
 @expose_substitution("and")
@@ -147,43 +124,30 @@ class AllSubstitution(_Variadic):
 _TRUE, _FALSE = ("true", "1"), ("false", "0")
 
 
+def _read(value: Any) -> list[Substitution]:
+    if is_substitution(value):
+        return normalize_to_list_of_substitutions(value)
+    if value is None:
+        value = ""
+    text = str(value)
+    return normalize_to_list_of_substitutions(text.lower() if isinstance(value, bool) else text)
+
+
 @expose_substitution("equals", feature=Feature.EQUALS_IF)
-class EqualsSubstitution(Substitution):
+class EqualsSubstitution(TemplateSubstitution):
     """``true`` when both are the same boolean, else the same number, else the same text."""
 
-    def __init__(self, left: Any, right: Any) -> None:
-        self.__left = normalize_to_list_of_substitutions(_as_text(left))
-        self.__right = normalize_to_list_of_substitutions(_as_text(right))
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if len(data) != 2:
-            raise TypeError("and substitution expects 2 arguments")
-        return cls, {"left": data[0], "right": data[1]}
-
-    @property
-    def left(self) -> list[Substitution]:
-        return self.__left
-
-    @property
-    def right(self) -> list[Substitution]:
-        return self.__right
+    left = template(read=_read)
+    right = template(read=_read)
+    refusal = (TypeError, "and substitution expects 2 arguments")
 
     def describe(self) -> str:
-        return f"{type(self).__name__}({self.__left} {self.__right})"
+        return f"{type(self).__name__}({self.left} {self.right})"
 
     def perform(self, context: LaunchContext) -> str:
-        left = perform_substitutions(context, self.__left)
-        right = perform_substitutions(context, self.__right)
+        left = perform_substitutions(context, self.left)
+        right = perform_substitutions(context, self.right)
         return "true" if _equal(left, right) else "false"
-
-
-def _as_text(value: Any) -> Any:
-    if is_substitution(value):
-        return value
-    if value is None:
-        return ""
-    return str(value).lower() if isinstance(value, bool) else str(value)
 
 
 def _equal(left: str, right: str) -> bool:
@@ -205,8 +169,13 @@ class NotEqualsSubstitution(EqualsSubstitution):
 
 
 @expose_substitution("if", feature=Feature.EQUALS_IF)
-class IfElseSubstitution(Substitution):
+class IfElseSubstitution(TemplateSubstitution):
     """One of two values; only that one is performed."""
+
+    condition = template()
+    if_value = template(default="")
+    else_value = template(default="")
+    refusal = (TypeError, "if substitution expects from 2 or 3 arguments")
 
     def __init__(
         self,
@@ -216,31 +185,17 @@ class IfElseSubstitution(Substitution):
     ) -> None:
         if if_value == else_value == "":
             raise RuntimeError("One of if_value and else_value must be specified")
-        self._condition = normalize_to_list_of_substitutions(condition)
-        self._if_value = normalize_to_list_of_substitutions(if_value)
-        self._else_value = normalize_to_list_of_substitutions(else_value)
+        super().__init__(condition, if_value, else_value)
 
     @classmethod
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if not 2 <= len(data) <= 3:
-            raise TypeError("if substitution expects from 2 or 3 arguments")
-        return cls, dict(zip(("condition", "if_value", "else_value"), data, strict=False))
-
-    @property
-    def condition(self) -> list[Substitution]:
-        return self._condition
-
-    @property
-    def if_value(self) -> list[Substitution]:
-        return self._if_value
-
-    @property
-    def else_value(self) -> list[Substitution]:
-        return self._else_value
+        if len(data) < 2:
+            raise TypeError(cls.refusal[1])
+        return super().parse(data)
 
     def describe(self) -> str:
-        return f"IfElseSubstitution({self._condition}, {self._if_value}, {self._else_value})"
+        return f"IfElseSubstitution({self.condition}, {self.if_value}, {self.else_value})"
 
     def perform(self, context: LaunchContext) -> str:
-        chosen = self._if_value if perform_boolean(context, self._condition) else self._else_value
+        chosen = self.if_value if perform_boolean(context, self.condition) else self.else_value
         return perform_substitutions(context, chosen)

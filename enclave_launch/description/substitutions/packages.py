@@ -2,39 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
-
 from enclave_launch.description import ament_index as packages
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
-    SomeSubstitutionsType,
-    Substitution,
     SubstitutionFailure,
-    normalize_to_list_of_substitutions,
     perform_substitutions,
 )
 from enclave_launch.description.substitutions.paths import PathOperator
+from enclave_launch.description.templates import TemplateSubstitution, template
 from nodl.ament_index import ExecutableNotFoundError
 
 
-class FindPackage(PathOperator, Substitution):
+class FindPackage(PathOperator, TemplateSubstitution):
     """A directory that belongs to a package; subclasses say which in ``find``."""
 
-    def __init__(self, package: SomeSubstitutionsType):
-        super().__init__()
-        self.__package = normalize_to_list_of_substitutions(package)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[FindPackage], dict[str, Any]]:
-        if not data or len(data) != 1:
-            raise AttributeError("find package substitutions expect 1 argument")
-        return cls, {"package": data[0]}
-
-    @property
-    def package(self) -> list[Substitution]:
-        return self.__package
+    package = template()
+    refusal = (AttributeError, "find package substitutions expect 1 argument")
 
     def find(self, package_name: str) -> str:
         """Raises ``PackageNotFoundError``, ``ValueError`` for what cannot be a package name."""
@@ -45,7 +29,7 @@ class FindPackage(PathOperator, Substitution):
         return f"{type(self).__name__}(pkg={package})"
 
     def perform(self, context: LaunchContext) -> str:
-        return self.find(perform_substitutions(context, self.__package))
+        return self.find(perform_substitutions(context, self.package))
 
 
 @expose_substitution("find-pkg-prefix")
@@ -67,19 +51,9 @@ class FindPackageShare(FindPackage):
 class ExecutableInPackage(FindPackagePrefix):
     """The path ``<prefix>/lib/<package>/<executable>``."""
 
-    def __init__(self, executable: SomeSubstitutionsType, package: SomeSubstitutionsType):
-        super().__init__(package)
-        self.__executable = normalize_to_list_of_substitutions(executable)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[ExecutableInPackage], dict[str, Any]]:
-        if not data or len(data) != 2:
-            raise AttributeError("exec-in-package substitution expects 2 arguments")
-        return cls, {"executable": data[0], "package": data[1]}
-
-    @property
-    def executable(self) -> list[Substitution]:
-        return self.__executable
+    executable = template()
+    package = template()
+    refusal = (AttributeError, "exec-in-package substitution expects 2 arguments")
 
     def describe(self) -> str:
         executable = " + ".join(part.describe() for part in self.executable)
@@ -88,7 +62,7 @@ class ExecutableInPackage(FindPackagePrefix):
 
     def perform(self, context: LaunchContext) -> str:
         """Raises as ``find``, and ``SubstitutionFailure`` when the package lacks the executable."""
-        executable = perform_substitutions(context, self.__executable)
+        executable = perform_substitutions(context, self.executable)
         package = perform_substitutions(context, self.package)
         try:
             return context.host.find_executable(package, executable)

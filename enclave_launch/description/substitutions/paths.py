@@ -13,6 +13,7 @@ from enclave_launch.description.substitution import (
     SubstitutionFailure,
     normalize_to_list_of_substitutions,
 )
+from enclave_launch.description.templates import TemplateSubstitution
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
@@ -96,14 +97,10 @@ class PathSubstitution(PathOperator, Substitution):
 
 
 @expose_substitution("filename")
-class ThisLaunchFile(Substitution):
+class ThisLaunchFile(TemplateSubstitution):
     """The path of the launch file being visited; an include leaves its own behind."""
 
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if len(data) != 0:
-            raise TypeError("filename substitution doesn't expect arguments")
-        return cls, {}
+    refusal = (TypeError, "filename substitution doesn't expect arguments")
 
     def describe(self) -> str:
         return "ThisLaunchFile()"
@@ -116,14 +113,10 @@ class ThisLaunchFile(Substitution):
 
 
 @expose_substitution("dirname")
-class ThisLaunchFileDir(PathOperator, Substitution):
+class ThisLaunchFileDir(PathOperator, TemplateSubstitution):
     """The directory of the launch file being visited; an include leaves its own behind."""
 
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if len(data) != 0:
-            raise TypeError("dirname substitution doesn't expect arguments")
-        return cls, {}
+    refusal = (TypeError, "dirname substitution doesn't expect arguments")
 
     def describe(self) -> str:
         return "ThisLaunchFileDir()"
@@ -137,14 +130,10 @@ class ThisLaunchFileDir(PathOperator, Substitution):
 
 @expose_substitution("launch_log_dir", feature=Feature.LAUNCH_LOG_DIR)
 @expose_substitution("log_dir")
-class LaunchLogDir(Substitution):
+class LaunchLogDir(TemplateSubstitution):
     """The directory of this run's log files."""
 
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if len(data) != 0:
-            raise TypeError("launch_log_dir/log_dir substitution doesn't expect arguments")
-        return cls, {}
+    refusal = (TypeError, "launch_log_dir/log_dir substitution doesn't expect arguments")
 
     def describe(self) -> str:
         return "LaunchLogDir()"

@@ -14,43 +14,12 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.description.templates import TemplateSubstitution, described, template
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.substitution import SomeSubstitutionsType
-
-
-@expose_substitution("var")
-class LaunchConfiguration(Substitution):
-    """The value of a launch configuration; the default, turned to text, is performed only if it is not set."""
-
-    def __init__(self, variable_name: SomeSubstitutionsType, *, default: Any = None) -> None:
-        self.__variable_name = normalize_to_list_of_substitutions(variable_name)
-        self.__default = None if default is None else _as_text(default)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if not 1 <= len(data) <= 2:
-            raise TypeError("var substitution expects 1 or 2 arguments")
-        return cls, dict(zip(("variable_name", "default"), data, strict=False))
-
-    @property
-    def variable_name(self) -> list[Substitution]:
-        return self.__variable_name
-
-    def describe(self) -> str:
-        return f"LaunchConfig({' + '.join(sub.describe() for sub in self.__variable_name)})"
-
-    def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self.__variable_name)
-        configurations = context.launch_configurations
-        if name in configurations:
-            value: str = configurations[name]
-            return value
-        if self.__default is None:
-            raise SubstitutionFailure(f"launch configuration '{name}' does not exist")
-        return perform_substitutions(context, self.__default)
 
 
 def _as_text(default: Any) -> list[Substitution]:
@@ -60,40 +29,42 @@ def _as_text(default: Any) -> list[Substitution]:
     )
 
 
-@expose_substitution("env")
-class EnvironmentVariable(Substitution):
-    """The value of an environment variable. The default is performed in any case."""
+@expose_substitution("var")
+class LaunchConfiguration(TemplateSubstitution):
+    """The value of a launch configuration; the default, turned to text, is performed only if it is not set."""
 
-    def __init__(
-        self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None
-    ) -> None:
-        self.__name = normalize_to_list_of_substitutions(name)
-        self.__default_value = (
-            None if default_value is None else normalize_to_list_of_substitutions(default_value)
-        )
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if not 1 <= len(data) <= 2:
-            raise TypeError("env substitution expects 1 or 2 arguments")
-        return cls, dict(zip(("name", "default_value"), data, strict=False))
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
-
-    @property
-    def default_value(self) -> list[Substitution] | None:
-        return self.__default_value
+    variable_name = template()
+    default = template(default=None, keyword_only=True, read=_as_text)
+    refusal = (TypeError, "var substitution expects 1 or 2 arguments")
 
     def describe(self) -> str:
-        return f"EnvVar({' + '.join(sub.describe() for sub in self.__name)})"
+        return f"LaunchConfig({described(self.variable_name)})"
 
     def perform(self, context: LaunchContext) -> str:
-        default = (
-            None if self.__default_value is None else perform_substitutions(context, self.__default_value)
-        )
-        name = perform_substitutions(context, self.__name)
+        name = perform_substitutions(context, self.variable_name)
+        configurations = context.launch_configurations
+        if name in configurations:
+            value: str = configurations[name]
+            return value
+        if self.default is None:
+            raise SubstitutionFailure(f"launch configuration '{name}' does not exist")
+        return perform_substitutions(context, self.default)
+
+
+@expose_substitution("env")
+class EnvironmentVariable(TemplateSubstitution):
+    """The value of an environment variable. The default is performed in any case."""
+
+    name = template()
+    default_value = template(default=None, keyword_only=True)
+    refusal = (TypeError, "env substitution expects 1 or 2 arguments")
+
+    def describe(self) -> str:
+        return f"EnvVar({described(self.name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        default = None if self.default_value is None else perform_substitutions(context, self.default_value)
+        name = perform_substitutions(context, self.name)
         value = context.environment.get(name, default)
         if value is None:
             raise SubstitutionFailure(f"environment variable '{name}' does not exist")
@@ -131,44 +102,31 @@ def local_name(name: str) -> str:
 
 
 @expose_substitution("for-var", feature=Feature.FOR_EACH)
-class ForEachVar(Substitution):
+class ForEachVar(TemplateSubstitution):
     """A value of the round of ``for_each`` that is being visited."""
 
-    def __init__(
-        self, name: SomeSubstitutionsType, *, default_value: SomeSubstitutionsType | None = None
-    ) -> None:
-        self._name = normalize_to_list_of_substitutions(name)
-        self._default_value = (
-            None if default_value is None else normalize_to_list_of_substitutions(default_value)
-        )
+    name = template()
+    default_value = template(default=None, keyword_only=True)
 
     @classmethod
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
         if not 1 <= len(data) <= 2:
             raise ValueError(f"{cls.__name__} substitution expects 1 or 2 arguments")
-        return cls, dict(zip(("name", "default_value"), data, strict=False))
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self._name
-
-    @property
-    def default_value(self) -> list[Substitution] | None:
-        return self._default_value
+        return super().parse(data)
 
     def describe(self) -> str:
-        return f"{type(self).__name__}(name={' + '.join(sub.describe() for sub in self._name)})"
+        return f"{type(self).__name__}(name={described(self.name)})"
 
     def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self._name)
+        name = perform_substitutions(context, self.name)
         value: str | None = context.get_locals_as_dict().get(local_name(name))
         if value is not None:
             return value
-        if self._default_value is None:
+        if self.default_value is None:
             raise RuntimeError(
                 f"No value available for {type(self).__name__} '{name}' and no default value provided"
             )
-        return perform_substitutions(context, self._default_value)
+        return perform_substitutions(context, self.default_value)
 
 
 @expose_substitution("index", feature=Feature.FOR_LOOP)
@@ -180,27 +138,17 @@ class ForLoopIndex(ForEachVar):
 
 
 @expose_substitution("anon")
-class AnonName(Substitution):
+class AnonName(TemplateSubstitution):
     """A unique name; the same for the same argument within one scope of launch configurations."""
 
-    def __init__(self, name: SomeSubstitutionsType) -> None:
-        self.__name = normalize_to_list_of_substitutions(name)
-
-    @classmethod
-    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
-        if len(data) != 1:
-            raise TypeError("anon substitution expects 1 argument")
-        return cls, {"name": data[0]}
-
-    @property
-    def name(self) -> list[Substitution]:
-        return self.__name
+    name = template()
+    refusal = (TypeError, "anon substitution expects 1 argument")
 
     def describe(self) -> str:
-        return f"AnonName({' + '.join(sub.describe() for sub in self.__name)})"
+        return f"AnonName({described(self.name)})"
 
     def perform(self, context: LaunchContext) -> str:
-        name = perform_substitutions(context, self.__name)
+        name = perform_substitutions(context, self.name)
         configurations = context.launch_configurations
         if context.host.release.has(Feature.FLAT_ANONYMOUS_NAMES):
             known, key = configurations, f"anon{name}"
