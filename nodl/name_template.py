@@ -10,6 +10,8 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from nodl.names import InvalidNameError, expand_name
+
 Edit = tuple[str, tuple[str, ...]]
 """A method of ``str`` with its arguments: ``("strip", ("/",))``."""
 
@@ -62,7 +64,21 @@ class ParameterPart(NamedTuple):
         for method, arguments in self.edits:
             if method in EDITS:
                 text = getattr(text, method)(*arguments)
+            elif method == "remapped":
+                text = _remapped(text, *arguments)
         return text
+
+
+def _remapped(text: str, namespace: str, node: str, *pairs: str) -> str:
+    """``text`` under remap rules (matches and replacements in turn) that the program gives to its node."""
+    try:
+        full = expand_name(text, namespace=namespace, node=node)
+        for match, replacement in zip(pairs[::2], pairs[1::2], strict=True):
+            if expand_name(match, namespace=namespace, node=node) == full:
+                return replacement
+    except InvalidNameError:
+        return text
+    return text
 
 
 class UnknownPart(NamedTuple):

@@ -18,7 +18,16 @@ from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Frame, R
 from nodl.infer.interpreter.tables import new_run
 from nodl.infer.models.foreign import is_node_class
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.values import ANY, ClassValue, External, FunctionValue, Instance, ModuleValue, unknown
+from nodl.infer.values import (
+    ANY,
+    BoundMethod,
+    ClassValue,
+    External,
+    FunctionValue,
+    Instance,
+    ModuleValue,
+    unknown,
+)
 from nodl.source_ref import SourceRef
 
 MAX_ROUNDS = 12
@@ -97,17 +106,33 @@ def _analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) ->
         settle(run)
 
 
+def _expect_escaped(run: Run, expected: set[object]) -> None:
+    """Code that was handed a class or an object may make objects of it and call its methods, in any order."""
+    for atom in list(run.escaped):
+        if atom in expected:
+            continue
+        expected.add(atom)
+        if isinstance(atom, ClassValue):
+            run.callbacks.setdefault(atom, None)
+        else:
+            _expect_methods(run, (atom,))
+
+
 def _expect_methods(run: Run, value: Iterable[object]) -> None:
     for instance in value:
         if not isinstance(instance, Instance) or not isinstance(instance.cls, ClassValue):
             continue
-        frame = Frame(instance.cls.module, {}, None, 0)
         for base in linearized(instance.cls):
             if not isinstance(base, ClassValue):
                 continue
             for name in list(base.cells):
-                if isinstance(name, str) and not name.startswith(("__", "[")):
-                    run.register_callback(run.attribute((instance,), name, base.node, frame), None)
+                if isinstance(name, str) and name not in _NOT_CALLED and not name.startswith("["):
+                    value = base.cells.get(name, ())
+                    bound = tuple(BoundMethod(a, instance) for a in value if isinstance(a, FunctionValue))
+                    run.register_callback(bound, None)
+
+
+_NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_getitem__", "__set_name__"})
 
 
 def _is_node(cls: ClassValue) -> bool:
@@ -135,7 +160,9 @@ def settle(run: Run) -> None:
     in_vain: dict[
         tuple[object, int | None], tuple[int, int]
     ] = {}  # the version that a callback left as it was
+    expected: set[object] = set()
     for turn in range(MAX_ROUNDS):
+        _expect_escaped(run, expected)
         before = run.state.version(), dict(run.callbacks)
         for callback, arity in before[1].items():
             version = run.state.version()
@@ -145,7 +172,7 @@ def settle(run: Run) -> None:
             run.state.repeatedly(_called_back(run, callback, arity), turn >= WIDEN_TEXTS_FROM)
             if run.state.version() == version:
                 in_vain[callback, arity] = version
-        if before == (run.state.version(), run.callbacks):
+        if before == (run.state.version(), run.callbacks) and expected.issuperset(run.escaped):
             break
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
@@ -158,7 +185,9 @@ def _called_back(run: Run, callback: object, arity: int | None) -> Callable[[], 
     module = next(iter(run.modules.values()))
 
     def call() -> bool:
-        _call(run, module, callback, args)
+        made = _call(run, module, callback, args)
+        if isinstance(callback, ClassValue):
+            run.escape_value(made)
         return True
 
     return call

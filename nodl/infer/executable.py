@@ -18,6 +18,7 @@ from dataclasses import dataclass
 from enclave_launch.boundary.files import check_regular, read_text
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executable_path
 from nodl.infer.analysis import start, start_function
+from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.program import Program
 from nodl.infer.results import Origin, interfaces_of
@@ -67,6 +68,8 @@ def infer_executable(
     with without_collector():
         run = finder.run(path, package, executable)
         interfaces = interfaces_of(run.findings, Origin(package, executable))
+        for gap in unsettled_places(run):
+            run.findings.gap(gap.source, gap.why)
     if not interfaces:
         reasons = "; ".join(f"{source}: {why}" for source, why in run.findings.gaps)
         return InferredExecutable((), f"no node was found in {path}" + (f" ({reasons})" if reasons else ""))

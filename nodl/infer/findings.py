@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from nodl.infer.values import BOTTOM, Value, join
+from nodl.infer.values import BOTTOM, FieldCells, Value, join
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
 
@@ -40,6 +40,7 @@ class NodeRecord:
     use_global_arguments: Value = (True,)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     class_key: object = None
+    cells: FieldCells = field(default_factory=FieldCells)  # parameters that the program sets itself
 
     def add_endpoint(self, endpoint: FoundEndpoint) -> None:
         self.endpoints.setdefault(endpoint)

@@ -15,6 +15,8 @@ from dataclasses import dataclass, field
 
 from enclave_launch.boundary.files import read_bytes
 
+from nodl.infer.mangling import mangle
+
 MAX_SOURCE_BYTES = 1_000_000
 
 # Libraries whose behaviour the models describe; their sources are never analysed.
@@ -159,4 +161,5 @@ def _parse(path: str, name: str) -> SourceModule:
         return SourceModule(name, path, empty, "", is_package, why, error.lineno or 0)
     except (ValueError, RecursionError, MemoryError) as error:
         return SourceModule(name, path, empty, "", is_package, f"cannot be parsed: {error}")
-    return SourceModule(name, path, tree, data.decode("utf-8", "replace"), is_package)
+    text = data.decode("utf-8", "replace")
+    return SourceModule(name, path, mangle(tree, text), text, is_package)

@@ -46,6 +46,12 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) 
         gaps.append(Gap(record.source, "the node that these interfaces belong to is not known"))
     elif names == [None]:
         gaps.append(Gap(record.source, "the name of this node is made at run time"))
+    if not all(atom is None or isinstance(atom, str) for atom in record.namespaces):
+        gaps.append(
+            Gap(record.source, f"the namespace of this node is made at run time{_made_of(record.namespaces)}")
+        )
+    if record.created and names != [None] and not all(isinstance(atom, str) for atom in record.names):
+        gaps.append(Gap(record.source, f"the name of this node is made at run time{_made_of(record.names)}"))
     interfaces = []
     for name in names:
         for namespace in _namespaces(record):
@@ -64,6 +70,12 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) 
             )
             interfaces.append(remapped(interface, rules) if rules.local or rules.process else interface)
     return interfaces
+
+
+def _made_of(value: Value) -> str:
+    """The inputs in ``value``, for the reader."""
+    shown = [str(template) for atom in value if isinstance(atom, Text) for template in templates(atom)]
+    return f": {', '.join(dict.fromkeys(shown))}" if shown else ""
 
 
 def _namespaces(record: NodeRecord) -> list[str | None]:
@@ -153,16 +165,12 @@ def _parts(piece: Piece, first: bool) -> list[Part]:
 
 
 def _input_parts(piece: Input) -> list[Part]:
-    """The symbolic part once per default, and what the program itself sets the parameter to."""
+    """The symbolic part once per default."""
     assert isinstance(piece.owner, NodeRecord | OptionDefaults)
     defaults = _default_texts(piece.owner.default(piece.name), piece.item)
     parts: list[Part] = [
         ParameterPart(piece.name, default, piece.item, piece.edits) for default in defaults or [None]
     ]
-    if isinstance(piece.owner, NodeRecord) and piece.name in piece.owner.assigned:
-        for text in _default_texts(piece.owner.assigned[piece.name], piece.item):
-            only = ParameterPart(piece.name, text, None, piece.edits).texts({}) if text is not None else ()
-            parts.extend(only or [UnknownPart(f"the program sets parameter {piece.name} itself")])
     return parts
 
 
@@ -218,6 +226,22 @@ def _parse_arguments(value: Value, record: NodeRecord, gaps: list[Gap]) -> list[
     return rules
 
 
+_REMAPPED = "remap rules given in code may apply to it"
+
+
+def _remapped_later(endpoint: Endpoint, rules: RemapRules, name: str, namespace: str) -> Endpoint:
+    """The rules as one more edit of a name that is an input as a whole; what is made of parts is not known."""
+    parts = endpoint.name.parts
+    part = parts[0]
+    if len(parts) > 1 or not isinstance(part, ParameterPart):
+        return endpoint._replace(name=NameTemplate((UnknownPart(_REMAPPED),)), certainty=Certainty.UNKNOWN)
+    pairs = [
+        text for rule in rules.names if rule.node in (None, name) for text in (rule.match, rule.replacement)
+    ]
+    edit = ("remapped", (namespace, name, *pairs))
+    return endpoint._replace(name=NameTemplate((part._replace(edits=(*part.edits, edit)),)))
+
+
 def remapped(interface: NodeInterface, rules: RemapRules) -> NodeInterface:
     """The interface under the rules that the program gives itself. Launch may still remap the result."""
     name, namespace = interface.name, interface.namespace
@@ -232,8 +256,12 @@ def remapped(interface: NodeInterface, rules: RemapRules) -> NodeInterface:
 def _remapped_endpoint(
     endpoint: Endpoint, rules: RemapRules, name: str | None, namespace: str | None
 ) -> Endpoint:
-    if not endpoint.name.is_literal or name is None or namespace is None:
+    if not rules.names:
         return endpoint
+    if name is None or namespace is None:
+        return endpoint._replace(name=NameTemplate((UnknownPart(_REMAPPED),)), certainty=Certainty.UNKNOWN)
+    if not endpoint.name.is_literal:
+        return _remapped_later(endpoint, rules, name, namespace)
     try:
         full = expand_name(endpoint.name.text, namespace=namespace, node=name)
         for rule in rules.names:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nodl.infer.analysis import analyse_rest, start
+from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.packages import EntryPoint, Package, find_package
 from nodl.infer.program import Program
@@ -50,8 +51,11 @@ def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
         instantiated = {node for run, _ in runs for node in run.instantiated}
         for run, _ in runs:
             analyse_rest(run, called, instantiated)
+        everywhere = {node for run, _ in runs for node in run.called}
+        unsettled = [gap for run, _ in runs for gap in unsettled_places(run, everywhere)]
         nodes = [node for run, origin in runs for node in interfaces_of(run.findings, origin)]
     gaps = dict.fromkeys(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)
+    gaps.update(dict.fromkeys(unsettled))
     cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
     return InferredSystem(_distinct([*nodes, *cpp_nodes]), (*gaps, *cpp_gaps), tuple(found))
 

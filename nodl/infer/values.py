@@ -26,6 +26,8 @@ Cells: TypeAlias = dict[object, Value]
 MAX_STRINGS = 32
 MAX_ATOMS = 64
 TOO_MANY = "too many possible values"
+COMMAND_LINE = "command line arguments"
+OF_A_NODE = "an attribute of a node whose name is made at run time"
 
 NONE: Value = (None,)
 BOTTOM: Value = ()
@@ -172,7 +174,26 @@ class Dictionary(HeapObject):
 
     def __init__(self) -> None:
         super().__init__()
+        self.cells = FieldCells()
         self.default: Value = BOTTOM  # defaultdict's factory
+
+    @property
+    def is_open(self) -> bool:
+        """It may hold keys that are not known."""
+        return self.escaped or bool(present(self.cells.get(OTHER, BOTTOM)))
+
+    def entries(self) -> list[tuple[Key, Value, bool]]:
+        """Known keys in order, with their values and whether they are certainly there."""
+        return [
+            (cell, present(value), not self.summary and ABSENT[0] not in value)
+            for cell, value in self.cells.items()
+            if isinstance(cell, Key) and value is not ABSENT and value != ABSENT
+        ]
+
+    def held(self, constant: object) -> tuple[Value, bool]:
+        """What a key may hold, and whether it is certainly there."""
+        value = self.cells.get(Key(constant), BOTTOM)
+        return present(value), bool(value) and not self.summary and ABSENT[0] not in value
 
 
 class ModuleValue(HeapObject):
@@ -187,7 +208,9 @@ class ModuleValue(HeapObject):
 class FunctionValue:
     """A function with what it closes over. ``owner`` is the class whose body defines it."""
 
-    __slots__ = ("closure", "context_manager", "defaults", "kw_defaults", "module", "name", "node", "owner")
+    __slots__ = (
+        "attributes", "closure", "context_manager", "defaults", "kw_defaults", "module", "name", "node", "owner",
+    )  # fmt: skip
 
     def __init__(
         self,
@@ -205,10 +228,11 @@ class FunctionValue:
         self.defaults: tuple[Value, ...] = ()
         self.kw_defaults: tuple[Value | None, ...] = ()
         self.context_manager = False
+        self.attributes: Cells = {}
 
 
 class ClassValue(HeapObject):
-    __slots__ = ("bases", "fields", "linear", "module", "name", "node")
+    __slots__ = ("bases", "fields", "hooked", "linear", "module", "name", "node")
 
     def __init__(self, node: ast.ClassDef, name: str, module: ModuleValue, bases: Value):
         super().__init__()
@@ -218,6 +242,7 @@ class ClassValue(HeapObject):
         self.bases = bases
         self.linear: tuple[object, ...] | None = None  # method resolution order, made on first use
         self.fields: list[tuple[str, Value | None]] | None = None  # of a dataclass
+        self.hooked = True  # it, or one of its bases, may define what reading or setting an attribute does
 
 
 class Instance(HeapObject):
@@ -294,13 +319,46 @@ class SuperProxy:
 
 @dataclass(frozen=True, slots=True)
 class PropertyValue:
+    """``cached``: read once, then an attribute of the object."""
+
     getter: Value
+    setter: Value = BOTTOM
+    deleter: Value = BOTTOM
+    cached: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class ClassMethod:
     function: Value
     static: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PartialMethod:
+    """``functools.partialmethod``: bound like a function, with arguments of its own."""
+
+    partial: Partial
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variables:
+    """The dictionary of an object's or a module's variables: ``vars(x)``, ``x.__dict__``, ``globals()``."""
+
+    owner: HeapObject
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Variables) and other.owner is self.owner
+
+    def __hash__(self) -> int:
+        return id(self.owner)
+
+    def named(self) -> dict[str, Value]:
+        """What is certainly or perhaps set, by name."""
+        return {
+            name: value
+            for name, value in self.owner.cells.items()
+            if isinstance(name, str) and not name.startswith("[")
+        }
 
 
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
@@ -398,6 +456,11 @@ def _widen_items(old: Items, new: Items, texts_too: bool) -> Items:
     if old.exact is not None and new.exact is not None and not texts_too:
         return Items(tuple(widen(a, b, texts_too) for a, b in zip(old.exact, new.exact, strict=True)))
     return Items(None, widen(old.any_element(), new.any_element(), texts_too))
+
+
+def present(value: Value) -> Value:
+    """``value`` where it is set."""
+    return tuple(atom for atom in value if type(atom) is not Absent) if ABSENT[0] in value else value
 
 
 def without_unknown(value: Value) -> Value:

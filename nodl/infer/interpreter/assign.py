@@ -4,19 +4,28 @@ from __future__ import annotations
 
 import ast
 
+from nodl.infer.interpreter import special
+from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Arguments, Frame, Run
 from nodl.infer.values import (
+    ABSENT,
     ANY,
     BOTTOM,
     ITEMS,
     ClassValue,
     Dictionary,
+    External,
+    FunctionValue,
+    HeapObject,
     Instance,
     Items,
+    Key,
     ModuleValue,
+    PropertyValue,
     Sequence,
     Value,
+    Variables,
     join,
 )
 
@@ -25,7 +34,7 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
     if isinstance(target, ast.Name):
         run.assign_name(target.id, value, frame)
     elif isinstance(target, ast.Attribute):
-        store_attribute(run, run.evaluate(target.value, frame), target.attr, value)
+        store_attribute(run, run.evaluate(target.value, frame), target.attr, value, target, frame)
     elif isinstance(target, ast.Subscript):
         _store_subscript(run, target, value, frame)
     elif isinstance(target, ast.Tuple | ast.List):
@@ -38,16 +47,63 @@ def assign_unknown(run: Run, target: ast.expr, frame: Frame) -> None:
     assign(run, target, ANY, frame)
 
 
-def store_attribute(run: Run, owners: Value, name: str, value: Value) -> None:
+def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
+    """``owner.name = value``, with what the owner's class makes of it (setters, ``__setattr__``)."""
     certain = len(owners) == 1
     for owner in owners:
-        if isinstance(owner, Instance | ClassValue | ModuleValue):
-            if certain:
-                run.state.store(owner, name, value)
-            else:
-                run.state.write(owner.cells, name, join(owner.cells.get(name, BOTTOM), value))
+        if isinstance(owner, Instance) and _set_by_class(run, owner, name, value, node, frame):
+            continue
+        if isinstance(owner, FunctionValue):
+            run.state.write(owner.attributes, name, join(owner.attributes.get(name, BOTTOM), value))
+        elif isinstance(owner, Instance | ClassValue | ModuleValue):
+            plain_store(run, owner, name, value, certain)
         else:
             run.escape_value(value)  # whoever holds it may call it
+            if isinstance(owner, External):
+                _patched(run, owner, name, node, frame)
+
+
+def plain_store(run: Run, owner: HeapObject, name: str, value: Value, certain: bool = True) -> None:
+    if certain:
+        run.state.store(owner, name, value)
+    else:
+        run.state.write(owner.cells, name, join(owner.cells.get(name, BOTTOM), value))
+
+
+def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) -> None:
+    """Setting an attribute of a library's module or class changes what its other users get."""
+    if "(" not in owner.path and "[" not in owner.path:
+        run.gap(node, frame, f"{owner.path}.{name} is replaced; what its users then do is not analysed")
+
+
+def _set_by_class(run: Run, owner: Instance, name: str, value: Value, node: ast.AST, frame: Frame) -> bool:
+    """Whether a setter, a descriptor or ``__setattr__`` of the program took the value."""
+    if not isinstance(owner.cls, ClassValue) or not owner.cls.hooked:
+        return False
+    hook = special.method(owner, "__setattr__")
+    if hook:
+        run.call(hook, Arguments([(name,), value]), node, frame)
+        return True
+    for base in linearized(owner.cls):
+        held = base.cells.get(name) if isinstance(base, ClassValue) else None
+        if held:
+            return _set_by_descriptor(run, owner, held, value, node, frame)
+    return False
+
+
+def _set_by_descriptor(
+    run: Run, owner: Instance, held: Value, value: Value, node: ast.AST, frame: Frame
+) -> bool:
+    taken = False
+    for atom in held:
+        if isinstance(atom, PropertyValue) and not atom.cached:
+            if atom.setter:
+                run.call(atom.setter, Arguments([(owner,), value]), node, frame)
+            taken = True
+        elif type(atom) is Instance and special.method(atom, "__set__"):
+            special.call_special(run, atom, "__set__", node, frame, (owner,), value)
+            taken = True
+    return taken and len(held) == 1
 
 
 def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame) -> None:
@@ -62,10 +118,33 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
             store_item(run, owner, key, value)
         elif isinstance(owner, Sequence):
             _store_element(run, owner, key, value)
+        elif isinstance(owner, Variables):
+            _store_variable(run, owner, key, value, target, frame)
+        elif isinstance(owner, External) and owner.path == "os.environ":
+            _set_environment(run, key, value, target, frame)
         elif isinstance(owner, Instance):
             setter = run.attribute((owner,), "__setitem__", target, frame)
             run.call(setter, Arguments([key, value]), target, frame)
         else:
+            run.escape_value(value)
+
+
+def _set_environment(run: Run, key: Value, value: Value, node: ast.AST, frame: Frame) -> None:
+    """What the program reads from its environment later is what it put there."""
+    if len(key) == 1 and isinstance(key[0], str):
+        run.state.write(run.environment, key[0], value)
+    else:
+        run.gap(node, frame, "an environment variable whose name is made at run time is set")
+
+
+def _store_variable(
+    run: Run, owner: Variables, key: Value, value: Value, node: ast.AST, frame: Frame
+) -> None:
+    for atom in key:
+        if isinstance(atom, str):
+            plain_store(run, owner.owner, atom, value, len(key) == 1)
+        else:
+            run.gap(node, frame, "a variable whose name is made at run time is set")
             run.escape_value(value)
 
 
@@ -121,8 +200,37 @@ def _unpack_star(
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:
     """``del``: a removed element makes the length of a list unknown; all else may stay (it only adds)."""
-    if not isinstance(target, ast.Subscript):
-        return
-    for owner in run.evaluate(target.value, frame):
-        if isinstance(owner, Sequence):
-            run.state.store(owner, ITEMS, (Items(None, owner.items.any_element()),))
+    if isinstance(target, ast.Attribute):
+        owners = run.evaluate(target.value, frame)
+        for owner in owners:
+            _delete_attribute(run, owner, target.attr, len(owners) == 1, target, frame)
+    elif isinstance(target, ast.Subscript):
+        owners = run.evaluate(target.value, frame)
+        key = run.evaluate(target.slice, frame) if not isinstance(target.slice, ast.Slice) else ANY
+        for owner in owners:
+            _delete_item(run, owner, key, len(owners) == 1, target, frame)
+
+
+def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: ast.AST, frame: Frame) -> None:
+    if isinstance(owner, Instance):
+        hook = special.method(owner, "__delattr__")
+        if hook:
+            run.call(hook, Arguments([(name,)]), node, frame)
+        elif name in owner.cells:
+            kept = BOTTOM if certain and not owner.summary else owner.cells[name]
+            run.state.write(owner.cells, name, join(kept, ABSENT))
+    elif isinstance(owner, ClassValue | ModuleValue) and name in owner.cells:
+        run.gap(node, frame, f"{name} is deleted; what is found instead is not analysed")
+
+
+def _delete_item(run: Run, owner: object, key: Value, certain: bool, node: ast.AST, frame: Frame) -> None:
+    if isinstance(owner, Sequence):
+        run.state.store(owner, ITEMS, (Items(None, owner.items.any_element()),))
+    elif isinstance(owner, Dictionary):
+        strong = certain and len(key) == 1 and not owner.summary
+        if strong and isinstance(key[0], str | int | float | bool | type(None)):
+            run.state.write(owner.cells, Key(key[0]), ABSENT)
+    elif isinstance(owner, Instance):
+        special.call_special(run, owner, "__delitem__", node, frame, key)
+    elif isinstance(owner, Variables):
+        run.gap(node, frame, "a variable is deleted by name")

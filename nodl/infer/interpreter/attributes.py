@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter import imports
+from nodl.infer.interpreter import imports, special
 from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.run import Arguments, AttributeReader, Frame, Run
 from nodl.infer.models import foreign
@@ -24,11 +24,14 @@ from nodl.infer.values import (
     Instance,
     ModuleValue,
     NativeMethod,
+    Partial,
+    PartialMethod,
     PropertyValue,
     Sequence,
     SuperProxy,
     Unknown,
     Value,
+    Variables,
     external,
     join,
     unknown,
@@ -41,25 +44,36 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     held = obj.cells.get(name)
     if isinstance(obj.cls, External):
         return held if held is not None else foreign.instance_attribute(run, obj, obj.cls.path, name)
+    if obj.cls.hooked and name != "__class__":
+        hook = special.method(obj, "__getattribute__")
+        if hook:
+            return run.call(hook, Arguments([(name,)]), node, frame)
+    return plain_attribute(run, obj, obj.cls, name, node, frame)
+
+
+def plain_attribute(
+    run: Run, obj: Instance, cls: ClassValue, name: str, node: ast.AST, frame: Frame
+) -> Value:
+    """What ``object.__getattribute__`` finds, and after it ``__getattr__``."""
+    held = obj.cells.get(name)
     if held is not None:
         certain = not obj.summary and not any(type(atom) is Absent for atom in held)
         if certain:
             return held
         held = tuple(atom for atom in held if atom is not ABSENT[0])
-        in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
+        in_class = _class_attribute(run, obj, linearized(cls), name, node, frame)
         return join(held, in_class or BOTTOM) or ANY
     if name == "__class__":
-        return (obj.cls,)
+        return (cls,)
     if name == "__dict__":
-        return ANY
-    found = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
+        return (Variables(obj),)
+    found = _class_attribute(run, obj, linearized(cls), name, node, frame)
     if found is not None:
         return found
-    later = unknown(f"attribute {name}, which nothing analysed sets")
-    getter = _class_attribute(run, obj, linearized(obj.cls), "__getattr__", node, frame)
-    if getter is not None:
+    getter = special.method(obj, "__getattr__")
+    if getter:
         return run.call(getter, Arguments([(name,)]), node, frame)
-    return later
+    return unknown(f"attribute {name}, which nothing analysed sets")
 
 
 def _class_attribute(
@@ -70,7 +84,7 @@ def _class_attribute(
         if isinstance(base, ClassValue):
             value = base.cells.get(name)
             if value:
-                return _bound(run, obj, value, node, frame)
+                return _bound(run, obj, value, node, frame, name)
         elif isinstance(base, External):
             found = foreign.inherited(obj, base.path, name)
             if found is not None:
@@ -80,17 +94,28 @@ def _class_attribute(
     return None
 
 
-def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame) -> Value:
+def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame, name: str = "") -> Value:
     if len(value) == 1 and type(value[0]) is FunctionValue:
+        run.bound.add(value[0].node)
         return (BoundMethod(value[0], obj),)
     result: Value = BOTTOM
     for atom in value:
         if isinstance(atom, FunctionValue):
+            run.bound.add(atom.node)
             result = join(result, (BoundMethod(atom, obj),))
         elif isinstance(atom, PropertyValue):
-            result = join(result, run.call(atom.getter, Arguments([(obj,)]), node, frame))
+            made = run.call(atom.getter, Arguments([(obj,)]), node, frame)
+            if atom.cached and name:
+                run.state.store(obj, name, made)
+            result = join(result, made)
         elif isinstance(atom, ClassMethod):
             result = join(result, _bound_class_method(atom, obj.cls))
+        elif isinstance(atom, PartialMethod):
+            fixed = atom.partial
+            result = join(result, (Partial(fixed.function, ((obj,), *fixed.positional), fixed.keywords),))
+        elif type(atom) is Instance and special.method(atom, "__get__"):
+            given = (obj,), (obj.cls,)
+            result = join(result, special.call_special(run, atom, "__get__", node, frame, *given))
         else:
             result = join(result, (atom,))
     return result
@@ -106,8 +131,15 @@ def _bound_class_method(method: ClassMethod, cls: object) -> Value:
 
 
 def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame) -> Value:
-    if name == "__name__":
-        return (cls.name,)
+    if name in ("__name__", "__qualname__"):
+        return (cls.name,) if name == "__name__" or "." not in cls.name else ANY
+    if name == "__dict__":
+        return (Variables(cls),)
+    if name in ("__mro__", "__bases__"):
+        classes = linearized(cls) if name == "__mro__" else cls.bases
+        return run.tuple_of(tuple((each,) for each in classes))
+    if name == "__module__":
+        return cls.module.cells.get("__name__", ANY)
     order = linearized(cls)
     for base in order:
         if isinstance(base, ClassValue):
@@ -118,7 +150,13 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
                 return _enum_member(run, base, name, value, node)
             result: Value = BOTTOM
             for atom in value:
-                found = _bound_class_method(atom, cls) if isinstance(atom, ClassMethod) else (atom,)
+                found: Value = (atom,)
+                if isinstance(atom, ClassMethod):
+                    found = _bound_class_method(atom, cls)
+                elif type(atom) is Instance and special.method(atom, "__get__"):
+                    found = special.call_special(run, atom, "__get__", node, frame, (None,), (cls,))
+                elif isinstance(atom, FunctionValue):
+                    run.bound.add(atom.node)
                 result = join(result, found)
             return result or ANY
         if isinstance(base, External) and base.path not in ("builtins.object", "abc.ABC", "typing.Generic"):
@@ -140,6 +178,8 @@ def _enum_member(run: Run, cls: ClassValue, name: str, value: Value, node: ast.A
 
 
 def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: Frame) -> Value:
+    if name == "__dict__":
+        return (Variables(module),)
     return imports.member(run, (module,), module.source.name, name, frame)
 
 
@@ -176,7 +216,11 @@ def _of_super(run: Run, proxy: SuperProxy, name: str, node: ast.AST, frame: Fram
     for base in rest:
         if isinstance(base, ClassValue) and name in base.cells:
             return _bound_in_class(base.cells[name], cls)
-    return ANY
+    if name == "__new__":
+        return external("builtins.object.__new__")
+    if name == "__init_subclass__":
+        return external("builtins.object.__init_subclass__")
+    return unknown(f"{name} of a base class that is not analysed")
 
 
 def _bound_in_class(value: Value, cls: ClassValue) -> Value:
@@ -192,10 +236,14 @@ def _of_native(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -
 
 
 def _of_function(run: Run, atom: FunctionValue, name: str, node: ast.AST, frame: Frame) -> Value:
-    return (atom.name,) if name == "__name__" else ANY
+    if name in ("__name__", "__qualname__"):
+        return (atom.name,) if atom.name else unknown("the name of a wrapped function")
+    held = atom.attributes.get(name)
+    return held if held else unknown(f"attribute {name} of a function")
 
 
 def _of_unknown(run: Run, atom: Unknown, name: str, node: ast.AST, frame: Frame) -> Value:
+    run.asked.add(name)
     return (NativeMethod(atom, name),) if name in foreign.NODE_METHODS else (atom,)
 
 
@@ -203,7 +251,9 @@ def _of_method(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -
     if isinstance(atom, BoundMethod):
         if name == "__self__":
             return (atom.receiver,)
-        return (atom.function.name,) if name == "__name__" else ANY
+        if name == "__func__":
+            return (atom.function,)
+        return _of_function(run, atom.function, name, node, frame)
     return ANY
 
 
@@ -222,4 +272,5 @@ ATTRIBUTES: dict[type, AttributeReader] = {
     bytes: _of_native,
     Sequence: _of_native,
     Dictionary: _of_native,
+    Variables: _of_native,
 }

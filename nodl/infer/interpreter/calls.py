@@ -11,7 +11,9 @@ from nodl.infer.models import foreign
 from nodl.infer.values import (
     ANY,
     BOTTOM,
+    COMMAND_LINE,
     NONE,
+    OF_A_NODE,
     OTHER,
     TOO_MANY,
     BoundMethod,
@@ -35,6 +37,8 @@ from nodl.infer.values import (
 )
 
 MAX_ROUNDS = 8
+_OF_EXECUTORS = frozenset({"add_node", "remove_node", "wake"})  # of rclpy, whichever object it is
+_CHANGES = frozenset({"append", "extend", "insert", "remove", "pop", "clear"})
 _MISSING = unknown("an argument that the caller does not give")
 
 
@@ -58,6 +62,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
         return unknown("the result of a deeply nested call")
     cells = bind(run, function, call)
     run.called.setdefault(node)
+    run.understood.add(call.node)
     if node not in run.stack:
         return _remembered(run, function, cells, call)
     summary = run.summaries.setdefault(node, Summary())
@@ -228,6 +233,13 @@ def _call_class_method(run: Run, method: ClassMethod, call: Call) -> Value:
 def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
     if atom.why == TOO_MANY:
         run.gap(call.node, call.frame, "one of too many functions is called here")
+    function = call.node.func if isinstance(call.node, ast.Call) else None
+    if atom.why == COMMAND_LINE and isinstance(function, ast.Attribute) and function.attr in _CHANGES:
+        run.gap(call.node, call.frame, "the command line is changed in code")
+    if isinstance(function, ast.Attribute) and function.attr in _OF_EXECUTORS:
+        return (atom,)
+    if atom.why == OF_A_NODE:
+        run.gap(call.node, call.frame, "a method of the node whose name is made at run time is called here")
     run.escape(call.args)
     return (atom,)
 
@@ -237,12 +249,49 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     for base in linearized(cls):
         if isinstance(base, ClassValue):
             run.instantiated.setdefault(base.node)
+    made = _made_by_new(run, cls, call)
+    if made is not None:
+        return made
+    return (initialise(run, cls, new_instance(run, cls, call), call),)
+
+
+def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
+    """What the program's own ``__new__`` gives, initialised where it is an object of the class."""
+    for base in linearized(cls):
+        if isinstance(base, ClassValue) and "__new__" in base.cells:
+            constructors = tuple(
+                each
+                for atom in base.cells["__new__"]
+                for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
+            )
+            shifted = call.args.preceded((cls,))
+            made = run.call(constructors, shifted, call.node, call.frame)
+            for atom in made:
+                if (
+                    isinstance(atom, Instance)
+                    and isinstance(atom.cls, ClassValue)
+                    and cls in linearized(atom.cls)
+                ):
+                    initialise(run, atom.cls, atom, call)
+            return made
+    return None
+
+
+def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
+    """``object.__new__(cls)``."""
     site = (call.frame.module.source.path, getattr(call.node, "lineno", 0))
     instance = run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
-    value: Value = (instance,)
+    assert isinstance(instance, Instance)
+    return instance
+
+
+def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> Instance:
+    """Call the constructor: the first one in the method resolution order."""
     _expect_callbacks(run, cls, instance)
     for base in linearized(cls):
         if isinstance(base, ClassValue):
+            if "__del__" in base.cells:
+                run.register_callback(run.attribute((instance,), "__del__", call.node, call.frame), 0)
             if base.fields is not None and "__init__" not in base.cells:
                 _fill_fields(run, base, instance, call)
                 break
@@ -258,7 +307,7 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
             path = base.path if isinstance(base, External) else ""
             run.call_atom(ForeignMethod(path, instance, "__init__"), call)
             break
-    return value
+    return instance
 
 
 def _fill_fields(run: Run, cls: ClassValue, instance: object, call: Call) -> None:

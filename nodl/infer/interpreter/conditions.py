@@ -8,6 +8,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable
 
+from nodl.infer.interpreter import special
 from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.text import Text
 from nodl.infer.values import (
@@ -56,7 +57,7 @@ def truth(value: Value) -> bool | None:
 
 def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
     """Evaluate ``test`` once, for its effects and its truth."""
-    return truth(run.evaluate(test, frame))
+    return truth(special.tested(run, run.evaluate(test, frame), test, frame))
 
 
 def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
@@ -121,7 +122,12 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
     results: set[bool | None] = set()
     for operator, comparator in zip(node.ops, node.comparators, strict=True):
         right = run.evaluate(comparator, frame)
-        results.add(_compare_values(operator, left, right))
+        own: Value = BOTTOM
+        if special.has_own(left) or special.has_own(right):
+            own = special.comparison(run, operator, left, right, node, frame)
+            if own and len(node.ops) == 1:
+                return own
+        results.add(truth(own) if own else _compare_values(operator, left, right))
         left = right
     if results == {True}:
         return (True,)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import ast
+from dataclasses import replace
 
 from nodl.infer.interpreter.run import Arguments, Frame, Run
 from nodl.infer.values import (
+    BoundMethod,
     ClassMethod,
     ClassValue,
     External,
     FunctionValue,
+    Instance,
     PropertyValue,
+    Unknown,
     Value,
+    external,
     join,
     sole,
 )
@@ -21,12 +26,16 @@ FunctionNode = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 # Decorators that leave the function what it is, as far as names are concerned.
 _TRANSPARENT = frozenset(
     {
-        "functools.lru_cache", "functools.cache", "functools.wraps", "abc.abstractmethod",
+        "functools.lru_cache", "functools.cache", "abc.abstractmethod",
         "typing.override", "typing.overload", "typing_extensions.override", "typing.final",
         "pytest.fixture", "asyncio.coroutine",
     }
 )  # fmt: skip
 _PROPERTIES = frozenset({"builtins.property", "functools.cached_property", "abc.abstractproperty"})
+_PLAIN_METACLASSES = frozenset({"abc.ABCMeta", "enum.EnumMeta", "enum.EnumType", "builtins.type"})
+_PLAIN_DECORATORS = frozenset(
+    {"functools.total_ordering", "typing.final", "typing.runtime_checkable", "enum.unique"}
+)
 _DATACLASSES = frozenset(
     {"dataclasses.dataclass", "attr.s", "attrs.define", "attr.dataclass", "attrs.frozen"}
 )
@@ -70,13 +79,20 @@ def define_function(run: Run, node: ast.FunctionDef | ast.AsyncFunctionDef, fram
 
 def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.expr, frame: Frame) -> Value:
     if isinstance(decorator, ast.Attribute) and decorator.attr in ("setter", "deleter", "getter"):
-        return frame.cells.get(function.name, value)
+        found = run.evaluate(decorator.value, frame)
+        if found and all(isinstance(atom, PropertyValue) for atom in found):
+            return tuple(
+                _with_accessor(a, decorator.attr, value) for a in found if isinstance(a, PropertyValue)
+            )
     made_by_call = isinstance(decorator, ast.Call)
     callee = run.evaluate(decorator.func if isinstance(decorator, ast.Call) else decorator, frame)
     atom = sole(callee)
     path = atom.path if isinstance(atom, External) else ""
     if path in _PROPERTIES:
-        return (PropertyValue(value),)
+        return (PropertyValue(value, cached=path == "functools.cached_property"),)
+    if path == "functools.wraps" and isinstance(decorator, ast.Call):
+        _take_name(run, function, decorator, frame)
+        return value
     if path in ("builtins.staticmethod", "builtins.classmethod"):
         return (ClassMethod(value, path == "builtins.staticmethod"),)
     if path in ("contextlib.contextmanager", "contextlib.asynccontextmanager"):
@@ -85,6 +101,8 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
     if path in _TRANSPARENT:
         return value
     if isinstance(atom, External):
+        if made_by_call:
+            run.evaluate(decorator, frame)
         run.register_callback(value, None)
         return value
     if made_by_call:
@@ -92,10 +110,29 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
     return run.call(callee, Arguments([value]), decorator, frame)
 
 
+def _with_accessor(held: PropertyValue, accessor: str, function: Value) -> PropertyValue:
+    if accessor == "setter":
+        return replace(held, setter=function)
+    return replace(held, deleter=function) if accessor == "deleter" else replace(held, getter=function)
+
+
+def _take_name(run: Run, function: FunctionValue, decorator: ast.Call, frame: Frame) -> None:
+    """``@functools.wraps(wrapped)``: the function goes by the name of the wrapped one."""
+    wrapped = sole(run.evaluate(decorator.args[0], frame)) if decorator.args else None
+    name = wrapped.name if isinstance(wrapped, FunctionValue) else ""
+    own = getattr(function.node, "name", "<lambda>")
+    function.name = name if function.name in (own, name) else ""
+
+
 def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     bases = tuple(sole(run.evaluate(base, frame)) for base in node.bases if not isinstance(base, ast.Starred))
-    for keyword in node.keywords:
-        run.evaluate(keyword.value, frame)
+    keywords = {
+        keyword.arg: run.evaluate(keyword.value, frame)
+        for keyword in node.keywords
+        if keyword.arg is not None
+    }
+    if any(isinstance(base, ast.Starred) for base in node.bases) or len(keywords) < len(node.keywords):
+        run.gap(node, frame, f"the bases of class {node.name} are made at run time")
     cls = run.allocate(node, "class", lambda: ClassValue(node, node.name, frame.module, bases))
     assert isinstance(cls, ClassValue)
     body = Frame(frame.module, cls.cells, frame.closure if frame.is_class else frame, frame.depth)
@@ -106,19 +143,86 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     body.function = frame.function
     run.execute(node.body, body)
     run.classes.setdefault(node, cls)
-    for decorator in node.decorator_list:
-        _decorate_class(run, cls, decorator, frame)
     if any(isinstance(base, External) and base.path == "typing.NamedTuple" for base in bases):
         cls.fields = _fields(run, cls, frame)
-    run.assign_name(node.name, (cls,), frame)
+    complete_class(run, cls, keywords, node, frame)
+    value: Value = (cls,)
+    for decorator in reversed(node.decorator_list):
+        value = _decorated_class(run, value, cls, decorator, frame)
+    run.assign_name(node.name, value, frame)
     return True
 
 
-def _decorate_class(run: Run, cls: ClassValue, decorator: ast.expr, frame: Frame) -> None:
-    callee = decorator.func if isinstance(decorator, ast.Call) else decorator
-    atom = sole(run.evaluate(callee, frame))
+def complete_class(
+    run: Run, cls: ClassValue, keywords: dict[str, Value], node: ast.AST, frame: Frame
+) -> None:
+    """What happens at the end of a class statement (data model, 3.3.3): metaclass, names, ``__init_subclass__``."""
+    cls.hooked = any(_hooks(base) for base in linearized(cls))
+    metaclass = sole(keywords.pop("metaclass", external("builtins.type")))
+    _inherit_metaclass(run, cls, metaclass, node, frame)
+    for name, value in list(cls.cells.items()):
+        for atom in value:
+            if type(atom) is Instance and isinstance(name, str):
+                found = run.attribute((atom,), "__set_name__", node, frame)
+                if any(isinstance(each, BoundMethod) for each in found):
+                    run.call(found, Arguments([(cls,), (name,)]), node, frame)
+    for base in linearized(cls)[1:]:
+        hook = base.cells.get("__init_subclass__") if isinstance(base, ClassValue) else None
+        if hook:
+            run.call(_function_of(hook), Arguments([(cls,)], keywords), node, frame)
+            return
+        if isinstance(base, Unknown):
+            run.escape_value((cls,))
+
+
+def _function_of(value: Value) -> Value:
+    return tuple(
+        each for atom in value for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
+    )
+
+
+def _inherit_metaclass(run: Run, cls: ClassValue, metaclass: object, node: ast.AST, frame: Frame) -> None:
+    """A metaclass of the program, or one that is not known, may do anything to the class."""
+    if isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES:
+        own = any(
+            isinstance(base, ClassValue) and base.node in run.with_metaclass for base in linearized(cls)[1:]
+        )
+        if not own:
+            return
+    run.with_metaclass.add(cls.node)
+    run.gap(node, frame, f"class {cls.name} has a metaclass, which is not analysed")
+    run.escape_value((cls,))
+
+
+def _hooks(base: object) -> bool:
+    """Whether this class defines what reading or setting an attribute does."""
+    if isinstance(base, ClassValue):
+        if not _HOOKS.isdisjoint(base.cells):
+            return True
+        return any(isinstance(a, PropertyValue | Instance) for value in base.cells.values() for a in value)
+    return isinstance(base, Unknown)
+
+
+_HOOKS = frozenset({"__setattr__", "__getattribute__", "__delattr__"})
+
+
+def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.expr, frame: Frame) -> Value:
+    callee = run.evaluate(decorator.func if isinstance(decorator, ast.Call) else decorator, frame)
+    atom = sole(callee)
     if isinstance(atom, External) and atom.path in _DATACLASSES:
         cls.fields = _fields(run, cls, frame)
+        return value
+    if isinstance(atom, External) and atom.path in _PLAIN_DECORATORS:
+        return value
+    if isinstance(decorator, ast.Call):
+        callee = run.evaluate(decorator, frame)
+    if isinstance(atom, External) and run.tables.keeps_off(atom.path):
+        return value
+    made = run.call(callee, Arguments([value]), decorator, frame)
+    if isinstance(atom, External | Unknown):
+        run.gap(decorator, frame, f"class {cls.name} is handed to a decorator that is not analysed")
+        return value
+    return made or value
 
 
 def _fields(run: Run, cls: ClassValue, frame: Frame) -> list[tuple[str, Value | None]]:

@@ -5,20 +5,22 @@ from __future__ import annotations
 import ast
 import builtins
 
-from nodl.infer.interpreter import loops
+from nodl.infer.interpreter import loops, special
 from nodl.infer.interpreter.assign import assign
-from nodl.infer.interpreter.conditions import compare, narrowed, truth, truth_of
+from nodl.infer.interpreter.conditions import compare, decide, narrowed, truth, truth_of
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.iterate import elements, values_of
 from nodl.infer.interpreter.operators import binary, f_string
 from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
 from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
+    ABSENT,
     ANY,
     BOOLEAN,
     BOTTOM,
     NONE,
     OTHER,
+    OTHER_KEYS,
     ClassValue,
     Dictionary,
     External,
@@ -29,8 +31,10 @@ from nodl.infer.values import (
     SuperProxy,
     Unknown,
     Value,
+    Variables,
     external,
     join,
+    present,
     unknown,
 )
 
@@ -74,8 +78,11 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
     function = node.func
     if type(function) is ast.Name and function.id == "super" and "super" not in frame.module.cells:
         return _super(run, node, frame)
+    run.evaluated.add(node)
     callee = run.evaluate(function, frame)
-    return run.call(callee, arguments_of(run, node, frame), node, frame)
+    args = arguments_of(run, node, frame)
+    run.at = node, frame
+    return run.call(callee, args, node, frame)
 
 
 def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:
@@ -103,11 +110,11 @@ def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:
 def _add_keywords(args: Arguments, value: Value) -> None:
     for atom in value:
         if isinstance(atom, Dictionary):
-            for cell, held in atom.cells.items():
-                if isinstance(cell, Key) and isinstance(cell.constant, str):
+            for cell, held, _ in atom.entries():
+                if isinstance(cell.constant, str):
                     args.keywords[cell.constant] = held
-            if OTHER in atom.cells or atom.escaped:
-                args.more_keywords = join(args.more_keywords, atom.cells.get(OTHER, ANY))
+            if atom.is_open:
+                args.more_keywords = join(args.more_keywords, present(atom.cells.get(OTHER, ANY)))
         elif isinstance(atom, Unknown):
             args.more_keywords = join(args.more_keywords, (atom,))
 
@@ -176,12 +183,18 @@ def _dict(run: Run, node: ast.Dict, frame: Frame) -> Value:
 def copy_dictionary(run: Run, target: Dictionary, source: Value) -> None:
     for atom in source:
         if isinstance(atom, Dictionary):
-            for cell, value in list(atom.cells.items()):
-                if len(source) > 1:
-                    value = join(target.cells.get(cell, BOTTOM), value)
-                run.state.store(target, cell, value)
+            for key, value, certain in atom.entries():
+                if len(source) > 1 or not certain:
+                    value = join(target.cells.get(key, ABSENT), value)
+                run.state.store(target, key, value)
+            if not atom.is_open:
+                continue
+            for cell in (OTHER, OTHER_KEYS):
+                held = present(atom.cells.get(cell, BOTTOM))
+                run.state.store(target, cell, join(target.cells.get(cell, BOTTOM), held))
             if not atom.escaped:
                 continue
+        run.escape_value((atom,))
         run.state.store(target, OTHER, join(target.cells.get(OTHER, BOTTOM), ANY))
 
 
@@ -215,6 +228,8 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         if len(atom.pieces) == 1 and isinstance(piece, Input) and piece.item is None and type(index) is int:
             return (make_text((Input(piece.name, piece.owner, index, piece.edits),)),)
         return unknown("a part of a text that is not known")
+    if isinstance(atom, Variables):
+        return variable(run, atom, key, node, frame)
     if isinstance(atom, Instance):
         getter = run.attribute((atom,), "__getitem__", node, frame)
         return run.call(getter, Arguments([key]), node, frame)
@@ -227,6 +242,19 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
             return (atom,)
         return external(f"{atom.path}[]")
     return (atom,) if isinstance(atom, Unknown) else ANY
+
+
+def variable(run: Run, atom: Variables, key: Value, node: ast.AST, frame: Frame) -> Value:
+    """``globals()[key]``, ``vars(x)[key]``."""
+    result: Value = BOTTOM
+    for name in key:
+        if isinstance(name, str):
+            result = join(result, present(atom.owner.cells.get(name, BOTTOM)))
+            continue
+        for value in atom.named().values():
+            run.escape_value(value, opened=False)
+        result = join(result, unknown("a variable whose name is made at run time"))
+    return result or unknown("a variable that nothing analysed sets")
 
 
 def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Frame) -> Value:
@@ -242,20 +270,25 @@ def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Fra
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:
     result: Value = BOTTOM
     everything = False
+    everywhere = not obj.escaped
     for atom in key:
         if isinstance(atom, str | int | float | bool | type(None)):
-            result = join(result, obj.cells.get(Key(atom), BOTTOM))
+            held, certain = obj.held(atom)
+            result = join(result, held)
+            everywhere = everywhere and certain
         else:
             everything = True
     if everything:
         run.spend(len(obj.cells))
         result = join(result, values_of(obj).any_element())
-    result = join(result, obj.cells.get(OTHER, BOTTOM))
-    if obj.default:
+        everywhere = False
+    result = join(result, present(obj.cells.get(OTHER, BOTTOM)))
+    if obj.default and not everywhere:
         made = run.call(obj.default, Arguments(), node, frame)
         for atom in key:
             if isinstance(atom, str | int):
-                run.state.write(obj.cells, Key(atom), join(obj.cells.get(Key(atom), BOTTOM), made))
+                old = obj.held(atom)[0]
+                run.state.write(obj.cells, Key(atom), join(old, made))
         result = join(result, made)
     if obj.escaped or not result:
         result = join(result, unknown("an element of a dictionary that is filled elsewhere"))
@@ -313,7 +346,7 @@ def _character(text: str, key: Value, node: ast.Subscript) -> Value:
 
 
 def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
-    outcome = truth(run.evaluate(node.test, frame))
+    outcome = decide(run, node.test, frame)
     if outcome is not None:
         return run.evaluate(node.body if outcome else node.orelse, frame)
     results: list[Value] = []
@@ -335,9 +368,14 @@ def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
         value = run.evaluate(operand, frame) if index == 0 else _perhaps(run, operand, frame)
         if index == len(node.values) - 1:
             return join(result, value)
+        tested = special.tested(run, value, operand, frame)
+        outcome = truth(tested)
+        if outcome is stops_at:
+            return join(result, value)
+        if tested is not value:
+            result = join(result, value if outcome is None else BOTTOM)
+            continue
         result = join(result, tuple(atom for atom in value if truth_of(atom) in (stops_at, None)))
-        if truth(value) is stops_at:
-            return result
     return result
 
 
@@ -357,8 +395,11 @@ def _perhaps(run: Run, operand: ast.expr, frame: Frame) -> Value:
 def _unary(run: Run, node: ast.UnaryOp, frame: Frame) -> Value:
     value = run.evaluate(node.operand, frame)
     if isinstance(node.op, ast.Not):
-        outcome = truth(value)
+        outcome = truth(special.tested(run, value, node, frame))
         return BOOLEAN if outcome is None else (not outcome,)
+    if special.has_own(value):
+        name = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__"}[type(node.op)]
+        return special.call_special(run, value[0], name, node, frame) or ANY
     if isinstance(node.op, ast.USub) and len(value) == 1 and isinstance(value[0], int | float):
         return (-value[0],)
     return ANY

@@ -15,15 +15,13 @@ from nodl.infer.values import (
     Dictionary,
     Instance,
     Items,
-    Key,
     Sequence,
     Unknown,
     Value,
     join,
+    present,
     unknown,
 )
-
-MAX_EXACT = 256
 
 
 def elements(run: Run, value: Value, node: ast.AST, frame: Frame) -> Items:
@@ -73,23 +71,27 @@ def input_items(text: Text) -> Value:
 
 
 def keys_of(obj: Dictionary) -> Items:
-    keys = tuple((cell.constant,) for cell in obj.cells if isinstance(cell, Key))
-    if OTHER in obj.cells or obj.escaped:
-        result = obj.cells.get(OTHER_KEYS, ANY)
+    entries = obj.entries()
+    keys = tuple((cell.constant,) for cell, _, _ in entries)
+    if obj.is_open:
+        result = present(obj.cells.get(OTHER_KEYS, ANY))
         for key in keys:
             result = join(result, key)
         return Items(None, join(result, ANY) if obj.escaped else result)
-    return Items(keys) if not obj.summary else Items(None, Items(keys).any_element())
+    certain = all(certain for _, _, certain in entries) and not obj.summary
+    return Items(keys) if certain else Items(None, Items(keys).any_element())
 
 
 def values_of(obj: Dictionary) -> Items:
-    values = tuple(value for cell, value in obj.cells.items() if isinstance(cell, Key))
-    if OTHER in obj.cells or obj.escaped:
-        result = obj.cells.get(OTHER, BOTTOM)
+    entries = obj.entries()
+    values = tuple(value for _, value, _ in entries)
+    if obj.is_open:
+        result = present(obj.cells.get(OTHER, BOTTOM))
         for value in values:
             result = join(result, value)
         return Items(None, join(result, ANY) if obj.escaped else result)
-    return Items(values) if not obj.summary else Items(None, Items(values).any_element())
+    certain = all(certain for _, _, certain in entries) and not obj.summary
+    return Items(values) if certain else Items(None, Items(values).any_element())
 
 
 def enum_members(run: Run, cls: ClassValue, node: ast.AST, frame: Frame) -> Items:

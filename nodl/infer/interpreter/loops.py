@@ -7,10 +7,11 @@ import functools
 from collections.abc import Callable
 
 from nodl.infer.interpreter.assign import assign
-from nodl.infer.interpreter.conditions import decide, narrowed, truth
+from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.values import (
+    ABSENT,
     BOTTOM,
     OTHER,
     OTHER_KEYS,
@@ -186,12 +187,15 @@ def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
     """``obj[key] = value`` for a dictionary."""
     assert isinstance(obj, Dictionary)
     if len(key) == 1 and isinstance(key[0], str | int | float | bool | type(None)):
-        run.state.store(obj, Key(key[0]), value)
+        cell = Key(key[0])
+        if not run.repeated and obj.cells.get(cell) == ABSENT:
+            del obj.cells[cell]  # it comes last again; undone, it is as absent as before
+        run.state.store(obj, cell, value)
         return
     known = [atom for atom in key if isinstance(atom, str | int)]
     for atom in known:
         cell = Key(atom)
-        run.state.write(obj.cells, cell, join(obj.cells.get(cell, BOTTOM), value))
+        run.state.write(obj.cells, cell, join(obj.cells.get(cell, ABSENT), value))
     if len(known) < len(key):
         run.state.write(obj.cells, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
         run.state.write(obj.cells, OTHER_KEYS, join(obj.cells.get(OTHER_KEYS, BOTTOM), key))
@@ -251,7 +255,7 @@ def _one(
     assign(run, generator.target, element, frame)
     certain = True
     for condition in generator.ifs:
-        outcome = truth(run.evaluate(condition, frame))
+        outcome = decide(run, condition, frame)
         if outcome is False:
             return True
         narrowed(run, condition, True, frame)

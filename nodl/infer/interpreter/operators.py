@@ -9,6 +9,7 @@ import string
 from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Sequences
 
+from nodl.infer.interpreter import special
 from nodl.infer.interpreter.run import Arguments, Frame, Run
 from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenate, concatenations, make_text
 from nodl.infer.values import (
@@ -18,7 +19,6 @@ from nodl.infer.values import (
     External,
     Instance,
     Items,
-    Key,
     Sequence,
     Unknown,
     Value,
@@ -42,14 +42,20 @@ _LARGE = 1 << 40
 def binary(run: Run, node: ast.BinOp, frame: Frame) -> Value:
     left = run.evaluate(node.left, frame)
     right = run.evaluate(node.right, frame)
-    return binary_operation(run, node, left, node.op, right)
+    return binary_operation(run, node, left, node.op, right, frame)
 
 
-def binary_operation(run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value) -> Value:
+def binary_operation(
+    run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
+) -> Value:
+    if special.has_own(left) or special.has_own(right):
+        defined = special.binary(run, left, op, right, node, frame)
+        if defined:
+            return defined
     if isinstance(op, ast.Add):
         return _add(run, node, left, right)
     if isinstance(op, ast.Mod) and any(isinstance(atom, str | Text) for atom in left):
-        return percent(left, right)
+        return percent(left, _spoken_operand(run, right, node, frame))
     if isinstance(op, ast.Div) and any(isinstance(atom, Instance) for atom in left):
         return ANY  # a path
     if type(op) in _ARITHMETIC and len(left) * len(right) <= 16:
@@ -100,6 +106,14 @@ def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
         if _pure(left) and _pure(right)
         else concatenations([_text_side(left), _text_side(right)])
     )
+
+
+def _spoken_operand(run: Run, right: Value, node: ast.AST, frame: Frame) -> Value:
+    """The right side of ``%`` with the program's objects as their texts."""
+    atom = sole(right)
+    if isinstance(atom, Sequence) and atom.kind == "tuple" and atom.items.exact is not None:
+        return run.tuple_of(tuple(special.spoken(run, each, node, frame) for each in atom.items.exact))
+    return special.spoken(run, right, node, frame)
 
 
 def _pure(value: Value) -> bool:
@@ -182,12 +196,14 @@ def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
 
 def _formatted(run: Run, part: ast.FormattedValue, frame: Frame) -> list[TextAtom]:
     value = run.evaluate(part.value, frame)
+    spec: Value = ("",) if part.format_spec is None else run.evaluate(part.format_spec, frame)
+    value = special.spoken(run, value, part, frame, spec if part.conversion == -1 else None)
     if part.conversion not in (-1, 115):  # !r and !a quote their argument
         return [make_text((Hole("text made with !r"),))]
     if part.format_spec is None:
         return as_texts(value)
-    spec = sole(run.evaluate(part.format_spec, frame))
-    return formatted(value, spec if isinstance(spec, str) else None)
+    known = sole(spec)
+    return formatted(value, known if isinstance(known, str) else None)
 
 
 _WIDE = re.compile(r"\d{4}")  # a width or precision that makes texts of no use, and of any size
@@ -264,7 +280,7 @@ def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
 
 
 def _mapping_item(atom: object, key: str) -> Value:
-    return atom.cells.get(Key(key), ANY) if isinstance(atom, Dictionary) else ANY
+    return (atom.held(key)[0] or ANY) if isinstance(atom, Dictionary) else ANY
 
 
 def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:

@@ -22,6 +22,9 @@ from nodl.infer.values import (
     ClassMethod,
     ClassValue,
     Dictionary,
+    External,
+    FieldCells,
+    ForeignMethod,
     FunctionValue,
     HeapObject,
     Instance,
@@ -30,7 +33,9 @@ from nodl.infer.values import (
     ModuleValue,
     Partial,
     Sequence,
+    SuperProxy,
     Value,
+    Variables,
     join,
 )
 from nodl.source_ref import SourceRef
@@ -135,6 +140,8 @@ class Tables:
     statements: dict[type, Executor]
     callables: dict[type, Caller]
     attributes: dict[type, AttributeReader]
+    keeps_off: Callable[[str], bool]  # whether a library leaves the program's classes and objects alone
+    creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
 
 
 class Run:
@@ -151,15 +158,26 @@ class Run:
         self.findings = Findings()
         self.modules: dict[str, ModuleValue] = {}
         self.no_submodules: set[tuple[str, ModuleValue]] = set()  # looked for and not found
+        self.at: tuple[ast.AST, Frame] | None = None  # the latest call of the program
+        self.escaped: dict[ClassValue | Instance, None] = {}  # handed to code that is not analysed
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
+        self.bound: set[ast.AST] = set()  # functions that were read as a method
+        self.with_metaclass: set[ast.AST] = set()
+        self.asked: set[str] = set()  # attributes read from what is not known
+        self.executed: set[ast.stmt] = set()
+        self.evaluated: set[ast.AST] = set()  # calls
+        self.understood: set[ast.AST] = (
+            set()
+        )  # calls that made an interface, or ran a function of the program
         self.stack: list[ast.AST] = []
         self.classes: dict[ast.AST, ClassValue] = {}
         self.enum_members: dict[tuple[str, int, str], Instance] = {}
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.summaries: dict[ast.AST, Any] = {}
         self.options = OptionDefaults()
+        self.environment = FieldCells()  # variables that the program sets itself
         self.memo: dict[tuple[object, ...], tuple[tuple[int, int], Value]] = {}
         self.unstable = False  # a recursion learned something new since its outermost call asked
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
@@ -183,7 +201,9 @@ class Run:
         """Run statements in order. False: control cannot reach the end of ``body``."""
         self.spend(len(body))
         statements = self._statements
+        executed = self.executed
         for statement in body:
+            executed.add(statement)
             handler = statements.get(type(statement))
             if handler is not None and not handler(self, statement, frame):
                 return False
@@ -337,23 +357,46 @@ class Run:
                 elif self.callbacks[atom] != arity:
                     self.callbacks[atom] = None
 
-    def escape(self, args: Arguments, opened: bool = True) -> None:
+    def escape(self, args: Arguments, opened: bool = True, objects: bool = True) -> None:
         """All of ``args`` go to code that is not analysed: it may call callables and fill containers.
 
-        ``opened`` is false for libraries that are known to leave containers alone.
+        ``opened`` is false for libraries that are known to leave containers alone, ``objects`` for those that
+        neither make objects of classes they are given nor call methods of objects.
         """
         for value in args.all_values():
-            self.escape_value(value, opened)
+            self.escape_value(value, opened, objects)
 
-    def escape_value(self, value: Value, opened: bool = True, depth: int = 0) -> None:
+    def escape_value(self, value: Value, opened: bool = True, objects: bool = True, depth: int = 0) -> None:
         self.steps += len(value)
         for atom in value:
             if isinstance(atom, Sequence | Dictionary):
-                self._escape_container(atom, opened, depth)
+                self._escape_container(atom, opened, objects, depth)
             elif isinstance(atom, FunctionValue | BoundMethod | Partial):
                 self.register_callback((atom,), None)
+            elif isinstance(atom, ClassValue | Instance) and objects:
+                self.escape_object(atom)
+            elif isinstance(atom, ForeignMethod | External) and self.tables.creates(atom):
+                self.callbacks.setdefault(atom, None)
+            elif isinstance(atom, Variables | SuperProxy) and objects:
+                held = atom.owner if isinstance(atom, Variables) else atom.receiver
+                self.escape_value((held,), opened, objects, depth + 1)
 
-    def _escape_container(self, obj: Sequence | Dictionary, opened: bool, depth: int) -> None:
+    def escape_object(self, atom: ClassValue | Instance) -> None:
+        """Code that is not analysed has the class or object: it may make objects and call methods.
+
+        A node in such hands is a gap. Objects of libraries are theirs already.
+        """
+        if isinstance(atom, Instance) and (atom.node is not None or not isinstance(atom.cls, ClassValue)):
+            if atom.node is not None and atom.node.created and self.at is not None:
+                node, frame = self.at
+                source = SourceRef(frame.module.source.path, getattr(node, "lineno", 0))
+                atom.node.gaps.setdefault((source, "the node is handed to code that is not analysed"))
+            return
+        if atom not in self.escaped:
+            self.escaped[atom] = None
+            self.state.learned += 1
+
+    def _escape_container(self, obj: Sequence | Dictionary, opened: bool, objects: bool, depth: int) -> None:
         if opened and not obj.escaped:
             obj.escaped = True
             self.state.learned += 1
@@ -361,7 +404,7 @@ class Run:
             for value in list(obj.cells.values()):
                 for atom in value:
                     inner = atom.any_element() if isinstance(atom, Items) else (atom,)
-                    self.escape_value(inner, opened, depth + 1)
+                    self.escape_value(inner, opened, objects, depth + 1)
 
     def gap(self, node: ast.AST, frame: Frame, why: str) -> None:
         self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)

@@ -5,28 +5,33 @@ from __future__ import annotations
 import ast
 from typing import Any
 
-from nodl.infer.interpreter import imports, loops
+from nodl.infer.interpreter import imports, loops, special
 from nodl.infer.interpreter.assign import assign, assign_unknown, delete
 from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.define import define_class, define_function
 from nodl.infer.interpreter.operators import binary_operation
 from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
-from nodl.infer.values import ANY, NONE, Instance, Sequence, Value, join
+from nodl.infer.values import ANY, NONE, External, Instance, Sequence, Value, join, sole
 
 
 def _expression(run: Run, node: ast.Expr, frame: Frame) -> bool:
     if type(node.value) is not ast.Constant:
         run.evaluate(node.value, frame)
-        if type(node.value) is ast.Call and _never_returns(node.value.func):
+        if type(node.value) is ast.Call and _never_returns(run, node.value.func, frame):
             _leave(run, frame)
             return False
     return True
 
 
-def _never_returns(function: ast.expr) -> bool:
-    if isinstance(function, ast.Attribute) and isinstance(function.value, ast.Name):
-        return (function.value.id, function.attr) in (("sys", "exit"), ("os", "_exit"))
-    return isinstance(function, ast.Name) and function.id in ("exit", "quit")
+_ENDS = frozenset({"sys.exit", "os._exit", "builtins.exit", "builtins.quit"})
+
+
+def _never_returns(run: Run, function: ast.expr, frame: Frame) -> bool:
+    name = function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+    if name not in ("exit", "_exit", "quit"):
+        return False
+    atom = sole(run.evaluate(function, frame))
+    return isinstance(atom, External) and atom.path in _ENDS
 
 
 def _assignment(run: Run, node: ast.Assign, frame: Frame) -> bool:
@@ -45,6 +50,11 @@ def _annotated(run: Run, node: ast.AnnAssign, frame: Frame) -> bool:
 def _augmented(run: Run, node: ast.AugAssign, frame: Frame) -> bool:
     old = run.evaluate(_as_load(node.target), frame)
     added = run.evaluate(node.value, frame)
+    if special.has_own(old):
+        changed = special.in_place(run, old, node.op, added, node, frame)
+        if changed:
+            assign(run, node.target, changed, frame)
+            return True
     if isinstance(node.op, ast.Add | ast.BitOr):
         mutated = [atom for atom in old if isinstance(atom, Sequence) and atom.kind in ("list", "set")]
         for atom in mutated:
@@ -56,7 +66,7 @@ def _augmented(run: Run, node: ast.AugAssign, frame: Frame) -> bool:
             )
         if mutated and len(mutated) == len(old):
             return True
-    assign(run, node.target, binary_operation(run, node, old, node.op, added), frame)
+    assign(run, node.target, binary_operation(run, node, old, node.op, added, frame), frame)
     return True
 
 
@@ -196,7 +206,9 @@ def _nonlocal(run: Run, node: ast.Nonlocal, frame: Frame) -> bool:
 
 
 def _assert(run: Run, node: ast.Assert, frame: Frame) -> bool:
-    run.evaluate(node.test, frame)
+    if decide(run, node.test, frame) is not True and node.msg is not None:
+        message = node.msg
+        run.state.maybe(lambda: bool(run.evaluate(message, frame)) or True)
     return True
 
 

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ast
 import builtins
 from collections.abc import Callable
 
+from nodl.infer.interpreter import special
 from nodl.infer.interpreter.assign import store_attribute
 from nodl.infer.interpreter.conditions import truth
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.define import complete_class, linearized
+from nodl.infer.interpreter.expressions import copy_dictionary
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.iterate import elements, keys_of
 from nodl.infer.interpreter.operators import as_texts, formatted, text_value
@@ -18,18 +21,23 @@ from nodl.infer.values import (
     BOOLEAN,
     BOTTOM,
     NONE,
+    OF_A_NODE,
     OTHER,
     BoundMethod,
     ClassValue,
     Dictionary,
     External,
     FunctionValue,
+    HeapObject,
     Instance,
     Items,
     Key,
+    ModuleValue,
+    PropertyValue,
     Sequence,
     Unknown,
     Value,
+    Variables,
     constant_strings,
     join,
     sole,
@@ -47,7 +55,9 @@ def argument_items(run: Run, call: Call, index: int = 0) -> Items:
 
 def _str(run: Run, call: Call) -> Value:
     value = call.args.at(0)
-    return ("",) if value is None else text_value(as_texts(value))
+    if value is None:
+        return ("",)
+    return text_value(as_texts(special.spoken(run, value, call.node, call.frame)))
 
 
 def _int(run: Run, call: Call) -> Value:
@@ -66,12 +76,15 @@ def _float(run: Run, call: Call) -> Value:
 
 
 def _bool(run: Run, call: Call) -> Value:
-    outcome = truth(call.args.at(0) or (False,))
+    outcome = truth(special.tested(run, call.args.at(0) or (False,), call.node, call.frame))
     return BOOLEAN if outcome is None else (outcome,)
 
 
 def _len(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
+    own = special.call_special(run, atom, "__len__", call.node, call.frame)
+    if own:
+        return own
     if isinstance(atom, str):
         return (len(atom),)
     if isinstance(atom, Sequence) and atom.items.exact is not None and not atom.escaped:
@@ -177,10 +190,10 @@ def _filter(run: Run, call: Call) -> Value:
 
 def _dict(run: Run, call: Call) -> Value:
     obj = run.allocate(call.node, "dict", Dictionary)
+    assert isinstance(obj, Dictionary)
     for atom in call.args.at(0) or BOTTOM:
         if isinstance(atom, Dictionary):
-            for cell, value in list(atom.cells.items()):
-                run.state.store(obj, cell, value)
+            copy_dictionary(run, obj, (atom,))
         else:
             _store_pairs(run, obj, elements(run, (atom,), call.node, call.frame), call)
     for name, value in call.args.keywords.items():
@@ -207,7 +220,8 @@ def _getattr(run: Run, call: Call) -> Value:
         found = join(found, run.attribute(owner, name, call.node, call.frame))
     if len(constant_strings(names)) < len(names):
         _any_method(run, owner, names)
-        found = join(found, unknown("an attribute whose name is made at run time"))
+        is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
+        found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
     default = call.args.at(2)
     return join(found, default) if default is not None else found
 
@@ -216,8 +230,15 @@ def _any_method(run: Run, owner: Value, names: Value) -> None:
     """``getattr(self, 'on_' + x)``: any method whose name fits may be meant."""
     prefixes = [text.pieces[0] if isinstance(text, Text) else "" for text in names]
     for atom in owner:
+        if isinstance(atom, ModuleValue | ClassValue):
+            for name, value in list(atom.cells.items()):
+                if isinstance(name, str) and not name.startswith(("__", "[")):
+                    run.escape_value(value, opened=False)
         if not (isinstance(atom, Instance) and isinstance(atom.cls, ClassValue)):
             continue
+        for name, value in list(atom.cells.items()):
+            if isinstance(name, str):
+                run.escape_value(value, opened=False, objects=False)
         for base in linearized(atom.cls):
             for name, value in list(base.cells.items()) if isinstance(base, ClassValue) else ():
                 for prefix in prefixes:
@@ -235,12 +256,15 @@ def _setattr(run: Run, call: Call) -> Value:
     for name in known:
         if len(names) > 1:
             value = join(value, run.attribute(owner, name, call.node, call.frame))
-        store_attribute(run, owner, name, value)
+        store_attribute(run, owner, name, value, call.node, call.frame)
     if len(known) < len(names):
+        run.escape_value(value)
         for atom in owner:
             if isinstance(atom, Instance):
                 for cell, old in list(atom.cells.items()):
                     run.state.write(atom.cells, cell, join(old, value))
+            if isinstance(atom, ClassValue | ModuleValue | External):
+                run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
 
 
@@ -259,19 +283,45 @@ def _isinstance(run: Run, call: Call) -> Value:
 
 
 def _type(run: Run, call: Call) -> Value:
+    if len(call.args.positional) == 3:
+        return _made_class(run, call)
     atom = sole(call.args.at(0))
     if isinstance(atom, Instance):
         return (atom.cls,)
     return ANY
 
 
+def _made_class(run: Run, call: Call) -> Value:
+    """``type(name, bases, attributes)``."""
+    name, bases, space = (sole(value) for value in call.args.positional)
+    listed = elements(run, (bases,), call.node, call.frame).exact
+    if not isinstance(name, str) or listed is None or not isinstance(space, Dictionary) or space.is_open:
+        run.gap(call.node, call.frame, "a class is made at run time (type)")
+        run.escape(call.args)
+        return unknown("a class made at run time")
+    line, column = getattr(call.node, "lineno", 0), getattr(call.node, "col_offset", 0)
+    node = ast.ClassDef(name, [], [], [], [], lineno=line, col_offset=column, end_lineno=line)
+    key = call.frame.module
+    cls = run.allocate(call.node, "type", lambda: ClassValue(node, name, key, tuple(sole(b) for b in listed)))
+    assert isinstance(cls, ClassValue)
+    for entry, value, _ in space.entries():
+        run.state.store(cls, entry.constant, value)
+    complete_class(run, cls, dict(call.args.keywords), call.node, call.frame)
+    return (cls,)
+
+
 def _format(run: Run, call: Call) -> Value:
-    spec = sole(call.args.at(1) or ("",))
-    return text_value(formatted(call.args.at(0) or ANY, spec if isinstance(spec, str) else None))
+    given = call.args.at(1) or ("",)
+    spec = sole(given)
+    value = special.spoken(run, call.args.at(0) or ANY, call.node, call.frame, given)
+    return text_value(formatted(value, spec if isinstance(spec, str) else None))
 
 
 def _repr(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
+    own = special.call_special(run, atom, "__repr__", call.node, call.frame)
+    if own:
+        return own
     return (repr(atom),) if isinstance(atom, str | int | float) else unknown("repr()")
 
 
@@ -306,7 +356,24 @@ def import_dynamic(run: Run, call: Call) -> Value:
 
 
 def _vars(run: Run, call: Call) -> Value:
+    found = call.args.at(0)
+    if found is None:
+        return _globals(run, call) if call.frame.function is None else unknown("the local variables")
+    if all(isinstance(atom, Instance | ClassValue | ModuleValue) for atom in found):
+        return tuple(Variables(atom) for atom in found if isinstance(atom, HeapObject))
     return unknown("a dictionary of variables")
+
+
+def _globals(run: Run, call: Call) -> Value:
+    return (Variables(call.frame.module),)
+
+
+def _locals(run: Run, call: Call) -> Value:
+    if call.frame.function is None:
+        return _globals(run, call)
+    for value in list(call.frame.cells.values()):
+        run.escape_value(value, opened=False, objects=False)
+    return unknown("the local variables")
 
 
 def _unknown_text(run: Run, call: Call) -> Value:
@@ -315,6 +382,36 @@ def _unknown_text(run: Run, call: Call) -> Value:
 
 def _any_all(run: Run, call: Call) -> Value:
     return BOOLEAN
+
+
+def _object_new(run: Run, call: Call) -> Value:
+    """``object.__new__(cls)``: an object whose constructor has not run."""
+    made: list[object] = []
+    for atom in call.args.at(0) or ANY:
+        if isinstance(atom, ClassValue):
+            for base in linearized(atom):
+                if isinstance(base, ClassValue):
+                    run.instantiated.setdefault(base.node)
+            made.append(new_instance(run, atom, call))
+        else:
+            made.append(unknown("an object of a class that is not known")[0])
+    return tuple(made)
+
+
+def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
+    from nodl.infer.interpreter import calls
+
+    return calls.new_instance(run, cls, call)
+
+
+def _nothing(run: Run, call: Call) -> Value:
+    return NONE
+
+
+def _property(run: Run, call: Call) -> Value:
+    given = [call.args.at(index, name) for index, name in enumerate(("fget", "fset", "fdel"))]
+    getter, setter, deleter = (tuple(a for a in value or () if a is not None) for value in given)
+    return (PropertyValue(getter, setter, deleter),)
 
 
 def _object(run: Run, call: Call) -> Value:
@@ -360,9 +457,12 @@ FUNCTIONS: dict[str, Model] = {
         "compile": _dynamic_code,
         "__import__": import_dynamic,
         "vars": _vars,
-        "globals": _vars,
-        "locals": _vars,
+        "globals": _globals,
+        "locals": _locals,
         "input": _unknown_text,
         "object": _object,
+        "object.__new__": _object_new,
+        "object.__init_subclass__": _nothing,
+        "property": _property,
     }.items()
 }

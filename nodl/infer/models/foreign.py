@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import sys
 
+from nodl.infer.interpreter.assign import plain_store
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.models import builtin, native, ros, stdlib
+from nodl.infer.models import builtin, endpoints, native, ros, stdlib
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
 from nodl.infer.values import (
     ANY,
+    NONE,
+    ClassValue,
     External,
     ForeignMethod,
     Instance,
@@ -21,18 +24,28 @@ from nodl.infer.values import (
     Unknown,
     Value,
     external,
+    join_all,
     unknown,
 )
 
 NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 
-# Libraries that create no endpoints on a node they are given and keep their hands off names.
-_TRUSTED = frozenset(sys.stdlib_module_names) | {
-    "builtins", "rclpy", "numpy", "cv2", "cv_bridge", "tf2_ros", "tf2_geometry_msgs", "tf_transformations",
+# Libraries that create no endpoints on a node they are given, keep their hands off names and off the program's
+# objects. A call of theirs gives something that does so as well.
+_KEEPS_OFF = frozenset({
+    "rclpy", "numpy", "cv2", "cv_bridge", "tf2_ros", "tf2_geometry_msgs", "tf_transformations",
     "tf2_py", "message_filters", "transforms3d", "scipy", "yaml", "ament_index_python", "rosidl_runtime_py",
     "rcl_interfaces", "rosidl_parser", "launch", "launch_ros", "std_msgs", "PIL", "torch", "matplotlib",
     "pandas", "serial", "requests", "setuptools", "pytest", "tqdm", "sensor_msgs_py", "psutil", "colorama",
-}  # fmt: skip
+    "launch_testing", "launch_testing_ros", "launch_pytest", "ament_copyright", "ament_flake8", "ament_pep257",
+    # of Python's own library
+    "unittest",
+    "builtins", "logging", "time", "math", "cmath", "random", "datetime", "typing", "abc", "json", "warnings",
+    "traceback", "struct", "re", "os", "sys", "statistics", "decimal", "fractions", "hashlib", "uuid", "platform",
+    "getpass", "pprint",
+})  # fmt: skip
+# The rest of it leaves containers alone, but calls and keeps what it is given.
+_TRUSTED = frozenset(sys.stdlib_module_names) | _KEEPS_OFF
 
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
@@ -44,10 +57,37 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     if found is not None:
         return found
     owner, _, name = path.rpartition(".")
-    if is_node_class(owner):
+    if is_node_class(owner) or (owner == "builtins.object" and name.startswith("__")):
         return _unbound_method(run, owner, name, call)
+    if "(" in path and (name in NODE_METHODS):
+        return call_native(run, NativeMethod(unknown(f"the result of {owner}")[0], name), call)
+    if "(" not in path:
+        run.understood.add(
+            call.node
+        )  # a function of a library that does not make interfaces, whatever its name
     _hand_over(run, path, call)
-    return external(path + "()") if ros.interface_type(path) else unknown(f"the result of {path}()")
+    if ros.interface_type(path) or path.partition(".")[0] in _KEEPS_OFF:
+        return external(f"{path}()" if "(" not in path else f"{path.partition('.')[0]}.()")
+    return unknown(f"the result of {path}()")
+
+
+def keeps_off(path: str) -> bool:
+    """Whether the library of ``path`` leaves the program's classes and objects alone."""
+    return path.partition(".")[0] in _KEEPS_OFF
+
+
+def creates(atom: object) -> bool:
+    """Whether calling this function, class or method of a library makes a node or an interface."""
+    if isinstance(atom, ForeignMethod):
+        return atom.name in NODE_ENDPOINTS
+    if not isinstance(atom, External):
+        return False
+    owner, _, leaf = atom.path.rpartition(".")
+    return (
+        is_node_class(atom.path)
+        or ros.makes_interfaces(atom.path)
+        or (leaf in NODE_ENDPOINTS and is_node_class(owner))
+    )
 
 
 def is_node_class(path: str) -> bool:
@@ -69,7 +109,7 @@ def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:
 def _hand_over(run: Run, path: str, call: Call) -> None:
     root = path.partition(".")[0]
     trusted = root in _TRUSTED or bool(ros.interface_type(path))
-    run.escape(call.args, opened=not trusted)
+    run.escape(call.args, opened=not trusted, objects=not trusted or root not in _KEEPS_OFF)
     if trusted or path.endswith(".ParamListener"):  # of generate_parameter_library: only declares parameters
         return
     for value in call.args.all_values():
@@ -89,11 +129,15 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     model = stdlib.METHODS.get((path, name))
     if model is not None:
         return model(run, receiver, call)
+    if path in endpoints.CLASSES:
+        return endpoints.method(run, receiver, name, call)
     if path == ros.PARAMETER_CLASS:
         return (receiver,) if name == "get_parameter_value" else ANY
     if name == "__init__":
         _initialise_other_bases(run, receiver, path, call)
         return ANY
+    if path == "builtins.object" or name in ("__setattr__", "__getattribute__", "__delattr__"):
+        return _object_method(run, receiver, name, call)
     if name in NODE_ENDPOINTS and len(call.args.positional) + len(call.args.keywords) >= 2:
         record = ros.record_of_instance(run, receiver, call)
         if not record.created:
@@ -103,8 +147,28 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     if name in COMMON_CALLBACKS:
         _common_callback(run, name, call)
         return ANY
-    run.escape(call.args, opened=path.partition(".")[0] not in _TRUSTED)
+    root = path.partition(".")[0]
+    run.escape(call.args, opened=root not in _TRUSTED, objects=root not in _KEEPS_OFF)
     return unknown(f"the result of {path.rpartition('.')[2] or 'an unknown class'}.{name}()")
+
+
+def _object_method(run: Run, receiver: Instance, name: str, call: Call) -> Value:
+    """What ``object`` does: set, get and delete attributes without asking the class."""
+    from nodl.infer.interpreter.attributes import plain_attribute
+
+    given = call.args.positional
+    names = [atom for atom in given[0] if isinstance(atom, str)] if given else []
+    if name == "__setattr__" and len(given) == 2 and len(names) == len(given[0]):
+        for each in names:
+            plain_store(run, receiver, each, given[1], len(names) == 1)
+        return NONE
+    if name == "__getattribute__" and names and isinstance(receiver.cls, ClassValue):
+        found = [plain_attribute(run, receiver, receiver.cls, each, call.node, call.frame) for each in names]
+        return join_all(found)
+    if name in ("__setattr__", "__delattr__"):
+        run.gap(call.node, call.frame, f"an attribute is changed by {name} under a name made at run time")
+    run.escape(call.args, opened=False, objects=False)
+    return unknown(f"the result of object.{name}()")
 
 
 def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: Call) -> Value:
@@ -114,13 +178,14 @@ def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: 
     model = ros.NODE_METHODS.get(name)
     if model is not None:
         return model(run, ros.record_of_instance(run, receiver, call), call)
-    run.escape(call.args, opened=False)
-    return unknown(f"the result of Node.{name}()")
+    run.escape(call.args, opened=False, objects=name in ("add_waitable", "add_rate"))
+    return external(f"rclpy.node.Node.{name}()")
 
 
 def _initialise_other_bases(run: Run, receiver: Instance, path: str, call: Call) -> None:
     """An unknown base class may pass the call on to the next one in the method resolution order."""
-    run.escape(call.args, opened=path.partition(".")[0] not in _TRUSTED)
+    root = path.partition(".")[0]
+    run.escape(call.args, opened=root not in _TRUSTED, objects=root not in _KEEPS_OFF)
     order = getattr(receiver.cls, "linear", None) or ()
     foreign = [base for base in order if isinstance(base, External)]
     paths = [base.path for base in foreign]
@@ -165,6 +230,8 @@ def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
     """An attribute of an object whose class is foreign."""
     if path == ros.PARAMETER_CLASS and name in _PARAMETER_VALUES:
         return obj.cells.get("value", ANY)
+    if path in endpoints.CLASSES and name in endpoints.NAMES:
+        return obj.cells.get("name", ANY)
     if path in stdlib.OPEN_ATTRIBUTES:
         return stdlib.OPEN_ATTRIBUTES[path](run, obj, name)
     return (ForeignMethod(path, obj, name),)

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from nodl.infer.interpreter import special
+from nodl.infer.interpreter.expressions import copy_dictionary, variable
 from nodl.infer.interpreter.iterate import elements, keys_of, values_of
 from nodl.infer.interpreter.loops import store_item
 from nodl.infer.interpreter.operators import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, make_text
 from nodl.infer.values import (
+    ABSENT,
     ANY,
     BOOLEAN,
     BOTTOM,
@@ -21,7 +24,9 @@ from nodl.infer.values import (
     Key,
     Sequence,
     Value,
+    Variables,
     join,
+    present,
     sole,
     unknown,
 )
@@ -43,12 +48,45 @@ def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
     if isinstance(receiver, Dictionary):
         run.spend(len(receiver.cells))
         model = _DICTIONARY.get(name)
-        return model(run, receiver, call) if model else ANY
+        return model(run, receiver, call) if model else _lost(run, receiver, call)
+    if isinstance(receiver, Variables):
+        return _variables_method(run, receiver, name, call)
     if isinstance(receiver, Sequence):
         run.spend(len(receiver.items.exact or receiver.items.rest))
         method = _SEQUENCE.get(name)
-        return method(run, receiver, call) if method else ANY
+        return method(run, receiver, call) if method else _lost(run, receiver, call)
+    run.escape(call.args)
     return unknown(f"the result of {name}()")
+
+
+def _variables_method(run: Run, receiver: Variables, name: str, call: Call) -> Value:
+    named = receiver.named()
+    if name == "get":
+        found = variable(run, receiver, call.args.at(0) or ANY, call.node, call.frame)
+        return join(found, call.args.at(1) or NONE)
+    if name == "update":
+        run.gap(call.node, call.frame, "variables are set from a dictionary")
+        run.escape(call.args)
+        return NONE
+    certain = not receiver.owner.summary and all(present(value) is value for value in named.values())
+    rows: list[Value] = [run.tuple_of(((key,), present(value))) for key, value in named.items()]
+    listed: dict[str, list[Value]] = {
+        "keys": [(key,) for key in named],
+        "values": list(named.values()),
+        "items": rows,
+    }
+    found_items = listed.get(name)
+    if found_items is None:
+        return _lost(run, receiver, call)
+    items = Items(tuple(present(value) for value in found_items))
+    return run.sequence(call.node, "list", items if certain else Items(None, items.any_element()))
+
+
+def _lost(run: Run, receiver: object, call: Call) -> Value:
+    """A method that is not modelled: it may call what it is given and change its object."""
+    run.escape(call.args)
+    run.escape_value((receiver,))
+    return ANY
 
 
 # --- text ---------------------------------------------------------------------------------------------------
@@ -56,7 +94,7 @@ def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
 
 def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
     if name == "format":
-        return text_value(str_format(text, call.args))
+        return text_value(str_format(text, special.spoken_each(run, call.args, call.node, call.frame)))
     if name == "join":
         return text_value(joined((text,), elements(run, call.args.at(0) or ANY, call.node, call.frame)))
     arguments = tuple(sole(value) for value in call.args.positional)
@@ -172,23 +210,23 @@ _SEQUENCE: dict[str, SequenceMethod] = {
 
 def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     key = call.args.at(0) or ANY
-    found = owner.cells.get(OTHER, BOTTOM)
+    found = present(owner.cells.get(OTHER, BOTTOM))
     missing = False
     for atom in key:
         if isinstance(atom, str | int | float | bool | type(None)):
-            held = owner.cells.get(Key(atom))
-            missing = missing or held is None
-            found = join(found, held or BOTTOM)
+            held, certain = owner.held(atom)
+            missing = missing or not certain
+            found = join(found, held)
         else:
             missing = True
             found = join(found, values_of(owner).any_element())
-    if missing or owner.summary or owner.escaped or OTHER in owner.cells:
+    if missing or owner.is_open:
         found = join(found, call.args.at(1, "default") or NONE)
     return join(found, ANY) if owner.escaped else found
 
 
 def _setdefault(run: Run, owner: Dictionary, call: Call) -> Value:
-    value = join(_get(run, owner, call), call.args.at(1) or NONE)
+    value = _get(run, owner, call)
     store_item(run, owner, call.args.at(0) or ANY, value)
     return value
 
@@ -211,25 +249,61 @@ def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
 
 
 def _update(run: Run, owner: Dictionary, call: Call) -> Value:
-    for atom in call.args.at(0) or BOTTOM:
-        if isinstance(atom, Dictionary):
-            for cell, value in list(atom.cells.items()):
-                run.state.store(owner, cell, value)
-        else:
-            run.state.store(owner, OTHER, join(owner.cells.get(OTHER, BOTTOM), ANY))
+    given = call.args.at(0)
+    if given is not None:
+        add_entries(run, owner, given, call)
     for name, value in call.args.keywords.items():
         run.state.store(owner, Key(name), value)
+    if call.args.more_keywords:
+        run.state.store(owner, OTHER, join(owner.cells.get(OTHER, BOTTOM), call.args.more_keywords))
     return NONE
 
 
+def add_entries(run: Run, owner: Dictionary, given: Value, call: Call) -> None:
+    """What ``dict.update`` takes: a mapping, or pairs."""
+    for atom in given:
+        if not isinstance(atom, Sequence):
+            copy_dictionary(run, owner, (atom,))
+            continue
+        items = elements(run, (atom,), call.node, call.frame)
+        for pair in items.exact if items.exact is not None else (items.any_element(),):
+            parts = elements(run, pair, call.node, call.frame).exact
+            if parts and len(parts) == 2 and items.exact is not None:
+                store_item(run, owner, *parts)
+            else:
+                held = parts[1] if parts and len(parts) == 2 else ANY
+                run.state.store(owner, OTHER, join(owner.cells.get(OTHER, BOTTOM), held))
+
+
 def _pop_item(run: Run, owner: Dictionary, call: Call) -> Value:
-    return _get(run, owner, call)
+    found = _get(run, owner, call)
+    key = sole(call.args.at(0))
+    if isinstance(key, str | int | float | bool | type(None)) and not owner.summary:
+        run.state.write(owner.cells, Key(key), ABSENT)
+    return found
+
+
+def _clear_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
+    for cell in list(owner.cells):
+        run.state.store(owner, cell, ABSENT)
+    return NONE
+
+
+def _last_item(run: Run, owner: Dictionary, call: Call) -> Value:
+    entries = owner.entries()
+    if entries and not owner.is_open and entries[-1][2]:
+        key, value, _ = entries[-1]
+        run.state.write(owner.cells, key, ABSENT)
+        return run.tuple_of(((key.constant,), value))
+    run.escape_value((owner,))
+    return run.tuple_of((keys_of(owner).any_element() or ANY, values_of(owner).any_element() or ANY))
 
 
 def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
     copied = run.allocate(call.node, "dict", Dictionary)
-    for cell, value in list(owner.cells.items()):
-        run.state.store(copied, cell, value)
+    assert isinstance(copied, Dictionary)
+    copied.default = join(copied.default, owner.default)
+    copy_dictionary(run, copied, (owner,))
     if owner.escaped and not copied.escaped:
         copied.escaped = True
         run.state.learned += 1
@@ -245,5 +319,7 @@ _DICTIONARY: dict[str, DictionaryMethod] = {
     "items": _pairs,
     "update": _update,
     "pop": _pop_item,
+    "popitem": _last_item,
+    "clear": _clear_dictionary,
     "copy": _copy_dictionary,
 }

@@ -9,6 +9,7 @@ from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import as_texts, text_value
 from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.models.endpoints import endpoint_object
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import (
     ENDPOINT_CALLS,
@@ -23,6 +24,7 @@ from nodl.infer.models.signatures import (
 )
 from nodl.infer.text import Input, NodePart, Text, concatenate, make_text
 from nodl.infer.values import (
+    ABSENT,
     ANY,
     BOTTOM,
     NONE,
@@ -34,11 +36,16 @@ from nodl.infer.values import (
     constant_strings,
     external,
     join,
+    present,
     unknown,
 )
 from nodl.node_interface import EndpointKind
 
 NODE_CLASS = "rclpy.node.Node"
+LOGGER_SERVICES = {  # rclpy/logging_service.py
+    "~/get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
+    "~/set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
+}
 LIFECYCLE_CLASS = "rclpy.lifecycle.Node"
 PARAMETER_CLASS = "rclpy.parameter.Parameter"
 _INTERFACE_FOLDERS = ("msg", "srv", "action")
@@ -60,6 +67,7 @@ def is_lifecycle(path: str) -> bool:
 def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None:
     """``Node.__init__``: the instance becomes a node."""
     record = record_of_instance(run, instance, call)
+    run.understood.add(call.node)
     record.created = True
     record.source = call.source
     library = library_node(path)
@@ -79,8 +87,40 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
         enabled = call.args.at(-1, "enable_communication_interface")
         record.communication_interface = enabled is None or truth(enabled) is not False
     overrides = call.args.at(-1, "parameter_overrides")
+    given = (
+        record.arguments if use_global == (False,) else join(record.arguments, run.findings.global_arguments)
+    )
+    override_parameters(run, record, given)
     if overrides:
         _assign_parameters(run, record, overrides, call)
+    if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
+        for service, service_type in LOGGER_SERVICES.items():
+            record.add_endpoint(
+                FoundEndpoint(EndpointKind.SERVICE_SERVER, service, service_type, call.source)
+            )
+
+
+def override_parameters(run: Run, record: NodeRecord, arguments: Value) -> None:
+    """``-p name:=value`` among the command line arguments that the program gives itself."""
+    for words in arguments:
+        for index, word in enumerate(words[:-1] if isinstance(words, tuple) else ()):
+            rule = words[index + 1] if isinstance(words, tuple) else ""
+            if word in ("-p", "--param") and ":=" in rule:
+                left, _, text = rule.partition(":=")
+                name = left.rpartition(":")[2]
+                run.state.write(record.cells, name, _yaml_value(text))
+            elif word == "--params-file":
+                record.gaps.setdefault((record.source, "a parameter file is named in code"))
+
+
+def _yaml_value(text: str) -> Value:
+    import yaml
+
+    try:
+        value = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return ANY
+    return (value,) if isinstance(value, str | int | float | bool) else ANY
 
 
 def _strings_in(run: Run, value: Value, call: Call) -> Value:
@@ -132,6 +172,7 @@ def records_of(run: Run, value: Value | None, call: Call) -> list[NodeRecord]:
 def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call: Call) -> None:
     names = argument(call, made.name) or unknown("a name that is not given")
     types = argument(call, made.type) or ANY
+    run.understood.add(call.node)
     for record in records:
         for name in names_of(names):
             for interface_type in types_of(types):
@@ -173,6 +214,7 @@ def interface_type(path: str) -> str:
 
 def _helper(run: Run, helper: Helper, call: Call) -> None:
     node = argument(call, helper.node)
+    run.understood.add(call.node)
     if node is None or node == NONE:
         return  # tf2_ros.Buffer without a node makes nothing
     for record in records_of(run, node, call):
@@ -197,8 +239,12 @@ def _fixed_names(fixed: FixedEndpoint, call: Call) -> Value:
 
 def _endpoint_method(name: str) -> NodeMethod:
     def method(run: Run, record: NodeRecord, call: Call) -> Value:
-        add_endpoints(run, NODE_ENDPOINTS[name], [record], call)
-        return external(f"rclpy.{name}()")
+        made = NODE_ENDPOINTS[name]
+        add_endpoints(run, made, [record], call)
+        names = argument(call, made.name) or ANY
+        return endpoint_object(
+            run, made.kind, record, names, types_of(argument(call, made.type) or ANY), call
+        )
 
     return method
 
@@ -240,7 +286,7 @@ def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
     names = _names_or_gap(run, call)
     for name in names:
         record.declare(name, _default_value(default))
-    return parameter_object(run, call, _inputs(record, names))
+    return parameter_object(run, call, _inputs(run, record, names))
 
 
 def _default_value(default: Value | None) -> Value:
@@ -250,10 +296,17 @@ def _default_value(default: Value | None) -> Value:
     return tuple(atom for atom in default if atom is not None)
 
 
-def _inputs(record: NodeRecord, names: list[str]) -> Value:
+def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
+    """The values of parameters: what the program set them to, else what launch and the defaults say."""
     if not names:
         return unknown("a parameter whose name is not known")
-    return tuple(make_text((Input(name, record),)) for name in names)
+    result: Value = BOTTOM
+    for name in names:
+        held = record.cells.get(name, ABSENT)
+        result = join(result, present(held))
+        if ABSENT[0] in held:
+            result = join(result, (make_text((Input(name, record),)),))
+    return result
 
 
 def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -270,7 +323,7 @@ def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
             for prefix in prefixes:
                 full = f"{prefix}.{name}" if prefix else name
                 record.declare(full, _default_value(default))
-                found = join(found, parameter_object(run, call, _inputs(record, [full]), full))
+                found = join(found, parameter_object(run, call, _inputs(run, record, [full]), full))
     return run.sequence(call.node, "list", Items(None, found or ANY))
 
 
@@ -280,13 +333,13 @@ def _each(run: Run, value: Value, call: Call) -> list[Value]:
 
 
 def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    return parameter_object(run, call, _inputs(record, _names_or_gap(run, call)))
+    return parameter_object(run, call, _inputs(run, record, _names_or_gap(run, call)))
 
 
 def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
     names = _each(run, call.args.at(0, "names") or ANY, call)
     found = tuple(
-        parameter_object(run, call, _inputs(record, constant_strings(name)), f"parameter {index}")
+        parameter_object(run, call, _inputs(run, record, constant_strings(name)), f"parameter {index}")
         for index, name in enumerate(names)
     )
     return run.sequence(call.node, "list", Items(found))
@@ -301,7 +354,7 @@ def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
             default = join(default, atom.cells.get("value", BOTTOM))
     for name in names:
         record.declare(name, _default_value(default or None))
-    return parameter_object(run, call, _inputs(record, names))
+    return parameter_object(run, call, _inputs(run, record, names))
 
 
 def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -316,8 +369,14 @@ def _assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) 
                 for name in constant_strings(atom.cells.get("name", BOTTOM)):
                     value = atom.cells.get("value", ANY)
                     record.assigned[name] = join(record.assigned.get(name, BOTTOM), value)
+                    run.state.write(record.cells, name, value)
             elif isinstance(atom, Unknown):
                 run.findings.gap(call.source, f"parameters set in code are not known: {atom.why}")
+
+
+def _set_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
+    run.findings.gap(call.source, "parameters are set by a method that is not modelled")
+    return ANY
 
 
 def _wait_until_active(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -379,7 +438,15 @@ def call_library(run: Run, path: str, call: Call) -> Value | None:
         _helper(run, helper, call)
         return instance_of(run, path, call)
     function = _FUNCTIONS.get((root, leaf))
+    if function:
+        run.understood.add(call.node)
     return function(run, path, call) if function else None
+
+
+def makes_interfaces(path: str) -> bool:
+    """Whether a call of this library function or class is among those that make nodes or interfaces."""
+    key = (path.partition(".")[0], path.rpartition(".")[2])
+    return key in ENDPOINT_CALLS or key in HELPERS or key in _MAKING
 
 
 def instance_of(run: Run, path: str, call: Call) -> Value:
@@ -458,6 +525,15 @@ _FUNCTIONS: dict[tuple[str, str], Callable[[Run, str, Call], Value]] = {
     ("image_transport_py", "ImageTransport"): _image_transport,
     ("tf2_ros", "BufferClient"): _buffer_client,
 }
+
+
+_MAKING = frozenset(_FUNCTIONS) - {
+    ("rclpy", "init"), ("rclpy", "Parameter"),
+    ("rosidl_runtime_py", "get_message"), ("rosidl_runtime_py", "get_service"), ("rosidl_runtime_py", "get_action"),
+}  # fmt: skip
+
+
+CREATING_NAMES = frozenset(name for _, name in (*ENDPOINT_CALLS, *HELPERS, *_MAKING))
 
 
 def image_transport_method(run: Run, record: NodeRecord, name: str, call: Call) -> Value:

@@ -11,19 +11,21 @@ from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.models import builtin
 from nodl.infer.text import Input, concatenations, make_text
 from nodl.infer.values import (
+    ABSENT,
     ANY,
     BOTTOM,
+    COMMAND_LINE,
     NONE,
     Dictionary,
     External,
     Instance,
     Items,
-    Key,
     Partial,
     Sequence,
     Value,
     constant_strings,
     join,
+    present,
     sole,
     unknown,
 )
@@ -103,9 +105,25 @@ def _environment(run: Run, call: Call) -> Value:
     default = call.args.at(1, "default") or BOTTOM
     result: Value = BOTTOM
     for name in constant_strings(call.args.at(0) or ANY):
+        held = run.environment.get(name, ABSENT)
+        result = join(result, present(held))
+        if ABSENT[0] not in held:
+            continue
         run.options.declare("$" + name, tuple(atom for atom in default if atom is not None))
         result = join(result, (make_text((Input("$" + name, run.options),)),))
     return result or unknown("an environment variable")
+
+
+def _set_default_environment(run: Run, call: Call) -> Value:
+    found = _environment(run, call)
+    for name in constant_strings(call.args.at(0) or ANY):
+        run.state.write(run.environment, name, found)
+    return found
+
+
+def _change_environment(run: Run, call: Call) -> Value:
+    run.gap(call.node, call.frame, "environment variables are changed in a way that is not modelled")
+    return ANY
 
 
 def _path_join(run: Run, call: Call) -> Value:
@@ -142,8 +160,8 @@ def _register_with(run: Run, target: Value, args: Value | None, kwargs: Value | 
     keywords: list[tuple[str, Value]] = []
     for atom in kwargs or BOTTOM:
         if isinstance(atom, Dictionary):
-            for cell, value in atom.cells.items():
-                if isinstance(cell, Key) and isinstance(cell.constant, str):
+            for cell, value, _ in atom.entries():
+                if isinstance(cell.constant, str):
                     keywords.append((cell.constant, value))
     items = Items(()) if args is None else elements(run, args, call.node, call.frame)
     if items.exact is None:
@@ -245,6 +263,10 @@ FUNCTIONS: dict[str, Model] = {
     "argparse.ArgumentParser": _parser,
     "os.getenv": _environment,
     "os.environ.get": _environment,
+    "os.environ.setdefault": _set_default_environment,
+    "os.environ.update": _change_environment,
+    "os.environ.pop": _change_environment,
+    "os.putenv": _change_environment,
     "os.path.join": _path_join,
     "os.path.basename": _base_name,
     "functools.partial": _partial,
@@ -313,7 +335,7 @@ HOOKS: dict[str, frozenset[str]] = {
 }
 
 CONSTANTS: dict[str, Value] = {
-    "sys.argv": unknown("command line arguments"),
+    "sys.argv": unknown(COMMAND_LINE),
     "sys.platform": ("linux",),
     "os.sep": ("/",),
     "os.name": ("posix",),

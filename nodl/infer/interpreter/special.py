@@ -1,0 +1,148 @@
+"""Special methods of the program's own classes: operators, truth, text, containers, attributes (data model, 3.3)."""
+
+from __future__ import annotations
+
+import ast
+
+from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.run import Arguments, Frame, Run
+from nodl.infer.values import (
+    ANY,
+    BOTTOM,
+    BoundMethod,
+    ClassValue,
+    FunctionValue,
+    Instance,
+    Value,
+    join,
+)
+
+OPERATORS: dict[type, str] = {
+    ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv", ast.Mod: "mod",
+    ast.Pow: "pow", ast.LShift: "lshift", ast.RShift: "rshift", ast.BitOr: "or", ast.BitXor: "xor",
+    ast.BitAnd: "and", ast.MatMult: "matmul",
+}  # fmt: skip
+COMPARISONS: dict[type, str] = {
+    ast.Eq: "__eq__", ast.NotEq: "__ne__", ast.Lt: "__lt__", ast.LtE: "__le__", ast.Gt: "__gt__", ast.GtE: "__ge__",
+}  # fmt: skip
+_MIRRORED = {"__lt__": "__gt__", "__gt__": "__lt__", "__le__": "__ge__", "__ge__": "__le__"}
+
+
+def method(obj: object, name: str) -> Value:
+    """``type(obj).name`` bound to ``obj``, where an analysed class defines it; else nothing."""
+    if not isinstance(obj, Instance) or not isinstance(obj.cls, ClassValue):
+        return BOTTOM
+    for base in linearized(obj.cls):
+        value = base.cells.get(name) if isinstance(base, ClassValue) else None
+        if value:
+            return tuple(
+                BoundMethod(atom, obj) if isinstance(atom, FunctionValue) else atom for atom in value
+            )
+    return BOTTOM
+
+
+def has_own(value: Value) -> bool:
+    """Whether ``value`` may be an object of one of the program's classes."""
+    return any(type(atom) is Instance and type(atom.cls) is ClassValue for atom in value)
+
+
+def call_special(run: Run, obj: object, name: str, node: ast.AST, frame: Frame, *given: Value) -> Value:
+    """The result of the special method, or nothing when the class has none."""
+    found = method(obj, name)
+    return run.call(found, Arguments(list(given)), node, frame) if found else BOTTOM
+
+
+def binary(run: Run, left: Value, op: ast.operator, right: Value, node: ast.AST, frame: Frame) -> Value:
+    """``left op right`` as far as a class of the program defines it; nothing: neither side does."""
+    name = OPERATORS.get(type(op), "")
+    result: Value = BOTTOM
+    for atom in left:
+        result = join(result, call_special(run, atom, f"__{name}__", node, frame, right))
+    if not result:
+        for atom in right:
+            result = join(result, call_special(run, atom, f"__r{name}__", node, frame, left))
+    return result
+
+
+def in_place(run: Run, left: Value, op: ast.operator, right: Value, node: ast.AST, frame: Frame) -> Value:
+    name = f"__i{OPERATORS.get(type(op), '')}__"
+    result: Value = BOTTOM
+    for atom in left:
+        result = join(result, call_special(run, atom, name, node, frame, right))
+    return result
+
+
+def comparison(run: Run, op: ast.cmpop, left: Value, right: Value, node: ast.AST, frame: Frame) -> Value:
+    """What the program's own method says; nothing: there is none."""
+    if isinstance(op, ast.In | ast.NotIn):
+        return _contained(run, op, left, right, node, frame)
+    name = COMPARISONS.get(type(op))
+    if name is None:
+        return BOTTOM
+    result: Value = BOTTOM
+    for atom in left:
+        result = join(result, call_special(run, atom, name, node, frame, right))
+    for atom in right if not result else ():
+        result = join(result, call_special(run, atom, _MIRRORED.get(name, name), node, frame, left))
+    if not result and name == "__ne__":
+        return _negated(run, comparison(run, ast.Eq(), left, right, node, frame), node, frame)
+    return result
+
+
+def _contained(run: Run, op: ast.cmpop, left: Value, right: Value, node: ast.AST, frame: Frame) -> Value:
+    result: Value = BOTTOM
+    for atom in right:
+        result = join(result, call_special(run, atom, "__contains__", node, frame, left))
+    if result:
+        result = booleans(run, result, node, frame)
+    return _negated(run, result, node, frame) if isinstance(op, ast.NotIn) else result
+
+
+def _negated(run: Run, value: Value, node: ast.AST, frame: Frame) -> Value:
+    return tuple(not atom for atom in booleans(run, value, node, frame)) if value else BOTTOM
+
+
+def booleans(run: Run, value: Value, node: ast.AST, frame: Frame) -> Value:
+    """``bool(value)``: ``(True,)``, ``(False,)`` or both."""
+    from nodl.infer.interpreter.conditions import truth_of
+
+    result: Value = BOTTOM
+    for atom in tested(run, value, node, frame):
+        outcome = truth_of(atom)
+        result = join(result, (True, False) if outcome is None else (outcome,))
+    return result or (True, False)
+
+
+def tested(run: Run, value: Value, node: ast.AST, frame: Frame) -> Value:
+    """``value`` with objects whose class defines truth replaced by what their method says."""
+    if not has_own(value):
+        return value
+    result: Value = BOTTOM
+    for atom in value:
+        said = call_special(run, atom, "__bool__", node, frame)
+        said = said or call_special(run, atom, "__len__", node, frame)
+        result = join(result, said or (atom,))
+    return result or ANY
+
+
+def spoken(run: Run, value: Value, node: ast.AST, frame: Frame, spec: Value | None = None) -> Value:
+    """``value`` with objects whose class defines their text replaced by it (``format`` with ``spec``, else ``str``)."""
+    if not has_own(value):
+        return value
+    result: Value = BOTTOM
+    for atom in value:
+        said: Value = BOTTOM
+        if spec is not None:
+            said = call_special(run, atom, "__format__", node, frame, spec)
+        said = said or call_special(run, atom, "__str__", node, frame)
+        said = said or call_special(run, atom, "__repr__", node, frame)
+        result = join(result, said or (atom,))
+    return result or ANY
+
+
+def spoken_each(run: Run, args: Arguments, node: ast.AST, frame: Frame) -> Arguments:
+    """The same for every argument of ``str.format``, with an empty format."""
+    empty: Value = ("",)
+    positional = [spoken(run, value, node, frame, empty) for value in args.positional]
+    keywords = {name: spoken(run, value, node, frame, empty) for name, value in args.keywords.items()}
+    return Arguments(positional, keywords, args.more, args.more_keywords)

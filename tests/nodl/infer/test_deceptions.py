@@ -1,0 +1,135 @@
+"""Programs written to deceive the inference, beside the truth: each is run against a recorder and compared.
+
+``deceptions/*.programs`` hold them, one after another under a heading ``# --- what it does``; a line ``#= {...}`` gives
+parameters that launch sets for one more run. What a program makes and inference does not know of must at least be a
+gap or a pattern (sound); where inference claims to know every name, it must claim no other one (exact).
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from nodl.infer import InferredSystem, infer_paths
+from nodl.names import InvalidNameError, expand_name
+from tests.nodl.infer.recorder import Fact, record
+
+FOLDER = Path(__file__).parent / "deceptions"
+SEEDS = range(6)
+_PRELUDE = """\
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+from std_srvs.srv import Empty
+"""
+
+
+class Program(NamedTuple):
+    title: str
+    text: str
+    scenarios: tuple[dict[str, object], ...]
+
+
+def _programs() -> Iterator[Program]:
+    for file in sorted(FOLDER.glob("*.programs")):
+        for section in re.split(r"^# --- ", file.read_text(), flags=re.M)[1:]:
+            title, _, body = section.partition("\n")
+            given = [json.loads(line[3:]) for line in body.splitlines() if line.startswith("#= ")]
+            yield Program(f"{file.stem}: {title}", _PRELUDE + body, ({}, *given))
+
+
+PROGRAMS = {program.title: program for program in _programs()}
+
+
+class Claim(NamedTuple):
+    """What inference says about a program under some parameters. ``open``: it says that it does not know all."""
+
+    facts: frozenset[Fact]
+    patterns: tuple[tuple[str, re.Pattern[str]], ...]
+    gaps: tuple[str, ...]
+
+    def covers(self, fact: Fact) -> bool:
+        fits = any(kind == fact[0] and pattern.fullmatch(fact[1]) for kind, pattern in self.patterns)
+        return fact in self.facts or fits or bool(self.gaps)
+
+    @property
+    def exact(self) -> bool:
+        return not self.gaps and not self.patterns
+
+
+def claim(system: InferredSystem, parameters: dict[str, object]) -> Claim:
+    facts: set[Fact] = set()
+    patterns: list[tuple[str, re.Pattern[str]]] = []
+    gaps = [gap.why for gap in system.gaps]
+    for node in system.nodes:
+        gaps.extend(gap.why for gap in node.gaps)
+        namespace, name = node.namespace or "/", node.name or "unknown"
+        facts.add(("node", expand_name("~", namespace=namespace, node=name)))
+        for endpoint in node.endpoints:
+            for filled in endpoint.name.fill_each(parameters):
+                if not filled.is_literal:
+                    text = re.escape(filled.text).replace(r"\*", ".*")
+                    start = "" if filled.text.startswith(("/", "*")) else "(/.*)?/"
+                    patterns.append((endpoint.kind.value, re.compile(start + text)))
+                    continue
+                try:
+                    full = expand_name(filled.text, namespace=namespace, node=name)
+                except InvalidNameError:
+                    continue  # rcl refuses it as well
+                facts.add((endpoint.kind.value, full))
+    return Claim(frozenset(facts), tuple(patterns), tuple(gaps))
+
+
+class Verdict(NamedTuple):
+    missing: list[Fact]
+    false: list[Fact]
+    exact: bool
+
+
+def judge(program: Program, folder: Path) -> Verdict:
+    """Compare truth and claim under each scenario; missing and false are what would be silently wrong."""
+    file = folder / "program.py"
+    file.write_text(program.text, encoding="utf-8")
+    system = infer_paths([file])
+    missing: set[Fact] = set()
+    false: set[Fact] = set()
+    exact = True
+    for parameters in program.scenarios:
+        seeds = SEEDS if "tosses" in program.text else (0,)
+        truth = {fact for seed in seeds for fact in record(file, parameters, seed)}
+        claimed = claim(system, parameters)
+        missing |= {fact for fact in truth if not claimed.covers(fact)}
+        if claimed.exact:
+            false |= claimed.facts - truth
+        exact = exact and claimed.exact
+    return Verdict(sorted(missing), sorted(false), exact)
+
+
+NOT_YET = {  # claims too much, or (the lazy generator) the wrong thing
+    "control_flow: max and min choose", "control_flow: sorted by a key",
+    "control_flow: a loop ends with a decided break", "control_flow: a loop goes on with a decided continue",
+    "control_flow: a generator is lazy", "control_flow: a generator creates while it is consumed",
+    "control_flow: no exception, no handler", "control_flow: hasattr decides",
+    "control_flow: swallowed exceptions", "control_flow: any and all decide",
+    "control_flow: a dictionary is filled, merged and turned round",
+    "control_flow: a coin decides once for both names",
+    "control_flow: a coin decides and two variables go together",
+    "control_flow: with a return inside, what follows is not reached",
+    "handed_over: a function that nobody calls stays without effect",
+    "handed_over: a subclass that nobody makes stays without effect", "libraries: a parameter decides",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "title",
+    [pytest.param(t, marks=pytest.mark.xfail(strict=True) if t in NOT_YET else ()) for t in PROGRAMS],
+)
+def test_nothing_is_missing_silently_and_nothing_exact_is_false(title: str, tmp_path: Path) -> None:
+    verdict = judge(PROGRAMS[title], tmp_path)
+    assert not verdict.missing
+    assert not verdict.false
