@@ -14,7 +14,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from enclave_launch.boundary.files import read_bytes
-
 from nodl.infer.mangling import mangle
 
 MAX_SOURCE_BYTES = 1_000_000
