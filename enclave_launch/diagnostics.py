@@ -50,6 +50,16 @@ class Code(str, Enum):
     ENCLAVE_ATTRIBUTE_UNUSED = "enclave-attribute-unused", "The process names another enclave itself"
     ENCLAVE_SHARED_WITH_LAUNCHER = "enclave-shared-with-launcher", "A process has the launcher's enclave"
     EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
+    # of what could take an enclave away
+    CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, on which nothing here was tried"
+    DOMAIN_INVALID = "domain-invalid", "A process has an impossible ROS_DOMAIN_ID"
+    DOMAIN_NOT_SERVED = "domain-not-served", "A process is in a domain that the permissions leave out"
+    DOMAINS_SHARED = "domains-shared", "An enclave may join the domains of several processes"
+    LIBRARY_PRELOADED = "library-preloaded", "The launch file loads a library into a process"
+    MIDDLEWARE_REFUSED = "middleware-refused", "The middleware of a process is not known to read enclaves"
+    PREFIX_REFUSED = "prefix-refused", "Something between launch and a program may change its environment"
+    SECURITY_CONFIGURED = "security-configured", "A DDS configuration has security properties of its own"
+    VARIABLE_OVERRIDDEN = "variable-overridden", "A security variable of the launch file has no effect"
 
     def __new__(cls, value: str, meaning: str = "") -> Code:
         code = str.__new__(cls, value)
@@ -234,5 +244,74 @@ def enclave_shared_with_launcher(enclave: str) -> Diagnostic:
 
 
 def executable_without_enclave(process: str, place: SourceLocation) -> Diagnostic:
-    text = f"{process} runs without an enclave: an executable gets one only through its enclave attribute"
+    text = (
+        f"{process} runs without an enclave: an executable gets one only through its enclave attribute or --enclave; "
+        "a ROS program in it could not start"
+    )
     return Diagnostic(Code.EXECUTABLE_WITHOUT_ENCLAVE, process, text, place)
+
+
+# -- of what could take an enclave away -------------------------------------------------------------------------------
+
+
+def connext(process: str, place: SourceLocation) -> Diagnostic:
+    text = (
+        f"{process} runs on RTI Connext: rmw_connextdds reads enclaves (its source says so), but nothing here was "
+        "tried on it; permissions name topics as ROS does (rt/chatter), topic aliases of plain Connext need both names"
+    )
+    return Diagnostic(Code.CONNEXT_UNTRIED, process, text, place)
+
+
+def domain_invalid(process: str, why: str, place: SourceLocation) -> Diagnostic:
+    return Diagnostic(Code.DOMAIN_INVALID, process, f"{process}: {why}", place, "it could not start")
+
+
+def domain_not_served(process: str, domain: int, served: str, place: SourceLocation) -> Diagnostic:
+    asked = "--domain-id (ProvisionOptions.domains)"
+    text = f"{process} is in domain {domain}, but {asked} asks for permissions for {served} only"
+    return Diagnostic(
+        Code.DOMAIN_NOT_SERVED, process, text, place, "add the domain there, or leave it out here"
+    )
+
+
+def domains_shared(enclave: str, domains: str, processes: tuple[str, ...]) -> Diagnostic:
+    text = (
+        f"enclave {enclave} may join domains {domains}, each of its processes all of them ({', '.join(processes)}); "
+        "give those of each domain an enclave of their own"
+    )
+    return Diagnostic(Code.DOMAINS_SHARED, enclave, text)
+
+
+def library_preloaded(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
+    text = f"{variable} puts {value!r} into {process} before its own libraries: it can do all that the enclave may"
+    return Diagnostic(Code.LIBRARY_PRELOADED, process, text, place)
+
+
+def middleware_refused(
+    process: str, middleware: str, why: str, place: SourceLocation, *, by_launch_file: bool
+) -> Diagnostic:
+    origin = "the launch file" if by_launch_file else "the environment"
+    text = f"{process} would run on {middleware} (RMW_IMPLEMENTATION of {origin}) and not be secured: {why}"
+    known = "rmw_cyclonedds_cpp, rmw_fastrtps_cpp, rmw_fastrtps_dynamic_cpp and rmw_connextdds read enclaves"
+    accept = f"; vouch for it with --accept-middleware {middleware}" if "not known" in why else ""
+    return Diagnostic(Code.MIDDLEWARE_REFUSED, process, text, place, known + accept)
+
+
+def prefix_refused(process: str, wrapper: str, why: str, place: SourceLocation) -> Diagnostic:
+    text = f"{process} would be started through {wrapper!r} and might not be secured: {why}"
+    return Diagnostic(
+        Code.PREFIX_REFUSED, process, text, place, f"if it keeps ROS_SECURITY_*, --accept-prefix {wrapper}"
+    )
+
+
+def security_configured(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
+    shown = value if len(value) <= 60 else f"{value[:57]}..."
+    text = f"{variable} of {process} has security settings of its own, beside those of its enclave: {shown}"
+    return Diagnostic(
+        Code.SECURITY_CONFIGURED, process, text, place, "take them out: which of them win is not known"
+    )
+
+
+def variable_overridden(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
+    text = f"{variable}={value} of the launch file has no effect on {process} under --secure"
+    return Diagnostic(Code.VARIABLE_OVERRIDDEN, process, text, place)

@@ -102,16 +102,18 @@ def provision(
     Raises ``ManifestError`` for a plan with problems (nothing is written then) and ``ProvisionError``.
     """
     from enclave_launch.secured import ProvisionedLaunch, provision_policies
-    from enclave_launch.security_environment import SecuritySettings, environment_domains
+    from enclave_launch.security_environment import SecuritySettings
+    from enclave_launch.served_domains import with_domains
     from keystore.steps.options import ProvisionOptions
 
     if plan.problems:
         raise ManifestError("\n".join((*map(str, plan.problems), "nothing was started or written")))
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
-    wanted = chosen.keystore or ProvisionOptions(domains=environment_domains(os.environ))
-    report = provision_policies(settings, plan.derived.policy.enclaves, wanted)
-    return ProvisionedLaunch(plan, settings, report, wanted)
+    asked = chosen.keystore or ProvisionOptions()
+    wanted = with_domains(plan, asked, os.environ)
+    report = provision_policies(settings, plan, wanted)
+    return ProvisionedLaunch(plan, settings, report, wanted, asked)
 
 
 def run(

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.admission import AdmissionOptions
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlanOptions
@@ -35,6 +36,8 @@ class ResolveOptions:
     library_folders: tuple[Path, ...] = ()
     accept_patterns: bool = False
     allow_missing_packages: bool = False
+    accept_prefixes: tuple[str, ...] = ()
+    accept_middlewares: tuple[str, ...] = ()
     no_python: bool = False
     launch_configurations: Mapping[str, str] = field(default_factory=dict)
 
@@ -49,7 +52,8 @@ class ResolveOptions:
     def plan_options(self) -> PlanOptions:
         """Raises ``UsageError`` for a policy file that cannot be used."""
         document = _read_policy(self.policy) if self.policy else None
-        return PlanOptions(self.enclave_scope, PolicyOptions(self.accept_patterns, document))
+        admission = AdmissionOptions(frozenset(self.accept_prefixes), frozenset(self.accept_middlewares))
+        return PlanOptions(self.enclave_scope, PolicyOptions(self.accept_patterns, document), admission)
 
 
 def _read_policy(path: Path) -> PolicyDocument:

@@ -13,9 +13,15 @@ from enum import Enum
 from types import MappingProxyType
 from typing import NamedTuple
 
+from enclave_launch.admission import AdmissionOptions, prefix_refusals, refusals, remarks
+from enclave_launch.admission.domains import domain_of
+from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
+from enclave_launch.admission.middleware import middleware_of
 from enclave_launch.diagnostics import (
+    Code,
     Diagnostic,
     container_elsewhere,
+    domains_shared,
     enclave_attribute_unused,
     enclave_shared_with_launcher,
     executable_without_enclave,
@@ -82,6 +88,9 @@ class PlannedProcess(NamedTuple):
     missing: Missing | None = None
     origin: InterfaceOrigin | None = None
     doubt: str = ""
+    refusals: tuple[Diagnostic, ...] = ()
+    domain: int = 0
+    middleware: str = DEFAULT_MIDDLEWARE
 
     @property
     def name(self) -> str | None:
@@ -153,10 +162,12 @@ class LaunchPlan(NamedTuple):
 
 
 class PlanOptions(NamedTuple):
-    """``enclave_scope``: where processes without an ``enclave`` attribute go; ``policy``: how permissions derive."""
+    """``enclave_scope``: where processes without an ``enclave`` attribute go; ``policy``: how permissions derive;
+    ``admission``: what may start though it is not known to keep its enclave."""
 
     enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
     policy: PolicyOptions = PolicyOptions()
+    admission: AdmissionOptions = AdmissionOptions()
 
 
 class LaunchSource(NamedTuple):
@@ -190,7 +201,10 @@ class Planner(NamedTuple):
     def plan(self, evaluation: Evaluation) -> LaunchPlan:
         """Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse."""
         scope = self.options.enclave_scope
-        processes = tuple(_plan_process(process, self.lookup, scope) for process in evaluation.processes)
+        processes = tuple(
+            self._admitted(_plan_process(process, self.lookup, scope), evaluation.distro)
+            for process in evaluation.processes
+        )
         containers = _containers(processes)
         components = tuple(_plan_component(item, containers, self.lookup) for item in evaluation.components)
         launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
@@ -212,9 +226,43 @@ class Planner(NamedTuple):
                 *evaluation.warnings,
                 *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
                 *_notes(processes, components, launcher),
+                *(note for item in processes for note in remarks(item.process, evaluation.distro)),
+                *_domains_shared(processes),
                 *derived.warnings,
             ),
         )
+
+    def _admitted(self, planned: PlannedProcess, distro: str) -> PlannedProcess:
+        """With what decides whether its enclave is used. An executable without one starts where none is found."""
+        process = planned.process
+        middleware = middleware_of(process.final_environment, distro)
+        if planned.enclave is None and process.kind == "executable":
+            unkept = tuple(prefix_refusals(process, self.options.admission))
+            return planned._replace(refusals=unkept, middleware=middleware)
+        refused = tuple(refusals(process, distro, self.options.admission))
+        bad = any(refusal.code is Code.DOMAIN_INVALID for refusal in refused)
+        domain = 0 if bad else domain_of(process.final_environment)
+        return planned._replace(refusals=refused, domain=domain, middleware=middleware)
+
+
+def enclave_domains(processes: Iterable[PlannedProcess]) -> dict[str, dict[int, list[PlannedProcess]]]:
+    """Enclave path -> domain -> the processes of that enclave in it."""
+    found: dict[str, dict[int, list[PlannedProcess]]] = {}
+    for item in processes:
+        if item.enclave is not None:
+            found.setdefault(item.enclave.path, {}).setdefault(item.domain, []).append(item)
+    return found
+
+
+def _domains_shared(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
+    for enclave, by_domain in enclave_domains(processes).items():
+        if len(by_domain) > 1:
+            who = (
+                f"{item.process.process_name} in {domain}"
+                for domain, items in sorted(by_domain.items())
+                for item in items
+            )
+            yield domains_shared(enclave, ", ".join(map(str, sorted(by_domain))), tuple(who))
 
 
 def _nodes(
@@ -288,6 +336,7 @@ def _problems(
     for process in processes:
         if process.missing:
             yield no_manifest(*process.missing, process.process.location)
+        yield from process.refusals
     for component in components:
         if component.missing:
             yield no_manifest(*component.missing, component.component.location)

@@ -62,6 +62,8 @@ class ResolvedProcess(NamedTuple):
     cwd: str | None = None
     shell: bool = False
     parameter_files: Mapping[str, str] = MappingProxyType({})  # "<params:N>" -> YAML text
+    prefix: tuple[str, ...] = ()  # words of cmd before the program: launch-prefix
+    final_environment: Mapping[str, str] = MappingProxyType({})  # all of it, inherited variables included
 
 
 class ResolvedComponent(NamedTuple):

@@ -7,7 +7,7 @@ what was provisioned (a few file reads) and hands out the arguments and variable
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from enclave_launch.errors import ProvisionError
@@ -21,7 +21,9 @@ from enclave_launch.security_environment import (
     launcher_environment,
     secured_environment,
 )
+from enclave_launch.served_domains import places, with_domains
 from keystore.errors import KeystoreError
+from keystore.formats.governance import NoGovernanceRule
 from keystore.formats.policy import EnclavePolicy
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
@@ -29,12 +31,14 @@ from keystore.steps.report import ProvisionReport
 
 
 class ProvisionedLaunch(NamedTuple):
-    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it."""
+    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it;
+    ``options`` are those ``asked`` for, with what the plan decided."""
 
     plan: LaunchPlan
     settings: SecuritySettings
     report: ProvisionReport
     options: ProvisionOptions
+    asked: ProvisionOptions
 
     @property
     def secret_variables(self) -> frozenset[str]:
@@ -44,11 +48,18 @@ class ProvisionedLaunch(NamedTuple):
 
 
 def provision_policies(
-    settings: SecuritySettings, policies: Iterable[EnclavePolicy], options: ProvisionOptions
+    settings: SecuritySettings,
+    plan: LaunchPlan,
+    options: ProvisionOptions,
+    only: EnclavePolicy | None = None,
 ) -> ProvisionReport:
-    """Raises ``ProvisionError`` with the keystore's own message."""
+    """All enclaves of ``plan``, or one. Raises ``ProvisionError`` with the keystore's own message, and where the plan
+    asks for what it cannot give."""
+    policies = plan.derived.policy.enclaves if only is None else (only,)
     try:
         return provision(settings.keystore, policies, options=options)
+    except NoGovernanceRule as error:
+        raise ProvisionError(f"{error} ({places(plan, error.domains)})") from error
     except KeystoreError as error:
         raise ProvisionError(str(error)) from error
 
@@ -58,6 +69,7 @@ class PlanProvider:
 
     def __init__(self, launch: ProvisionedLaunch):
         self._launch = launch
+        self._options = launch.options  # follow the plan when it is extended
         self._follow(launch.plan)
 
     @property
@@ -71,6 +83,10 @@ class PlanProvider:
         self._by_name = {(item.process.process_name, key): item for key, item in identified}
         self._by_identity = dict(identified)
         self._policies = {enclave.path: enclave for enclave in plan.derived.policy.enclaves}
+
+    def _follow_domains(self) -> None:
+        """What came late may be in another domain."""
+        self._options = with_domains(self._plan, self._launch.asked, os.environ)
 
     def granted(self, process: ResolvedProcess) -> Grant | None:
         """The grant, if the plan has the process and its enclave is the one provisioned (a few file reads)."""
@@ -113,7 +129,8 @@ class PlanProvider:
             policy = self._policies[planned.enclave.path]
             if policy.path in before:  # to extend is not to repair
                 self._check(before[policy.path])
-            provision_policies(self._launch.settings, [policy], self._launch.options)
+            self._follow_domains()
+            provision_policies(self._launch.settings, self._plan, self._options, policy)
         return self.ensure(process)
 
     def launcher(self) -> Grant | None:
@@ -129,7 +146,7 @@ class PlanProvider:
 
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
-            wrong = differences(keystore, policy, options=self._launch.options)
+            wrong = differences(keystore, policy, options=self._options)
         except KeystoreError as error:
             raise ProvisionError(
                 f"enclave {enclave} cannot be looked at any more, though it was provisioned for this launch: {error}"

@@ -7,32 +7,26 @@ appended only where the user wrote none); an ``executable`` action, whose comman
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from enclave_launch.admission.domains import domain_of
 from enclave_launch.enclave import Reason
-from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlannedProcess
-from keystore.errors import printable
-from keystore.formats.domains import HIGHEST_ID, Domains
+from keystore.formats.domains import Domains
 
 ENABLE = "ROS_SECURITY_ENABLE"
 KEYSTORE = "ROS_SECURITY_KEYSTORE"
 STRATEGY = "ROS_SECURITY_STRATEGY"
 OVERRIDE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
-DOMAIN = "ROS_DOMAIN_ID"
+NO_KEYSTORE = "/dev/null/an_executable_without_an_enclave"
+"""Below a file, so that nothing can ever be there."""
 
 
 def environment_domains(environment: Mapping[str, str]) -> Domains:
-    """The one domain that the processes will use: rcl takes a plain number, and no value for 0.
-
-    Raises ``UsageError``; ranges are for ``--domain-id``, where somebody asks for them.
-    """
-    text = environment.get(DOMAIN) or "0"
-    if re.fullmatch("[0-9]{1,3}", text) is None or int(text) > HIGHEST_ID:
-        raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
-    return Domains.single(int(text))
+    """The one domain of a process with this environment. Raises ``UsageError``; ranges are for ``--domain-id``,
+    where somebody asks for them."""
+    return Domains.single(domain_of(environment))
 
 
 class SecuritySettings(NamedTuple):
@@ -59,10 +53,12 @@ def secured_command(planned: PlannedProcess, settings: SecuritySettings | None) 
 
 
 def secured_environment(planned: PlannedProcess, settings: SecuritySettings | None) -> Mapping[str, str]:
-    """The security variables of one process. Every process gets them: an executable that turns out to be a ROS
-    process without an enclave of its own is then secured under rcl's default, never silently unsecured."""
+    """The security variables of one process. Every process gets them; for an executable without an enclave they lead
+    nowhere, so that a ROS program in it ends with rcl's message instead of joining as ``/`` or unsecured."""
     if settings is None:
         return {}
+    if planned.enclave is None:
+        return {ENABLE: "true", KEYSTORE: NO_KEYSTORE, STRATEGY: "Enforce"}
     variables = dict(launcher_environment(settings))
     if planned.enclave is not None and planned.process.kind == "executable":
         variables[OVERRIDE] = planned.enclave.path

@@ -39,6 +39,9 @@ class Process(_Strict):
         default=None,
         description="where they come from: --nodl, manifest of the package, recorded, inferred, library",
     )
+    prefix: list[str] = Field(description="the first words of cmd, which start the program: launch-prefix")
+    domain_id: int = Field(description="of its own environment")
+    middleware: str = Field(description="the RMW implementation it would load")
     environment: dict[str, str] = Field(
         description="variables added or changed, values as the process sees them"
     )

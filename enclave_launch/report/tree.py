@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 
 from enclave_launch.boundary.terminal import printable
@@ -58,7 +59,9 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
         if process.location.file == plan.launch_file
         else str(process.location)
     )
-    head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{source}{event})"
+    also = f", behind {shlex.join(process.prefix)}" if process.prefix else ""
+    also += f", domain {item.domain}" if item.domain else ""
+    head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{source}{also}{event})"
     loaded: list[Branch] = [
         (f"component {component.component.package} {component.component.plugin} as {component.fqn}", ())
         for component in plan.components

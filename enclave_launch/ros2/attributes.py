@@ -3,7 +3,7 @@
 * ``enclave=`` on ``node``, ``node_container``, lifecycle nodes and ``executable``;
 * ``enclave=`` on ``push_ros_namespace`` and the action ``push_ros_enclave`` for the enclave scope.
 
-Upstream offers no hook for attributes of its own actions, so three methods are wrapped, once, and each does
+Upstream offers no hook for attributes of its own actions, so four methods are wrapped, once, and each does
 exactly what it did for those who do not use the attribute. Loaded through the entry point
 ``launch.frontend.launch_extension``, when the first XML or YAML file is parsed, and by our other
 extensions: in every ``ros2 launch`` of a workspace, so the rest of this project is imported where an
@@ -17,14 +17,16 @@ from collections.abc import Callable
 from typing import Any
 
 import launch_ros.actions
-from launch import Action, Substitution
+from launch import Action
 from launch.actions import ExecuteProcess
+from launch.descriptions import Executable
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
 from enclave_launch.ros2.context import session_of
 
 ATTRIBUTE = "_enclave_launch_enclave"
+GRANT = "_enclave_launch_grant"
 WRAPPED = "_enclave_launch_wrapped"
 # Renamed after humble; the old name stays as an alias.
 PushNamespace: Any = (
@@ -68,7 +70,8 @@ def install() -> None:
     if getattr(ExecuteProcess, WRAPPED, False):
         return
     setattr(ExecuteProcess, WRAPPED, True)
-    ExecuteProcess.__init__ = _accepting_enclave(_overriding_enclave(ExecuteProcess.__init__))
+    ExecuteProcess.__init__ = _accepting_enclave(ExecuteProcess.__init__)
+    Executable.prepare = _securing(Executable.prepare)
     # Subclasses, nodes and those of other packages, come here through super().
     ExecuteProcess.parse = classmethod(_reading_enclave_class(ExecuteProcess.parse.__func__))
     PushNamespace.__init__ = _accepting_enclave(PushNamespace.__init__)
@@ -91,41 +94,23 @@ def _accepting_enclave(init: Callable[..., None]) -> Callable[..., None]:
     return wrapped
 
 
-def _overriding_enclave(init: Callable[..., None]) -> Callable[..., None]:
-    """An ``executable``'s command line is not ours to extend: rcl also takes the enclave from a variable."""
+def _securing(prepare: Callable[..., None]) -> Callable[..., None]:
+    """What launch is about to execute gets its security variables last: after what the launch file set, and also
+    where it gave a process an environment of its own (``env=``)."""
 
-    @functools.wraps(init)
-    def wrapped(self: Any, *args: Any, **kwargs: Any) -> None:
-        if hasattr(self, ATTRIBUTE) and not isinstance(self, launch_ros.actions.Node):
+    @functools.wraps(prepare)
+    def wrapped(self: Any, context: Any, action: Any) -> None:
+        prepare(self, context, action)
+        session = session_of(context)
+        if session is not None:
+            from enclave_launch.ros2.observation import observe_executable
             from enclave_launch.security_environment import OVERRIDE
 
-            given = kwargs.get("additional_env") or {}
-            kwargs["additional_env"] = {**given, OVERRIDE: EnclaveOverride(self)}
-        init(self, *args, **kwargs)
+            grant = getattr(action, GRANT, None) or session.enter(observe_executable(action, context))
+            self.final_env.pop(OVERRIDE, None)  # rcl lets it win over --enclave
+            self.final_env.update(grant.environment)
 
     return wrapped
-
-
-class EnclaveOverride(Substitution):  # type: ignore[misc]  # untyped without ROS
-    """The enclave of an ``executable``, complete by the time it is performed; empty in a launch not
-    secured.
-    """
-
-    def __init__(self, action: Any) -> None:
-        super().__init__()
-        self._action = action
-
-    def describe(self) -> str:
-        return "EnclaveOverride()"
-
-    def perform(self, context: Any) -> str:
-        session = session_of(context)
-        if session is None:
-            return ""
-        from enclave_launch.ros2.observation import observe_executable
-        from enclave_launch.security_environment import OVERRIDE
-
-        return session.enter(observe_executable(self._action, context)).environment.get(OVERRIDE, "")
 
 
 Parse = Callable[..., tuple[type, dict[str, Any]]]

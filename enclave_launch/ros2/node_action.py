@@ -8,7 +8,7 @@ from typing import Any
 
 from launch_ros.actions.node import NodeActionExtension
 
-from enclave_launch.ros2 import attributes  # noqa: F401  # accepted by the time a node is executed, too
+from enclave_launch.ros2 import attributes  # accepted by the time a node is executed, too
 from enclave_launch.ros2.context import session_of
 
 
@@ -28,4 +28,5 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
 
         process = observe_node(node_action, context, ros_specific_arguments)
         grant = session.enter(process, observe_components(node_action, context))
+        setattr(node_action, attributes.GRANT, grant)
         return [[TextSubstitution(text=word)] for word in grant.arguments], ros_specific_arguments

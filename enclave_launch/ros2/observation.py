@@ -6,6 +6,9 @@ are final then. Next: ``session``. Touches nothing.
 
 from __future__ import annotations
 
+import os
+import re
+import shlex
 from collections.abc import Iterable
 from typing import Any
 
@@ -25,7 +28,7 @@ from enclave_launch.process import (
 )
 from enclave_launch.ros2.attributes import enclave_attribute, scope_in_force
 from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, words_after_program
 from enclave_launch.source_location import SourceLocation
 
 
@@ -54,6 +57,9 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
             enclave_attribute(action, context), scope_in_force(context), arguments.enclave
         ),
         location=location_in(context, type(action).__name__),
+        prefix=_prefix(action, context, cmd),
+        final_environment=_environment(action, context),
+        shell=bool(action.shell),
     )
 
 
@@ -61,6 +67,8 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
     """``action``: an ``ExecuteProcess`` that is no node, being prepared: its command and name are final."""
     description = action.process_description
     cmd = tuple(description.final_cmd)
+    prefix = cmd[: len(cmd) - len(description.cmd)]
+    words = words_after_program(cmd, len(prefix), shell=bool(action.shell))
     return ResolvedProcess(
         number=int(description.final_name.rpartition("-")[2]),
         kind="executable",
@@ -74,8 +82,15 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
         remaps=(),
         parameters={},
         environment={},
-        enclave=EnclaveRequest(enclave_attribute(action, context), scope_in_force(context)),
+        enclave=EnclaveRequest(
+            enclave_attribute(action, context),
+            scope_in_force(context),
+            parse_ros_arguments(words).enclave,
+        ),
         location=location_in(context, type(action).__name__),
+        prefix=prefix,
+        final_environment=dict(description.final_env),
+        shell=bool(action.shell),
     )
 
 
@@ -119,6 +134,32 @@ def location_in(context: Any, element: str) -> SourceLocation:
     return SourceLocation(
         context.get_locals_as_dict().get("current_launch_file_path", "<program>"), 0, element
     )
+
+
+def _environment(action: Any, context: Any) -> dict[str, str]:
+    """As launch's ``Executable.prepare`` makes it (launch/descriptions/executable.py)."""
+    description = action.process_description
+    base = dict(context.environment) if description.env is None else _performed(description.env, context)
+    return {**base, **_performed(description.additional_env or (), context)}
+
+
+def _performed(variables: Any, context: Any) -> dict[str, str]:
+    return {
+        perform_substitutions(context, name): perform_substitutions(context, value)
+        for name, value in variables
+    }
+
+
+def _prefix(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[str, ...]:
+    """The words that launch will put before the command, where its filter lets it."""
+    description = action.process_description
+    pattern = getattr(description, "_Executable__prefix_filter", None)  # upstream shows the prefix only
+    if (
+        pattern is not None
+        and re.match(perform_substitutions(context, pattern), os.path.basename(cmd[0])) is None
+    ):
+        return ()
+    return tuple(shlex.split(perform_substitutions(context, description.prefix)))
 
 
 def _kind(action: Any) -> ProcessKind:

@@ -7,6 +7,7 @@ outside of them a word with ``:=`` is still taken as a remap rule (deprecated th
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
@@ -55,6 +56,19 @@ def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
         elif flag in _PARAMETER and ":=" in value:
             parameters.append(_parameter_rule(value))
     return RosArguments(tuple(remaps), tuple(parameters), enclave)
+
+
+def words_after_program(cmd: Sequence[str], prefix_length: int, *, shell: bool) -> list[str]:
+    """The words that the program itself gets; a shell cuts its command line anew."""
+    return (shell_words(cmd) if shell else list(cmd))[prefix_length + 1 :]
+
+
+def shell_words(cmd: Sequence[str]) -> list[str]:
+    """The words of a command that goes through a shell. What the shell would refuse stays as it is."""
+    try:
+        return shlex.split(" ".join(cmd))
+    except ValueError:
+        return list(cmd)
 
 
 def _flags(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:

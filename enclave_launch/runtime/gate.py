@@ -73,6 +73,8 @@ def identity(process: ResolvedProcess) -> tuple[object, ...]:
         process.enclave,
         parse_ros_arguments(process.cmd).remaps,
         process.parameters.get("use_sim_time"),  # subscribes /clock
+        process.prefix,
+        *(process.final_environment.get(name) for name in ("RMW_IMPLEMENTATION", "ROS_DOMAIN_ID")),
     )
 
 
@@ -111,7 +113,7 @@ class PlannedGate:
     def ensure(self, process: ResolvedProcess) -> Grant:
         if identity(process) in self._processes:
             return self._provider.ensure(process)
-        if process.kind == "executable" and process.enclave.attribute is None:
+        if process.kind == "executable" and process.enclave.attribute is process.enclave.argument is None:
             return self._provider.ensure_late(process)  # no ROS process by the launch file: nothing to sign
         if not self._allow_late:
             raise LateProcess(_refusal(f"{_named(process)} at {process.location}"))

@@ -72,7 +72,7 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--domain-id",
         metavar="IDS",
-        help="DDS domains of the permissions: N, N-M, or a list (default: ROS_DOMAIN_ID, else 0)",
+        help="DDS domains of the permissions: N, N-M, or a list (default: for each enclave those of its processes)",
     )
     group.add_argument(
         "--valid-for", metavar="TIME", help="validity of new certificates and permissions, such as 90d"
@@ -139,6 +139,20 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
         choices=("namespace", "node", "process", "launch"),
         default="namespace",
         help="enclave of a process that names none (default: namespace)",
+    )
+    group.add_argument(
+        "--accept-prefix",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="a launch prefix that keeps the environment, though it is not known to (repeatable; 'shell' for shells)",
+    )
+    group.add_argument(
+        "--accept-middleware",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="an RMW_IMPLEMENTATION that reads enclaves, though it is not known to (repeatable)",
     )
     group.add_argument("--policy", metavar="FILE", type=Path, help="SROS2 policy merged over the derived one")
 

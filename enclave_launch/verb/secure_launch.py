@@ -112,6 +112,8 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
         library_folders=tuple(options.library),
         accept_patterns=options.accept_patterns,
         allow_missing_packages=options.allow_missing_packages,
+        accept_prefixes=tuple(options.accept_prefix),
+        accept_middlewares=tuple(options.accept_middleware),
         no_python=options.no_python,
         launch_configurations=_launch_prefix(options),
     )

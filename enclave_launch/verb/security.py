@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Iterator
 
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.options import SecurityOptions
 from enclave_launch.secured import ProvisionedLaunch
-from enclave_launch.security_environment import environment_domains
 from keystore.errors import InvalidInput, KeystoreError
 from keystore.formats.domains import Domains
 from keystore.formats.validity import later, parse_duration, parse_end, utc_now
@@ -45,9 +43,10 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
     )
 
 
-def domains(options: argparse.Namespace) -> Domains:
-    """``--domain-id``, else the domain the processes will use. Raises ``InvalidInput`` and ``UsageError``."""
-    return Domains.parse(options.domain_id) if options.domain_id else environment_domains(os.environ)
+def domains(options: argparse.Namespace) -> Domains | None:
+    """``--domain-id``; None: those that the plan finds in the environments of the processes. Raises
+    ``InvalidInput``."""
+    return Domains.parse(options.domain_id) if options.domain_id else None
 
 
 def _passphrase(options: argparse.Namespace) -> Secret | None:

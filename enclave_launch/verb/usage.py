@@ -35,7 +35,17 @@ FOR_SECURE = frozenset(
 )
 """Options of a keystore or of secured processes."""
 
-FOR_PLAN = frozenset({"nodl", "missing_nodl", "accept_patterns", "enclave_scope", "policy"})
+FOR_PLAN = frozenset(
+    {
+        "nodl",
+        "missing_nodl",
+        "accept_patterns",
+        "accept_prefix",
+        "accept_middleware",
+        "enclave_scope",
+        "policy",
+    }
+)
 """Options of the plan: an unsecured launch makes none."""
 
 _VIEWS = ("explain", "dump_params", "show_args", "print_description")

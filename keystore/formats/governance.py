@@ -75,6 +75,14 @@ class DomainRule:
             )
 
 
+class NoGovernanceRule(InvalidInput):
+    """``domains`` are not among the several rules of the governance."""
+
+    def __init__(self, domains: Domains, message: str) -> None:
+        self.domains = domains
+        super().__init__(message)
+
+
 @dataclass(frozen=True, slots=True)
 class Governance:
     domain_rules: tuple[DomainRule, ...] = (DomainRule(),)
@@ -93,11 +101,12 @@ class Governance:
         return Domains(tuple(part for rule in self.domain_rules for part in rule.domains.ranges))
 
     def extended_to(self, domains: Domains) -> Governance:
-        """The same rules for more domains; only unambiguous with a single rule, else raises InvalidInput."""
+        """The same rules for more domains; only unambiguous with a single rule, else raises NoGovernanceRule."""
         if len(self.domain_rules) != 1:
-            raise InvalidInput(
+            raise NoGovernanceRule(
+                domains,
                 f"the governance has no rule for domains {domains} and several to choose from; "
-                "add the domains to its YAML file and run: secure-keystore governance KEYSTORE FILE.yaml"
+                "add the domains to its YAML file and run: secure-keystore governance KEYSTORE FILE.yaml",
             )
         rule = self.domain_rules[0]
         both = Domains((*rule.domains.ranges, *domains.ranges))

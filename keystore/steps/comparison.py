@@ -120,7 +120,7 @@ def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
 
 def permissions_source(policy: EnclavePolicy, options: ProvisionOptions) -> PermissionsSource:
     """Makes the document of exactly this policy."""
-    domains = options.domains or Domains.single(0)
+    domains = options.enclave_domains.get(policy.path) or options.domains or Domains.single(0)
 
     def document(subject: str, validity: Validity) -> bytes:
         return permissions_document(subject, policy, validity=validity, domains=domains, rmw=options.rmw)

@@ -1,7 +1,8 @@
 """What a caller can choose when enclaves are provisioned. One type for launch, verbs and library users."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from keystore.formats.domains import Domains
@@ -19,7 +20,9 @@ DEFAULT_LOCK_TIMEOUT = 30.0
 
 
 class ProvisionOptions(NamedTuple):
-    """``domains`` None: those of the keystore's governance, 0 for a new one. ``lifetime``, ``subjects`` None:
+    """``enclave_domains``: enclaves whose permissions are for fewer of the ``domains``.
+
+    ``domains`` None: those of the keystore's governance, 0 for a new one. ``lifetime``, ``subjects`` None:
     what the keystore was created with. ``renew_within``: certificates that end sooner are re-issued, by
     default only the expired. ``creation``: for a new keystore; its domains, access, clock and durability are
     taken from here."""
@@ -41,3 +44,4 @@ class ProvisionOptions(NamedTuple):
     now: datetime | None = None
     revoke: bool = True
     """Revoke certificates whose rights shrink or whose key is not safe; without it they are usable until they end."""
+    enclave_domains: Mapping[str, Domains] = MappingProxyType({})

@@ -48,6 +48,7 @@ class Executable:
         self.__env = None if env is None else _normalize(env)
         self.__additional_env = None if additional_env is None else _normalize(additional_env)
         self.__arguments = arguments
+        self.__final_prefix: tuple[str, ...] = ()
         self.__final_cmd: list[str] | None = None
         self.__final_cwd: str | None = None
         self.__final_env: dict[str, str] | None = None
@@ -91,6 +92,11 @@ class Executable:
         return self.__final_cmd
 
     @property
+    def final_prefix(self) -> tuple[str, ...]:
+        """The words of ``final_cmd`` that the prefix gave (ours)."""
+        return self.__final_prefix
+
+    @property
     def final_cwd(self) -> str | None:
         return self.__final_cwd
 
@@ -104,7 +110,8 @@ class Executable:
         cmd = [perform_substitutions(context, word) for word in self.__cmd]
         if self.__prefix_applies(context, cmd):
             prefix = perform_substitutions(context, self.__prefix)
-            cmd = [*shlex.split(prefix), *cmd] if prefix else cmd
+            self.__final_prefix = tuple(shlex.split(prefix)) if prefix else ()
+            cmd = [*self.__final_prefix, *cmd]
         self.__final_cmd = cmd
         name = (
             os.path.basename(cmd[0]) if self.__name is None else perform_substitutions(context, self.__name)

@@ -24,7 +24,6 @@ from enclave_launch.description.substitution import (
 from enclave_launch.description.substitutions.packages import ExecutableInPackage
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, ProcessKind
 from enclave_launch.ros_rules.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.node_extensions import NodeActionExtension
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from enclave_launch.description.parameters.types import SomeParameters
     from enclave_launch.description.remap_rules import SomeRemapRules
     from enclave_launch.description.substitution import SomeSubstitutionsType
-    from enclave_launch.process import EnclaveRequest
     from enclave_launch.source_location import SourceLocation
 
 
@@ -207,8 +205,6 @@ class Node(ExecuteProcess):
     def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
         fields = super().resolved_fields(context)
         place: SourceLocation = fields["location"]
-        enclave: EnclaveRequest = fields["enclave"]
-        found = parse_ros_arguments(self.__words_after_program(fields["cmd"]))
         return fields | {
             "kind": self.process_kind,
             "package": None if self.__package is None else _performed(context, self.__package),
@@ -217,14 +213,9 @@ class Node(ExecuteProcess):
             "namespace": self.__expanded_namespace,
             "fqn": self.node_name,
             "remaps": tuple([placed(rule, place) for rule in self.__expanded_remappings or ()]),
-            "parameters": self.__parameters.resolve(self.__name_tokens(), found.parameters),
+            "parameters": self.__parameters.resolve(self.__name_tokens(), self.ros_arguments().parameters),
             "parameter_files": self.__parameters.written_files(context),
-            "enclave": enclave._replace(argument=found.enclave) if found.enclave else enclave,
         }
-
-    def __words_after_program(self, cmd: tuple[str, ...]) -> tuple[str, ...]:
-        prefix_length = len(cmd) - len(self.process_description.cmd)
-        return cmd[prefix_length + 1 :]
 
     def __name_tokens(self) -> list[str | None]:
         """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""

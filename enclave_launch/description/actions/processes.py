@@ -29,6 +29,7 @@ from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import enclave_scope
+from enclave_launch.ros_rules.ros_arguments import RosArguments, parse_ros_arguments, words_after_program
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import LaunchDescriptionEntity, SomeEntitiesType
@@ -230,12 +231,22 @@ class ExecuteLocal(Action):
             "remaps": (),
             "parameters": {},
             "environment": self.__changed_environment(context),
-            "enclave": self.enclave_request(context),
+            "enclave": self.enclave_request(context)._replace(argument=self.ros_arguments().enclave),
             "location": location_of(self, context),
             "on_event": context.on_event,
             "cwd": description.final_cwd,
             "shell": self.__shell is True,  # other true values do not make one, as upstream
+            "prefix": description.final_prefix,
+            "final_environment": description.final_env or {},
         }
+
+    def ros_arguments(self) -> RosArguments:
+        """What rcl would find on the prepared command line."""
+        description = self.__process_description
+        words = words_after_program(
+            description.final_cmd or (), len(description.final_prefix), shell=self.__shell is True
+        )
+        return parse_ros_arguments(words)
 
     def enclave_request(self, context: LaunchContext) -> EnclaveRequest:
         """What the launch file says about the enclave, without the user's own ROS arguments."""

@@ -1,0 +1,59 @@
+"""All that is asked of one process before it may start secured: refusals, and remarks for the reader."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from enclave_launch import diagnostics
+from enclave_launch.admission.domains import domain_of
+from enclave_launch.admission.middleware import VARIABLE, Vendor, middleware_of, vendor_of, why_not
+from enclave_launch.admission.variables import overridden, own_security, preloaded
+from enclave_launch.admission.wrappers import obstacles
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.errors import UsageError
+from enclave_launch.process import ResolvedProcess
+
+
+class AdmissionOptions(NamedTuple):
+    """What somebody vouches for by name: launch prefixes (``shell`` for shells), and middlewares."""
+
+    prefixes: frozenset[str] = frozenset()
+    middlewares: frozenset[str] = frozenset()
+
+
+def prefix_refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iterator[Diagnostic]:
+    """What may change the environment that we give it. Without enclave it matters as much: what is there then keeps
+    ROS programs from starting unsecured."""
+    for obstacle in obstacles(process, options.prefixes):
+        yield diagnostics.prefix_refused(
+            process.process_name, obstacle.wrapper, obstacle.why, process.location
+        )
+
+
+def refusals(process: ResolvedProcess, distro: str, options: AdmissionOptions) -> Iterator[Diagnostic]:
+    """Why a process must not start in its enclave."""
+    name, place = process.process_name, process.location
+    yield from prefix_refusals(process, options)
+    middleware = middleware_of(process.final_environment, distro)
+    if (why := why_not(middleware, options.middlewares)) is not None:
+        given = VARIABLE in process.environment
+        yield diagnostics.middleware_refused(name, middleware, why, place, by_launch_file=given)
+    try:
+        domain_of(process.final_environment)
+    except UsageError as error:
+        yield diagnostics.domain_invalid(name, str(error), place)
+    for setting in own_security(process.final_environment):
+        yield diagnostics.security_configured(name, setting.variable, setting.value, place)
+
+
+def remarks(process: ResolvedProcess, distro: str) -> Iterator[Diagnostic]:
+    """What a reader should know of a process that may start."""
+    name, place = process.process_name, process.location
+    for setting in overridden(process.environment):
+        yield diagnostics.variable_overridden(name, setting.variable, setting.value, place)
+    for setting in preloaded(process.environment):
+        yield diagnostics.library_preloaded(name, setting.variable, setting.value, place)
+    middleware = middleware_of(process.final_environment, distro)
+    if vendor_of(middleware) is Vendor.CONNEXT:
+        yield diagnostics.connext(name, place)

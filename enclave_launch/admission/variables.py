@@ -1,0 +1,73 @@
+"""Variables of a process that decide whether its enclave is used: those we set, and those that could undo them.
+
+The runtime lays its own values over ``ROS_SECURITY_*``, so a launch file cannot take the enclave away through them; it
+is told that they have no effect. Configurations of a DDS with security properties of their own are refused: which of
+the two would win is a matter of the DDS and its version.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple
+
+from enclave_launch.boundary.files import read_text
+
+OURS = (
+    "ROS_SECURITY_ENABLE",
+    "ROS_SECURITY_KEYSTORE",
+    "ROS_SECURITY_STRATEGY",
+    "ROS_SECURITY_ENCLAVE_OVERRIDE",
+)
+_CONFIGURATIONS = (
+    "CYCLONEDDS_URI",
+    "FASTRTPS_DEFAULT_PROFILES_FILE",
+    "FASTDDS_DEFAULT_PROFILES_FILE",
+    "NDDS_QOS_PROFILES",
+)
+_SECURITY = re.compile(r"<\s*(?:DDS)?Security\b|dds\.sec\.", re.IGNORECASE)
+_PRELOAD = ("LD_PRELOAD", "LD_AUDIT")
+
+
+class Setting(NamedTuple):
+    variable: str
+    value: str
+
+
+def overridden(environment: Mapping[str, str]) -> Iterator[Setting]:
+    """What a launch file sets (``environment``: its own changes) and a secured start sets otherwise."""
+    for name in OURS:
+        if name in environment:
+            yield Setting(name, environment[name])
+
+
+def preloaded(environment: Mapping[str, str]) -> Iterator[Setting]:
+    """Libraries that a launch file puts into the process before its own: they may do anything in it."""
+    for name in _PRELOAD:
+        if environment.get(name):
+            yield Setting(name, environment[name])
+
+
+def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
+    """Configurations of a DDS with security properties of their own; reads the files that they are in."""
+    for name in _CONFIGURATIONS:
+        for part in _documents(environment.get(name, "")):
+            text = part if part.lstrip().startswith("<") else _content(part.removeprefix("file://"))
+            if _SECURITY.search(text):
+                yield Setting(name, part)
+
+
+def _content(path: str) -> str:
+    """Empty for a file that cannot be read: the DDS says so itself."""
+    try:
+        return read_text(path, errors="replace")
+    except OSError:
+        return ""
+
+
+def _documents(value: str) -> Iterator[str]:
+    """Cyclone DDS takes several, separated by commas, each a file or a document; Connext by semicolons."""
+    if "<" in value:
+        yield value
+    else:
+        yield from (part for part in re.split("[,;]", value) if part)

@@ -1,0 +1,61 @@
+"""Which DDS domains the permissions of each enclave are for: those of its own processes.
+
+Takes a plan, gives the keystore's options; what cannot be served is refused with both places named. Pure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
+
+from enclave_launch.admission.domains import covers, domain_of
+from enclave_launch.diagnostics import Diagnostic, domain_not_served
+from enclave_launch.errors import ManifestError
+from enclave_launch.plan import LaunchPlan, enclave_domains
+from keystore.formats.domains import Domains
+
+if TYPE_CHECKING:
+    from keystore.steps.options import ProvisionOptions
+
+
+def with_domains(
+    plan: LaunchPlan, options: ProvisionOptions, environment: Mapping[str, str]
+) -> ProvisionOptions:
+    """``options`` with the domains of ``plan``, unless somebody chose them.
+
+    ``environment``: the launcher's own. Raises ``ManifestError`` for processes in a domain that was not chosen.
+    """
+    if options.domains is not None:
+        refused = list(not_served(plan, options.domains))
+        if refused:
+            raise ManifestError("\n".join((*map(str, refused), "nothing was started or written")))
+        return options
+    by_enclave = {path: set(domains) for path, domains in enclave_domains(plan.processes).items()}
+    if plan.launcher is not None:
+        by_enclave.setdefault(plan.launcher.enclave, set()).add(domain_of(environment))
+    every = set().union(*by_enclave.values()) or {domain_of(environment)}
+    return options._replace(
+        domains=_domains(every), enclave_domains={path: _domains(ids) for path, ids in by_enclave.items()}
+    )
+
+
+def not_served(plan: LaunchPlan, domains: Domains) -> Iterator[Diagnostic]:
+    """Each process with an enclave whose domain is not among ``domains``."""
+    for item in plan.processes:
+        if item.enclave is not None and not covers(domains, item.domain):
+            process = item.process
+            yield domain_not_served(process.process_name, item.domain, str(domains), process.location)
+
+
+def places(plan: LaunchPlan, domains: Domains) -> str:
+    """Where ``domains`` come from, for a reader."""
+    asking = (
+        f"{item.process.process_name} at {item.process.location} is in domain {item.domain}"
+        for item in plan.processes
+        if item.enclave is not None and covers(domains, item.domain)
+    )
+    return "; ".join(asking)
+
+
+def _domains(ids: set[int]) -> Domains:
+    return Domains((number, number) for number in ids)

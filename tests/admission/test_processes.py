@@ -1,0 +1,169 @@
+"""Middleware, domain and variables of each process, from its own environment."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from enclave_launch import SecurityOptions, provision
+from enclave_launch.diagnostics import Code
+from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.report.tree import plan_tree
+from keystore.formats.domains import Domains
+from keystore.steps.options import ProvisionOptions
+
+from .conftest import Plan
+
+TALKER = '<node pkg="demo_nodes" exec="talker">{}</node>'
+PYTHON_NODE = "entities = [Node(package='demo_nodes', executable='talker', {})]"
+
+
+def codes(plan: LaunchPlan) -> list[Code]:
+    return [problem.code for problem in plan.problems]
+
+
+WAYS = {
+    "set_env": '<set_env name="{}" value="{}"/>' + TALKER.format(""),
+    "env of the node": TALKER.format('<env name="{}" value="{}"/>'),
+    "env of a group": '<group><set_env name="{}" value="{}"/>' + TALKER.format("") + "</group>",
+    "additional_env": PYTHON_NODE.format("additional_env={{{!r}: {!r}}}"),
+    "an environment of its own": PYTHON_NODE.format("env={{{!r}: {!r}}}"),
+    "an include": "entities = [SetEnvironmentVariable({!r}, {!r}), "
+    "Node(package='demo_nodes', executable='talker')]",
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_a_middleware_that_reads_no_enclaves_is_refused_with_the_reason(way: str, plan: Plan) -> None:
+    found = plan(WAYS[way].format("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"))
+    (problem,) = found.problems
+    assert problem.code is Code.MIDDLEWARE_REFUSED and "ZENOH_SESSION_CONFIG_URI" in problem.text
+    assert problem.location is not None and problem.location.element in ("node", "Node")
+    assert not plan(WAYS[way].format("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")).problems
+
+
+def test_the_environment_counts_and_only_one_node_may_differ(
+    plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    other = '<env name="RMW_IMPLEMENTATION" value="rmw_fastrtps_dynamic_cpp"/>'
+    (problem,) = plan(TALKER.format("") + TALKER.format(other)).problems
+    assert problem.subject == "talker-1" and "RMW_IMPLEMENTATION of the environment" in problem.text
+
+
+def test_an_unknown_middleware_needs_somebody_to_vouch_for_it(plan: Plan) -> None:
+    text = TALKER.format('<env name="RMW_IMPLEMENTATION" value="rmw_new_cpp"/>')
+    (problem,) = plan(text).problems
+    assert problem.remedy.endswith("--accept-middleware rmw_new_cpp")
+    assert not plan(text, accept_middlewares=("rmw_new_cpp",)).problems
+    zenoh = text.replace("rmw_new_cpp", "rmw_zenoh_cpp")
+    assert plan(zenoh, accept_middlewares=("rmw_zenoh_cpp",)).problems
+
+
+def test_of_connext_is_said_what_is_known(plan: Plan) -> None:
+    found = plan(TALKER.format('<env name="RMW_IMPLEMENTATION" value="rmw_connextdds"/>'))
+    assert not found.problems and [note.code for note in found.warnings] == [Code.CONNEXT_UNTRIED]
+
+
+def test_a_program_that_is_no_node_may_use_what_it_likes(plan: Plan) -> None:
+    """rcl looks for the enclave before it loads a middleware: without one a ROS program ends."""
+    text = '<executable cmd="true"{}><env name="RMW_IMPLEMENTATION" value="rmw_zenoh_cpp"/></executable>'
+    assert not plan(text.format("")).problems
+    assert codes(plan(text.format(' enclave="/x"'))) == [Code.MIDDLEWARE_REFUSED]
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_permissions_and_governance_are_for_the_domain_of_the_process(
+    way: str, plan: Plan, tmp_path: Path
+) -> None:
+    found = plan(WAYS[way].format("ROS_DOMAIN_ID", "57"))
+    assert found.processes[0].domain == 57 and ", domain 57" in plan_tree(found)
+    provision(found, tmp_path / "ks")
+    permissions = (tmp_path / "ks/enclaves/permissions.xml").read_text()
+    assert "<id>57</id>" in permissions and "<id>0</id>" not in permissions
+    assert b"<id>57</id>" in (tmp_path / "ks/enclaves/governance.p7s").read_bytes()
+
+
+TWO_DOMAINS = (
+    '<node pkg="demo_nodes" exec="talker" enclave="/a"><env name="ROS_DOMAIN_ID" value="3"/></node>'
+    '<node pkg="demo_nodes" exec="listener" enclave="{}"><env name="ROS_DOMAIN_ID" value="7"/></node>'
+)
+
+
+def test_each_enclave_gets_the_domains_of_its_own_processes(plan: Plan, tmp_path: Path) -> None:
+    found = plan(TWO_DOMAINS.format("/b"))
+    assert not found.warnings
+    provision(found, tmp_path / "ks")
+    first = (tmp_path / "ks/enclaves/a/permissions.xml").read_text()
+    assert "<id>3</id>" in first and "<id>7</id>" not in first
+    governance = (tmp_path / "ks/enclaves/governance.p7s").read_bytes()
+    assert b"<id>3</id>" in governance and b"<id>7</id>" in governance
+
+
+def test_an_enclave_in_two_domains_is_told(plan: Plan) -> None:
+    (warning,) = plan(TWO_DOMAINS.format("/a")).warnings
+    assert warning.code is Code.DOMAINS_SHARED
+    assert "domains 3, 7" in warning.text and "talker-1 in 3, listener-2 in 7" in warning.text
+
+
+def test_a_domain_that_was_not_asked_for_is_refused_with_both_places(plan: Plan, tmp_path: Path) -> None:
+    found = plan(TWO_DOMAINS.format("/b"))
+    options = SecurityOptions(keystore=ProvisionOptions(domains=Domains.parse("3")))
+    with pytest.raises(EnclaveLaunchError) as refused:
+        provision(found, tmp_path / "ks", options=options)
+    assert "listener-2 is in domain 7, but --domain-id" in str(refused.value)
+    assert f"{tmp_path}/test.launch.xml:2" in str(refused.value) and "talker" not in str(refused.value)
+    assert not (tmp_path / "ks").exists()
+    both = SecurityOptions(keystore=ProvisionOptions(domains=Domains.parse("0-10")))
+    provision(found, tmp_path / "ks", options=both)
+
+
+@pytest.mark.parametrize("value", ["abc", "231", "-1", "1 2", "0x5"])
+def test_an_impossible_domain_is_a_problem_with_its_place(value: str, plan: Plan) -> None:
+    found = plan(TALKER.format(f'<env name="ROS_DOMAIN_ID" value="{value}"/>'))
+    assert codes(found) == [Code.DOMAIN_INVALID]
+    assert not plan(TALKER.format('<env name="ROS_DOMAIN_ID" value=""/>')).problems
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "ROS_SECURITY_ENABLE",
+        "ROS_SECURITY_KEYSTORE",
+        "ROS_SECURITY_STRATEGY",
+        "ROS_SECURITY_ENCLAVE_OVERRIDE",
+    ],
+)
+def test_a_security_variable_of_the_launch_file_is_told_to_have_no_effect(name: str, plan: Plan) -> None:
+    (warning,) = plan(TALKER.format(f'<env name="{name}" value="x"/>')).warnings
+    assert warning.code is Code.VARIABLE_OVERRIDDEN and f"{name}=x" in warning.text
+
+
+def test_a_preloaded_library_is_told(plan: Plan) -> None:
+    (warning,) = plan(TALKER.format('<env name="LD_PRELOAD" value="libspy.so"/>')).warnings
+    assert warning.code is Code.LIBRARY_PRELOADED
+
+
+def test_a_dds_configuration_with_security_of_its_own_is_refused(plan: Plan, tmp_path: Path) -> None:
+    secured = tmp_path / "secured.xml"
+    secured.write_text("<CycloneDDS><Domain><Security><AccessControl/></Security></Domain></CycloneDDS>")
+    plain = tmp_path / "plain.xml"
+    plain.write_text("<CycloneDDS><Domain><Tracing/></Domain></CycloneDDS>")
+    fast = tmp_path / "fast.xml"
+    fast.write_text("<property><name>dds.sec.auth.plugin</name></property>")
+    refused = {
+        "CYCLONEDDS_URI": (
+            f"file://{secured}",
+            f"{plain},{secured}",
+            "<Security><Authentication/></Security>",
+        ),
+        "FASTRTPS_DEFAULT_PROFILES_FILE": (str(fast),),
+    }
+    for name, values in refused.items():
+        for value in values:
+            text = TALKER.format(f'<env name="{name}" value="{value.replace("<", "&lt;")}"/>')
+            assert codes(plan(text)) == [Code.SECURITY_CONFIGURED], value
+        assert not plan(TALKER.format(f'<env name="{name}" value="{plain}"/>')).problems
+    assert not plan(TALKER.format('<env name="CYCLONEDDS_URI" value="/no/such/file"/>')).problems
