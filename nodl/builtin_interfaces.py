@@ -24,6 +24,7 @@ class Condition(Enum):
 
     ALWAYS = "every node"
     SIM_TIME = "use_sim_time is true"
+    PARAMETERS = "unless the program switches its parameter services off"
     TYPE_DESCRIPTION = "unless start_type_description_service is false"
     LIFECYCLE = "lifecycle node"
     CONTAINER = "component container"
@@ -55,10 +56,12 @@ _EVENT = "rcl_interfaces/msg/ParameterEvent"
 
 TABLE: tuple[BuiltIn, ...] = (
     BuiltIn(_P, "/rosout", "rcl_interfaces/msg/Log", "rcl logging_rosout.c"),
-    BuiltIn(_P, "/parameter_events", _EVENT, "rclcpp node_parameters.cpp, rclpy node.py"),
+    BuiltIn(
+        _P, "/parameter_events", _EVENT, "rclcpp node_parameters.cpp, rclpy node.py", Condition.PARAMETERS
+    ),
     BuiltIn(_S, "/parameter_events", _EVENT, "rclcpp time_source.cpp", library=ClientLibrary.RCLCPP),
     *(
-        BuiltIn(_R, f"~/{name}", f"rcl_interfaces/srv/{type_name}", _PARAMETERS)
+        BuiltIn(_R, f"~/{name}", f"rcl_interfaces/srv/{type_name}", _PARAMETERS, Condition.PARAMETERS)
         for name, type_name in (
             ("describe_parameters", "DescribeParameters"),
             ("get_parameter_types", "GetParameterTypes"),
@@ -113,7 +116,9 @@ TABLE: tuple[BuiltIn, ...] = (
 
 
 def built_in_interfaces(
-    distro: str, library: ClientLibrary, conditions: frozenset[Condition] = frozenset({Condition.ALWAYS})
+    distro: str,
+    library: ClientLibrary,
+    conditions: frozenset[Condition] = frozenset({Condition.ALWAYS, Condition.PARAMETERS}),
 ) -> tuple[BuiltIn, ...]:
     """The rows that hold under ``conditions``. Raises ``ValueError`` for a distribution we do not know."""
     if distro not in DISTROS:

@@ -78,8 +78,9 @@ class NodeInterface(NamedTuple):
 
     ``name`` and ``namespace`` are the program's own defaults (what applies when launch gives none);
     ``None`` when unknown. ``executable`` or ``plugin`` is the key under which launch starts the node.
-    ``own_rules``: remap rules in the options with which a program makes a further node beside its main one; such a node
-    obeys them before the process's, and the process's even in a container. ``depends``: what varies with its start.
+    ``own_rules``: remap rules in the options with which a program makes a further node beside its main one; such a
+    node obeys them before the process's, and the process's even in a container. ``parameter_services``: the program
+    does not switch them off. ``depends``: what varies with its start.
     """
 
     package: str | None
@@ -94,4 +95,5 @@ class NodeInterface(NamedTuple):
     parameters: tuple[str, ...] = ()
     gaps: tuple[Gap, ...] = ()
     own_rules: tuple[str, ...] = ()
+    parameter_services: bool = True
     depends: Dependence | None = None

@@ -16,7 +16,6 @@ from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from nodl.dependence import Situation
 from nodl.node_interface import NodeInterface
-from nodl.remap import RemapRules, parse_rule
 
 
 def situation_of_process(
@@ -31,7 +30,6 @@ def situation_of_process(
         parameters=_parameters(process, node.namespace, node.name),
         words=tuple(own_words(process)),
         installed=installed,
-        process_namespace=_process_namespace(process),
     )
 
 
@@ -54,7 +52,6 @@ def situation_of_component(
         namespace=node.namespace,
         parameters=parameters,
         installed=installed,
-        process_namespace=_process_namespace(container) if container else "/",
     )
 
 
@@ -67,8 +64,3 @@ def _parameters(process: ResolvedProcess, namespace: str, name: str) -> Mapping[
         parse_ros_arguments(process.cmd).parameters,
         lambda path: parameters_of_text(written[path]) if path in written else None,
     )
-
-
-def _process_namespace(process: ResolvedProcess) -> str:
-    rules = tuple(parse_rule(text) for text in parse_ros_arguments(process.cmd).remaps)
-    return RemapRules(process=rules).namespace("/", "").name

@@ -9,6 +9,8 @@ from nodl.node_interface import EndpointKind, NodeInterface
 
 def conditions_of(node: RunningNode) -> frozenset[Condition]:
     met = {Condition.ALWAYS}
+    if node.interface.parameter_services:
+        met.add(Condition.PARAMETERS)
     if node.parameters.get("use_sim_time") is True:
         met.add(Condition.SIM_TIME)
     if node.parameters.get("start_type_description_service") is not False:

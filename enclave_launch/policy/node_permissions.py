@@ -126,9 +126,6 @@ class _Collector:
                 note = f"{endpoint.written} is taken as the private name {template}"
             if endpoint.certainty is Certainty.FROM_DEFAULT:
                 note = note or "from a default value in the source"
-            if endpoint.certainty is Certainty.PATTERN:
-                self._stated_pattern(endpoint)
-                return
             self._name(endpoint, template, note)
             return
         note = _parameter_note(template, self._node)
@@ -233,17 +230,6 @@ class _Collector:
         self._result.warnings.append(
             pattern_accepted(self._fqn, operation.value, name, note, SourceLocation.read(place))
         )
-
-    def _stated_pattern(self, endpoint: Endpoint) -> None:
-        """A whole name with ``*``, which a description states itself: the program makes it up anew at each start."""
-        operation, place, text = _OPERATIONS[endpoint.kind], str(endpoint.source), endpoint.name.text
-        try:
-            name = _expand_pattern(self._names, text)
-        except InvalidNameError as error:
-            self._unresolved(operation, place, str(error))
-            return
-        reason = Reason(self._fqn, "declared", place, text, (), endpoint.note)
-        self._result.permissions.append(Permission(operation, name, reason))
 
     def _impossible(self, error: InvalidNameError) -> None:
         impossible = node_name_impossible(self._fqn, str(error), self._node.location)

@@ -84,7 +84,13 @@ def node_of_component(
 
 
 def _own_rules(interface: NodeInterface) -> tuple[ParsedRule, ...]:
-    return tuple(parse_rule(text, str(interface.source)) for text in interface.own_rules)
+    """The rules in the node's own options, of which one may give it a name that ends at random."""
+    rules: list[ParsedRule] = []
+    for text in interface.own_rules:
+        rule = parse_rule(text.removesuffix(RANDOM_ENDING), str(interface.source))
+        ending = RANDOM_ENDING if text.endswith(RANDOM_ENDING) else ""
+        rules.append(rule._replace(replacement=rule.replacement + ending))
+    return tuple(rules)
 
 
 def _named(

@@ -30,6 +30,10 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return Configured(
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)
         )
+    if kind == "behavior_tree":
+        from nodl.configuration.behavior_tree import of_tree
+
+        return of_tree(file)
     try:
         root = _read(file)
     except InvalidNoDLError as error:

@@ -52,12 +52,13 @@ class Variation(NamedTuple):
 class FurtherNode(NamedTuple):
     """A node that the program makes beside its main one, with options of its own.
 
-    ``document``: ``package/name`` of its description. ``namespace`` is relative to the main node's unless absolute.
+    ``document``: ``package/name`` of its description. ``namespace`` is relative to the main node's unless absolute;
+    empty: the program sets none, the process's counts.
     """
 
     document: str
     node: str
-    namespace: str
+    namespace: str = ""
     when: When = When()
 
 
@@ -126,7 +127,6 @@ class Situation(NamedTuple):
     """One start of a node. ``node`` and ``namespace`` are final; ``words``: of its command line, without ROS arguments.
 
     ``installed``: the packages of the ament index, ``None`` when nothing can be said about them.
-    ``process_namespace``: what nodes get that the program makes without a namespace.
     """
 
     distro: str
@@ -135,4 +135,3 @@ class Situation(NamedTuple):
     parameters: Mapping[str, object] = MappingProxyType({})
     words: tuple[str, ...] = ()
     installed: frozenset[str] | None = None
-    process_namespace: str = "/"

@@ -22,8 +22,11 @@ from nodl.dependence import (
 from nodl.dependence.scope import Filled, Scope
 from nodl.name_template import NameTemplate
 from nodl.names import join
-from nodl.node_interface import Certainty, Endpoint, EndpointKind, Gap, NodeInterface
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
 
+TF_LISTENER = "transform_listener_impl_*"
+_TF_TOPICS = ("/tf", "/tf_static")
+_TF = "tf2_msgs/msg/TFMessage"
 _NOTHING = Dependence()
 _DEPTH = 8
 
@@ -82,6 +85,8 @@ class _Application:
         depends = interface.depends or _NOTHING
         scope = Scope(self._situation, depends.defaults, depends.options, plugin)
         for endpoint in interface.endpoints:
+            if depends.tf_listener and _is_of_tf_listener(endpoint):
+                continue
             variation = depends.variations.get((endpoint.kind, endpoint.name.text))
             self.endpoints.extend(_varied(endpoint, variation or Variation(), scope, notes))
         for gap in depends.gaps:
@@ -98,7 +103,7 @@ class _Application:
         for configuration in depends.configurations:
             self._configured(configuration, scope, interface)
         if depends.tf_listener:
-            self.endpoints.extend(_tf_listener(interface, self._situation))
+            self.further.append(_tf_listener(self._main))
 
     def _load(self, plugins: PluginList, scope: Scope, by: NodeInterface, depth: int) -> None:
         if not scope.holds(plugins.when):
@@ -108,7 +113,7 @@ class _Application:
             return
         instances = list(scope.items(plugins.parameter))
         if not instances and scope.value(plugins.parameter) is None:
-            instances = list(plugins.default)
+            instances = [scope.fill(name).text or "" for name in plugins.default]
         for instance in dict.fromkeys(instances):
             self._load_one(instance, plugins, scope, by, depth)
 
@@ -116,9 +121,7 @@ class _Application:
         self, instance: str, plugins: PluginList, scope: Scope, by: NodeInterface, depth: int
     ) -> None:
         inner = Scope(self._situation, {}, {}, instance)
-        class_parameter = inner.fill(
-            plugins.type.replace("$(outer)", scope.fill("$(plugin)").text or "")
-        ).text
+        class_parameter = inner.fill(plugins.type).text
         value = scope.value(class_parameter or "", plugins.types.get(instance))
         if value is None:
             self.gaps.append(
@@ -175,17 +178,18 @@ class _Application:
         if described is None or name is None:
             self.gaps.append(Gap(by.source, f"no document {node.document} describes its node '{node.node}'"))
             return
-        namespace = join(self._situation.namespace, scope.fill(node.namespace).text or "")
-        if node.namespace.startswith("/"):
-            namespace = node.namespace
+        rules = [f"__node:={name}"]
+        if node.namespace:
+            relative = scope.fill(node.namespace).text or ""
+            absolute = relative.startswith("/")
+            rules.append(f"__ns:={relative if absolute else join(self._situation.namespace, relative)}")
         self.further.append(
             described._replace(
-                package=by.package,
-                executable=by.executable,
-                plugin=by.plugin,
+                package=self._main.package,
+                executable=self._main.executable,
+                plugin=self._main.plugin,
                 name=name,
-                namespace=namespace,
-                own_rules=(f"__node:={name}", f"__ns:={namespace.rstrip('/') or '/'}"),
+                own_rules=tuple(rules),
             )
         )
 
@@ -241,22 +245,25 @@ def _sequence(value: object) -> tuple[object, ...]:
     return tuple(value) if isinstance(value, (list, tuple)) else (value,)
 
 
-def _tf_listener(interface: NodeInterface, situation: Situation) -> Iterator[Endpoint]:
-    """``tf2_ros::TransformListener`` without a node makes one named by a memory address (transform_listener.cpp).
-
-    Of what that node has, only its service to describe types, which it has since iron, is named after it.
-    """
-    if situation.distro in ("foxy", "galactic", "humble"):
-        return
-    if situation.parameters.get("start_type_description_service") is False:
-        return
-    yield Endpoint(
-        EndpointKind.SERVICE_SERVER,
-        NameTemplate.literal(
-            join(situation.process_namespace, "transform_listener_impl_*/get_type_description")
+def _tf_listener(interface: NodeInterface) -> NodeInterface:
+    """The node that ``tf2_ros::TransformListener`` makes where it is given none (transform_listener.cpp): named by a
+    memory address, in the process's namespace, without parameter services."""
+    return NodeInterface(
+        package=interface.package,
+        executable=interface.executable,
+        plugin=interface.plugin,
+        name=TF_LISTENER,
+        namespace=None,
+        endpoints=tuple(
+            Endpoint(EndpointKind.SUBSCRIPTION, NameTemplate.literal(name), _TF, interface.source)
+            for name in _TF_TOPICS
         ),
-        "type_description_interfaces/srv/GetTypeDescription",
-        interface.source,
-        Certainty.PATTERN,
-        note="the helper node of a TransformListener, whose name ends in a memory address",
+        source=interface.source,
+        library=ClientLibrary.RCLCPP,
+        own_rules=(f"__node:={TF_LISTENER}",),
+        parameter_services=False,
     )
+
+
+def _is_of_tf_listener(endpoint: Endpoint) -> bool:
+    return endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.text in _TF_TOPICS

@@ -5,6 +5,7 @@
     $(argument N [DEFAULT])      the N-th word of the command line that is neither option nor value of one, from 1
     $(item) $(plugin)            the entry of ``each``, the instance of a plugin list
     $(node) $(namespace)         the node's final name and namespace
+    $(parent)                    the namespace less its last part: that of the node which made a costmap
 
 Inner references are replaced first: ``$(param $(plugin).topic)``.
 """
@@ -57,7 +58,12 @@ class Scope:
         plugin: str = "",
     ):
         self.situation = situation
-        self._bound = {"plugin": plugin, "node": situation.node, "namespace": situation.namespace}
+        self._bound = {
+            "plugin": plugin,
+            "node": situation.node,
+            "namespace": situation.namespace,
+            "parent": situation.namespace.rpartition("/")[0],
+        }
         self._defaults = {self._plain(name): value for name, value in defaults.items()}
         self._options, self._arguments = _command_line(situation.words, options)
 

@@ -13,7 +13,12 @@ from enclave_launch.description.parameters.evaluate import evaluate_parameters
 from enclave_launch.diagnostics import parameter_file_missing
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.ros_rules.rcl_parameters import Section, as_rcl_reads, resolve_parameters
+from enclave_launch.ros_rules.rcl_parameters import (
+    Section,
+    as_rcl_reads,
+    parameters_of_text,
+    resolve_parameters,
+)
 from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
 
 if TYPE_CHECKING:
@@ -26,7 +31,7 @@ class NodeParameters:
 
     def __init__(self, own: Parameters):
         self.__own = own
-        self.__written: dict[str, Mapping[str, Section]] = {}  # content of the files made from dicts
+        self.__written: dict[str, Mapping[str, Section]] = {}  # content of generated files
 
     def write(self, context: LaunchContext, section: str) -> list[str]:
         """Words to append to the command line. ``section`` is the node's full name, or ``/**``."""
@@ -40,12 +45,18 @@ class NodeParameters:
             name, value = item.evaluate(context)
             return ("-p", f"{name}:={yaml_text.dump(value)}")
         if isinstance(item, pathlib.Path):
-            path = str(item)
-            if context.host.parameter_file(path) is None and not os.path.isfile(path):
-                context.host.warn(parameter_file_missing(path))
-                return ()
-            return ("--params-file", path)
+            return self.__file_words(context, str(item))
         return ("--params-file", self.__write_file(context, section, item))
+
+    def __file_words(self, context: LaunchContext, path: str) -> Sequence[str]:
+        """A file of the user's, or one that was made from such a file by substitutions."""
+        text = context.host.parameter_file(path)
+        if text is not None:
+            self.__written[path] = parameters_of_text(text)
+        elif not os.path.isfile(path):
+            context.host.warn(parameter_file_missing(path))
+            return ()
+        return ("--params-file", path)
 
     def __write_file(self, context: LaunchContext, section: str, values: Mapping[str, Any]) -> str:
         quoted = context.host.release.has(Feature.QUOTED_TEXT_PARAMETERS)

@@ -1,0 +1,138 @@
+"""A behavior tree of Nav2 (XML of BehaviorTree.CPP): the actions, services and topics that its nodes use.
+
+Source: ros-navigation/navigation2 jazzy, nav2_behavior_tree/plugins: the names that the nodes register with, and the
+ports ``server_name``, ``service_name`` and ``topic_name`` by which the tree changes them. A node that is not in the
+tables is a gap unless it belongs to BehaviorTree.CPP itself.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from xml.etree import ElementTree
+
+from nodl.configuration import Configured
+from nodl.name_template import NameTemplate
+from nodl.names import InvalidNameError, shown, validate_written_name
+from nodl.node_interface import Endpoint, EndpointKind, Gap
+from nodl.source_ref import SourceRef
+
+_MAX_BYTES = 1_000_000
+
+# Tag -> action and its type; the port ``server_name`` changes the name.
+_ACTIONS = {
+    "AssistedTeleop": ("assisted_teleop", "AssistedTeleop"),
+    "BackUp": ("backup", "BackUp"),
+    "ComputeAndTrackRoute": ("compute_and_track_route", "ComputeAndTrackRoute"),
+    "ComputePathThroughPoses": ("compute_path_through_poses", "ComputePathThroughPoses"),
+    "ComputePathToPose": ("compute_path_to_pose", "ComputePathToPose"),
+    "ComputeRoute": ("compute_route", "ComputeRoute"),
+    "DriveOnHeading": ("drive_on_heading", "DriveOnHeading"),
+    "FollowPath": ("follow_path", "FollowPath"),
+    "NavigateThroughPoses": ("navigate_through_poses", "NavigateThroughPoses"),
+    "NavigateToPose": ("navigate_to_pose", "NavigateToPose"),
+    "SmoothPath": ("smooth_path", "SmoothPath"),
+    "Spin": ("spin", "Spin"),
+    "Wait": ("wait", "Wait"),
+}
+_CANCELS = {
+    "CancelAssistedTeleop": "AssistedTeleop",
+    "CancelBackUp": "BackUp",
+    "CancelComputeAndTrackRoute": "ComputeAndTrackRoute",
+    "CancelControl": "FollowPath",
+    "CancelDriveOnHeading": "DriveOnHeading",
+    "CancelSpin": "Spin",
+    "CancelWait": "Wait",
+}
+# Tag -> type; the port ``service_name`` names it.
+_SERVICES = {
+    "ClearCostmapAroundPose": "nav2_msgs/srv/ClearCostmapAroundPose",
+    "ClearCostmapAroundRobot": "nav2_msgs/srv/ClearCostmapAroundRobot",
+    "ClearCostmapExceptRegion": "nav2_msgs/srv/ClearCostmapExceptRegion",
+    "ClearEntireCostmap": "nav2_msgs/srv/ClearEntireCostmap",
+    "ReinitializeGlobalLocalization": "std_srvs/srv/Empty",
+}
+# Tag -> port, default and type.
+_TOPICS = {
+    "ControllerSelector": ("topic_name", "controller_selector", "std_msgs/msg/String"),
+    "GoalCheckerSelector": ("topic_name", "goal_checker_selector", "std_msgs/msg/String"),
+    "PlannerSelector": ("topic_name", "planner_selector", "std_msgs/msg/String"),
+    "ProgressCheckerSelector": ("topic_name", "progress_checker_selector", "std_msgs/msg/String"),
+    "SmootherSelector": ("topic_name", "smoother_selector", "std_msgs/msg/String"),
+    "IsBatteryCharging": ("battery_topic", "/battery_status", "sensor_msgs/msg/BatteryState"),
+    "IsBatteryLow": ("battery_topic", "/battery_status", "sensor_msgs/msg/BatteryState"),
+    "IsStuck": ("", "odom", "nav_msgs/msg/Odometry"),
+}
+_PATH_VALID = "IsPathValid"
+_OF_NAV2 = """
+AreErrorCodesPresent ArePosesNear ConcatenatePaths DistanceController DistanceTraveled GetCurrentPose
+GetPoseFromPath GlobalUpdatedGoal GoalReached GoalUpdated GoalUpdatedController InitialPoseReceived
+PathExpiringTimer PathLongerOnApproach PipelineSequence RateController RecoveryNode RemovePassedGoals
+RoundRobin SingleTrigger SpeedController TimeExpired TransformAvailable TruncatePath TruncatePathLocal
+WouldAControllerRecoveryHelp WouldAPlannerRecoveryHelp WouldASmootherRecoveryHelp
+"""
+_OF_BEHAVIOR_TREE_CPP = """
+root BehaviorTree TreeNodesModel include SubTree SubTreePlus Sequence SequenceStar ReactiveSequence Fallback
+ReactiveFallback Parallel ParallelAll IfThenElse WhileDoElse Switch2 Switch3 Switch4 Switch5 Switch6
+Inverter RetryUntilSuccessful RetryUntilSuccesful Repeat Timeout Delay ForceSuccess ForceFailure RunOnce
+AlwaysSuccess AlwaysFailure KeepRunningUntilFailure SetBlackboard UnsetBlackboard Script ScriptCondition
+Precondition SequenceWithMemory AsyncSequence AsyncFallback Sleep
+"""
+_SILENT = frozenset((*_OF_NAV2.split(), *_OF_BEHAVIOR_TREE_CPP.split()))
+_MODELS = ("Action", "Condition", "Decorator", "Control")  # elements whose attribute ID is the node
+
+
+def of_tree(file: str) -> Configured:
+    """What the tree in ``file`` uses."""
+    place = SourceRef(file)
+    try:
+        if os.path.getsize(file) > _MAX_BYTES:
+            return Configured(gaps=(Gap(place, "the behavior tree is too large to be read"),))
+        root = ElementTree.parse(file).getroot()
+    except (OSError, ElementTree.ParseError) as error:
+        return Configured(gaps=(Gap(place, f"the behavior tree cannot be read: {error}"),))
+    found = list(dict.fromkeys(_used(root, place)))
+    return Configured(
+        tuple(part for part in found if isinstance(part, Endpoint)),
+        tuple(part for part in found if isinstance(part, Gap)),
+    )
+
+
+def _used(root: ElementTree.Element, place: SourceRef) -> Iterator[Endpoint | Gap]:
+    models = {child for model in root.iter("TreeNodesModel") for child in model.iter()}
+    for element in root.iter():
+        if element not in models:
+            yield from _of_node(element, place)
+
+
+def _of_node(element: ElementTree.Element, place: SourceRef) -> Iterator[Endpoint | Gap]:
+    tag = (
+        element.get("ID", element.tag)
+        if element.tag in ("Action", "Condition", "Decorator", "Control")
+        else element.tag
+    )
+    if tag in _ACTIONS or tag in _CANCELS:
+        name, type_name = _ACTIONS[_CANCELS.get(tag, tag)]
+        chosen = element.get("server_name") or name
+        yield _named(EndpointKind.ACTION_CLIENT, chosen, f"nav2_msgs/action/{type_name}", tag, place)
+    elif tag in _SERVICES:
+        yield _named(
+            EndpointKind.SERVICE_CLIENT, element.get("service_name") or "", _SERVICES[tag], tag, place
+        )
+    elif tag in _TOPICS:
+        port, default, type_name = _TOPICS[tag]
+        yield _named(EndpointKind.SUBSCRIPTION, element.get(port) or default, type_name, tag, place)
+    elif tag == _PATH_VALID:
+        yield _named(EndpointKind.SERVICE_CLIENT, "is_path_valid", "nav2_msgs/srv/IsPathValid", tag, place)
+    elif tag == "GoalUpdater":
+        yield Gap(place, "the topics of the node GoalUpdater are parameters that are not looked at")
+    elif tag not in _SILENT:
+        yield Gap(place, f"what the node {shown(str(tag))} of the behavior tree uses is not known")
+
+
+def _named(kind: EndpointKind, name: str, type_name: str, tag: str, place: SourceRef) -> Endpoint | Gap:
+    try:
+        validate_written_name(name)
+    except InvalidNameError as error:
+        return Gap(place, f"{tag}: {error}")
+    return Endpoint(kind, NameTemplate.literal(name), type_name, place, note=f"{tag} of the behavior tree")
