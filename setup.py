@@ -15,7 +15,7 @@ DATA_FILES = [
     (f"share/{NAME}", ["package.xml"]),
 ]
 VERSION = "0.1.0"
-REQUIRES = ["lxml>=4.9", "pyyaml>=6.0", "cryptography>=42", "pydantic>=2.5"]
+REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "pydantic>=1.8"]
 PACKAGE_DATA = {
     "enclave_launch": ["py.typed", "recording/recorder.c"],
     "nodl": ["py.typed", "schemas/*", "library/documents/*", "library/documents/*/*"],

@@ -2,57 +2,56 @@
 
 ``secure-launch --dry-run --format json`` prints a document that ``DryRun`` validates; ``report.plan_json``
 writes it without importing this module (pydantic costs more start-up time than the whole dry run), and the
-tests hold both together. Read a document with ``DryRun.model_validate_json(text)``.
+tests hold both together. Read a document with
+``DryRun.model_validate_json(text)`` (``DryRun.parse_raw(text)`` before pydantic 2).
 
 Within one ``version`` fields are only ever added; a removed or changed field raises the number.
 """
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Optional, Union
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, Field, StrictBool, StrictFloat, StrictInt, StrictStr
 
-JsonScalar = bool | int | float | str
-JsonParameter = JsonScalar | list[JsonScalar]
-
-
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True)
+# Only what pydantic 1.8 and 2 have in common: no ``|``, strict types in unions, ``...`` for what is required.
+JsonScalar = Union[StrictBool, StrictInt, StrictFloat, StrictStr]
+JsonParameter = Union[JsonScalar, list[JsonScalar]]
 
 
-class Process(_Strict):
+class _Strict(BaseModel, extra="forbid", frozen=True):
+    """The base of all entries: an unknown key is an error."""
+
+
+class Process(_Strict, frozen=True):
     """One process, in launch order."""
 
-    package: str | None = Field(description="null for executable actions and nodes given without a package")
-    executable: str = Field(description="executable name; the first word of an executable action")
-    namespace: str | None = Field(description="as launch shows it; null for executable actions")
-    name: str | None = Field(
-        description="node name, the manifest's where launch gives none; null for executables"
+    package: Optional[str] = Field(..., description="null for executable actions and nodes given without a package")
+    executable: str = Field(..., description="executable name; the first word of an executable action")
+    namespace: Optional[str] = Field(..., description="as launch shows it; null for executable actions")
+    name: Optional[str] = Field(..., description="node name, the manifest's where launch gives none; null for executables"
     )
-    fqn: str | None
-    cmd: list[str] = Field(description="what would be executed; holds --enclave only under --secure")
-    remaps: list[tuple[str, str]] = Field(description="from, to; global rules before the node's own")
-    parameters: dict[str, JsonParameter] = Field(description="as the node will see them")
-    enclave: str | None
-    interfaces: str | None = Field(
+    fqn: Optional[str] = Field(...)
+    cmd: list[str] = Field(..., description="what would be executed; holds --enclave only under --secure")
+    remaps: list[tuple[str, str]] = Field(..., description="from, to; global rules before the node's own")
+    parameters: dict[str, JsonParameter] = Field(..., description="as the node will see them")
+    enclave: Optional[str] = Field(...)
+    interfaces: Optional[str] = Field(
         default=None,
         description="where they come from: --nodl, manifest of the package, recorded, inferred, library",
     )
-    prefix: list[str] = Field(description="the first words of cmd, which start the program: launch-prefix")
-    domain_id: int = Field(description="of its own environment")
-    middleware: str = Field(description="the RMW implementation it would load")
-    environment: dict[str, str] = Field(
-        description="variables added or changed, values as the process sees them"
+    prefix: list[str] = Field(..., description="the first words of cmd, which start the program: launch-prefix")
+    domain_id: int = Field(..., description="of its own environment")
+    middleware: str = Field(..., description="the RMW implementation it would load")
+    environment: dict[str, str] = Field(..., description="variables added or changed, values as the process sees them"
     )
     launch_file: str
-    line: int = Field(description="line of the element, 0 when not known")
-    on_event: str | None = Field(
-        description="the event that would start it; null when the launch itself does"
+    line: int = Field(..., description="line of the element, 0 when not known")
+    on_event: Optional[str] = Field(..., description="the event that would start it; null when the launch itself does"
     )
 
 
-class Component(_Strict):
+class Component(_Strict, frozen=True):
     """One composable node, in launch order."""
 
     container: str
@@ -61,19 +60,18 @@ class Component(_Strict):
     fqn: str
     remaps: list[tuple[str, str]]
     parameters: dict[str, JsonParameter]
-    enclave: str | None = Field(
-        description="the container's; null when the container is not part of this launch"
+    enclave: Optional[str] = Field(..., description="the container's; null when the container is not part of this launch"
     )
-    interfaces: str | None = Field(
+    interfaces: Optional[str] = Field(
         default=None,
         description="where they come from: --nodl, manifest of the package, recorded, inferred, library",
     )
     launch_file: str
     line: int
-    on_event: str | None
+    on_event: Optional[str] = Field(...)
 
 
-class Enclave(_Strict):
+class Enclave(_Strict, frozen=True):
     """What one enclave may do: final names, sorted."""
 
     nodes: list[str]
@@ -85,24 +83,24 @@ class Enclave(_Strict):
     serve_actions: list[str]
 
 
-class Diagnostic(_Strict):
+class Diagnostic(_Strict, frozen=True):
     """One thing a person should know; ``code`` is stable (``enclave_launch.diagnostics.Code``)."""
 
-    severity: Literal["error", "warning"] = Field(description="error: --secure refuses to start")
+    severity: Literal["error", "warning"] = Field(..., description="error: --secure refuses to start")
     code: str
     subject: str
-    file: str | None
+    file: Optional[str] = Field(...)
     line: int
     text: str
-    remedy: str = Field(description="what to do next, empty when nothing needs doing")
+    remedy: str = Field(..., description="what to do next, empty when nothing needs doing")
 
 
-class DryRun(_Strict):
+class DryRun(_Strict, frozen=True):
     """The whole document."""
 
     version: Literal[1]
     processes: list[Process]
     components: list[Component]
     enclaves: dict[str, Enclave]
-    warnings: list[str] = Field(description="every diagnostic as one message for a person, errors first")
+    warnings: list[str] = Field(..., description="every diagnostic as one message for a person, errors first")
     diagnostics: list[Diagnostic]

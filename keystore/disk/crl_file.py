@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from datetime import datetime
+from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files
@@ -75,7 +75,14 @@ def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
     if not view.has_crl:
         return {}
     crl = load_crl(view)
-    return {entry.serial_number: entry.revocation_date_utc for entry in crl}
+    return {entry.serial_number: _revoked_at(entry) for entry in crl}
+
+
+def _revoked_at(entry: x509.RevokedCertificate) -> datetime:
+    """cryptography before 42 gives the time of RFC 5280, which is UTC, without a zone."""
+    if hasattr(entry, "revocation_date_utc"):
+        return entry.revocation_date_utc
+    return entry.revocation_date.replace(tzinfo=timezone.utc)
 
 
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:

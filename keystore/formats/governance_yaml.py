@@ -24,10 +24,10 @@ the topic rule's last two (ENCRYPT).
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Union
 
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, StrictInt, StrictStr, ValidationError
+from pydantic import BaseModel, Field, StrictBool, StrictInt, StrictStr, ValidationError
 
 from enclave_launch.boundary.files import read_bytes
 from keystore.errors import InvalidInput, printable
@@ -37,12 +37,13 @@ from keystore.formats.governance import DomainRule, Governance, Protection, Topi
 _MAX_BYTES = 200_000
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid")
+# Only what pydantic 1.8 and 2 have in common: no Python union operator, no ``model_*``, no constraint on a list.
+class _Strict(BaseModel, extra="forbid"):
+    """The base of all entries: an unknown key is an error."""
 
 
 class _Topic(_Strict):
-    topic_expression: str
+    topic_expression: StrictStr
     enable_discovery_protection: StrictBool = True
     enable_liveliness_protection: StrictBool = True
     enable_read_access_control: StrictBool = True
@@ -52,7 +53,7 @@ class _Topic(_Strict):
 
 
 class _Domain(_Strict):
-    domains: StrictInt | StrictStr = 0
+    domains: Union[StrictInt, StrictStr] = 0
     allow_unauthenticated_participants: StrictBool = False
     enable_join_access_control: StrictBool = True
     discovery_protection_kind: Protection = Protection.ENCRYPT
@@ -62,8 +63,8 @@ class _Domain(_Strict):
 
 
 class _Document(_Strict):
-    version: StrictInt = Field(ge=1, le=1)
-    domain_rules: list[_Domain] = Field(min_length=1)
+    version: StrictInt
+    domain_rules: list[_Domain]
 
 
 def load_governance_yaml(path: Path) -> Governance:
@@ -86,11 +87,15 @@ def parse_governance_yaml(text: bytes, where: str) -> Governance:
     except (yaml.YAMLError, ValueError, RecursionError):  # numbers, dates, nesting that Python refuses
         raise InvalidInput(f"{where}: not YAML text") from None
     try:
-        document = _Document.model_validate(content)
+        document = _Document(**_mapping(content, where))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "document"
         raise InvalidInput(f"{where}: {place}: {first['msg']}") from None
+    if document.version != 1:
+        raise InvalidInput(f"{where}: version: {document.version} is not known, only 1 is")
+    if not document.domain_rules:
+        raise InvalidInput(f"{where}: domain_rules: at least one rule is needed")
     try:
         return Governance(tuple(_domain_rule(rule) for rule in document.domain_rules))
     except InvalidInput as error:
@@ -98,12 +103,16 @@ def parse_governance_yaml(text: bytes, where: str) -> Governance:
 
 
 def _domain_rule(rule: _Domain) -> DomainRule:
-    values = {name: getattr(rule, name) for name in type(rule).model_fields}
+    values = dict(rule)
     values["domains"] = Domains.parse(str(rule.domains))
-    values["topic_rules"] = tuple(TopicRule(**topic.model_dump()) for topic in rule.topic_rules) or (
-        TopicRule(),
-    )
+    values["topic_rules"] = tuple(TopicRule(**dict(topic)) for topic in rule.topic_rules) or (TopicRule(),)
     return DomainRule(**values)
+
+
+def _mapping(content: Any, where: str) -> dict[str, Any]:
+    if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
+        raise InvalidInput(f"{where}: document: not a mapping with the keys version and domain_rules")
+    return content
 
 
 class _SafeLoader(yaml.SafeLoader):
