@@ -36,6 +36,10 @@ class Locals:
         raise AttributeError(f"can't set attribute '{key}', locals are read-only")
 
 
+MAX_UNFOLDED = 250_000
+"""Entities of one walk over a launch file: loops and includes can multiply without end."""
+
+
 class LaunchContext:
     """Launch configurations, environment, locals, events. Upstream's class, plus:
 
@@ -64,6 +68,7 @@ class LaunchContext:
         self.on_event: str | None = None
         self.includes: tuple[str, ...] = ()
         self.open_files: tuple[OpenFile, ...] = ()
+        self.unfolded = 0  # entities visited and copied in the walk in progress
         self._timer_handler_installed = False
 
     @property
@@ -79,6 +84,15 @@ class LaunchContext:
     @property
     def noninteractive(self) -> bool:
         return self.__noninteractive
+
+    def count_unfolded(self, entities: int) -> None:
+        """Note that the walk in progress visits or copies so many more. Raises ``RuntimeError`` beyond all measure."""
+        self.unfolded += entities
+        if self.unfolded > MAX_UNFOLDED:
+            raise RuntimeError(
+                f"the launch file unfolds to more than {MAX_UNFOLDED} actions: look for loops with a huge 'len' "
+                "and for files that include each other"
+            )
 
     # Shutdown and the loop
 

@@ -6,6 +6,7 @@ import collections.abc
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.files import MEBIBYTE
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
@@ -44,6 +45,10 @@ class TextSubstitution(Substitution):
         return self.__text
 
 
+MAX_TEXT = 4 * MEBIBYTE
+"""Characters that substitutions may give together. Values can double with each ``let``; no process takes more."""
+
+
 class SubstitutionFailure(RuntimeError):
     """The message says why."""
 
@@ -55,11 +60,18 @@ SomeSubstitutionsType_types_tuple = (str, Substitution, collections.abc.Iterable
 
 
 def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution]) -> str:
-    """Perform each and concatenate. Raises ``TypeError`` where one does not give text."""
+    """Perform each and concatenate.
+
+    Raises ``TypeError`` where one does not give text, ``SubstitutionFailure`` for more than ``MAX_TEXT`` characters.
+    """
     if type(subs) is list and len(subs) == 1:
         text = subs[0].perform(context)
-        return text if type(text) is str else "".join((text,))
-    return "".join([sub.perform(context) for sub in subs])
+        text = text if type(text) is str else "".join((text,))
+    else:
+        text = "".join([sub.perform(context) for sub in subs])
+    if len(text) > MAX_TEXT:
+        raise SubstitutionFailure(f"substitutions give a text of more than {MAX_TEXT} characters")
+    return text
 
 
 def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Path) -> list[Substitution]:

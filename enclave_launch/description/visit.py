@@ -26,6 +26,7 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
     """
     futures: list[Any] = []
     outside = context.includes, context.open_files
+    before = context.unfolded
     stack: list[tuple[Iterator[LaunchDescriptionEntity], Surroundings]] = [(iter((entity,)), outside)]
     current: LaunchDescriptionEntity | None = entity
     try:
@@ -35,6 +36,7 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
             if current is None:
                 stack.pop()
                 continue
+            context.count_unfolded(1)
             sub_entities = current.visit(context)
             future = current.get_asyncio_future()
             if future is not None:
@@ -46,6 +48,7 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
         raise
     finally:
         context.includes, context.open_files = outside
+        context.unfolded = before
     return futures
 
 

@@ -36,8 +36,11 @@ def load(text: str) -> Any:
     return _load_with_yaml(text)
 
 
+_MAX_KEPT = 10_000  # characters of a text whose value is remembered
+
+
 def _load_with_yaml(text: str) -> Any:
-    value = _load_cached(text)
+    value = _load_cached(text) if len(text) <= _MAX_KEPT else _load_bounded(text)
     return value.copy() if isinstance(value, list | dict) else value
 
 
@@ -45,5 +48,14 @@ def _load_with_yaml(text: str) -> Any:
 def _load_cached(text: str) -> Any:
     import yaml
 
+    if "&" in text and "*" in text:
+        return _load_bounded(text)
     # The pure-Python loader, as upstream: libyaml differs in what it rejects.
     return yaml.safe_load(text)
+
+
+def _load_bounded(text: str) -> Any:
+    """The same value; what is made to take long is refused (``boundary.yaml_nodes``)."""
+    from enclave_launch.frontend.yaml_tree import parse_yaml
+
+    return parse_yaml(text).root

@@ -26,10 +26,13 @@ class _Strict(BaseModel, extra="forbid", frozen=True):
 class Process(_Strict, frozen=True):
     """One process, in launch order."""
 
-    package: Optional[str] = Field(..., description="null for executable actions and nodes given without a package")
+    package: Optional[str] = Field(
+        ..., description="null for executable actions and nodes given without a package"
+    )
     executable: str = Field(..., description="executable name; the first word of an executable action")
     namespace: Optional[str] = Field(..., description="as launch shows it; null for executable actions")
-    name: Optional[str] = Field(..., description="node name, the manifest's where launch gives none; null for executables"
+    name: Optional[str] = Field(
+        ..., description="node name, the manifest's where launch gives none; null for executables"
     )
     fqn: Optional[str] = Field(...)
     cmd: list[str] = Field(..., description="what would be executed; holds --enclave only under --secure")
@@ -40,14 +43,18 @@ class Process(_Strict, frozen=True):
         default=None,
         description="where they come from: --nodl, manifest of the package, recorded, inferred, library",
     )
-    prefix: list[str] = Field(..., description="the first words of cmd, which start the program: launch-prefix")
+    prefix: list[str] = Field(
+        ..., description="the first words of cmd, which start the program: launch-prefix"
+    )
     domain_id: int = Field(..., description="of its own environment")
     middleware: str = Field(..., description="the RMW implementation it would load")
-    environment: dict[str, str] = Field(..., description="variables added or changed, values as the process sees them"
+    environment: dict[str, str] = Field(
+        ..., description="variables added or changed, values as the process sees them"
     )
     launch_file: str
     line: int = Field(..., description="line of the element, 0 when not known")
-    on_event: Optional[str] = Field(..., description="the event that would start it; null when the launch itself does"
+    on_event: Optional[str] = Field(
+        ..., description="the event that would start it; null when the launch itself does"
     )
 
 
@@ -60,7 +67,8 @@ class Component(_Strict, frozen=True):
     fqn: str
     remaps: list[tuple[str, str]]
     parameters: dict[str, JsonParameter]
-    enclave: Optional[str] = Field(..., description="the container's; null when the container is not part of this launch"
+    enclave: Optional[str] = Field(
+        ..., description="the container's; null when the container is not part of this launch"
     )
     interfaces: Optional[str] = Field(
         default=None,

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
+from enclave_launch.frontend import shell_words
 
 if TYPE_CHECKING:
     from enclave_launch.description.action import Action
@@ -110,7 +110,7 @@ class Executable:
         cmd = [perform_substitutions(context, word) for word in self.__cmd]
         if self.__prefix_applies(context, cmd):
             prefix = perform_substitutions(context, self.__prefix)
-            self.__final_prefix = tuple(shlex.split(prefix)) if prefix else ()
+            self.__final_prefix = tuple(shell_words.split_words(prefix)) if prefix else ()
             cmd = [*self.__final_prefix, *cmd]
         self.__final_cmd = cmd
         name = (

@@ -23,6 +23,7 @@ from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.substitutions.variables import local_name
+from enclave_launch.frontend import yaml_scalar
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
@@ -180,8 +181,7 @@ class ForEach(Action):
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
         _, kwargs = super().parse(entity, parser)
-        children = [parser.parse_action(child) for child in entity.children]
-        kwargs["function"] = lambda **values: one_round(children, values)
+        kwargs["function"] = _ParsedBody(entity, parser)
         kwargs["input_values"] = parser.parse_substitution(entity.get_attr("values"))
         return cls, kwargs
 
@@ -194,13 +194,12 @@ class ForEach(Action):
         return self._function
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        import yaml
-
         text = perform_substitutions(context, self._input_values)
         entities: list[LaunchDescriptionEntity] = []
         for item in filter(None, text.strip().split(self.SEPARATOR)):
-            values = yaml.safe_load(item.strip())
+            values = yaml_scalar.load(item.strip())
             if values is not None:
+                context.count_unfolded(_size_of(self._function))
                 entities.extend(self._function(**values) or ())
         return entities
 
@@ -224,9 +223,8 @@ class ForLoop(Action):
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
         _, kwargs = super().parse(entity, parser)
         name = entity.get_attr("name")
-        children = [parser.parse_action(child) for child in entity.children]
         kwargs["name"] = name
-        kwargs["function"] = lambda i: one_round(children, {name: i})
+        kwargs["function"] = _ParsedBody(entity, parser, index=name)
         kwargs["length"] = parser.parse_substitution(entity.get_attr("len"))
         return cls, kwargs
 
@@ -245,8 +243,30 @@ class ForLoop(Action):
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         entities: list[LaunchDescriptionEntity] = []
         for index in range(int(perform_substitutions(context, self._length))):
+            context.count_unfolded(_size_of(self._function))
             entities.extend(self._function(i=index) or ())
         return entities
+
+
+class _ParsedBody:
+    """The children of a loop element, as its function. ``elements`` counts those that each round copies."""
+
+    def __init__(self, entity: Entity, parser: Parser, index: str | None = None) -> None:
+        self._children = [parser.parse_action(child) for child in entity.children]
+        self._index = index
+        self.elements = _count(entity)
+
+    def __call__(self, /, **values: Any) -> list[LaunchDescriptionEntity]:
+        return one_round(self._children, values if self._index is None else {self._index: values["i"]})
+
+
+def _count(entity: Entity) -> int:
+    return 1 + sum(_count(child) for child in entity.children)
+
+
+def _size_of(function: Body) -> int:
+    """Of a function in Python only the call itself is known."""
+    return getattr(function, "elements", 1)
 
 
 def one_round(children: list[Action], values: Mapping[str, Any]) -> list[LaunchDescriptionEntity]:

@@ -7,7 +7,6 @@ runtime spawns, pipes output and emits the process events.
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
@@ -24,6 +23,7 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
+from enclave_launch.frontend import shell_words
 from enclave_launch.host.current import current_release
 from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess
@@ -448,7 +448,7 @@ def split_words(template: Iterable[Substitution]) -> list[SomeSubstitutionsType]
         if not isinstance(part, TextSubstitution):
             word.append(part)
             continue
-        tokens = shlex.split(part.text)
+        tokens = shell_words.split_words(part.text)
         if not tokens or (part.text[0].isspace() and word):
             words.append(word)
             word = []

@@ -6,6 +6,7 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
+from enclave_launch.boundary.files import read_text
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
 from enclave_launch.description.substitution import (
@@ -147,7 +148,7 @@ def _substituted(context: LaunchContext, path: Path) -> Path:
 
     from enclave_launch.description.parameters import yaml_text
 
-    text = perform_substitutions(context, parse_substitution(path.read_text(encoding="utf-8")))
+    text = perform_substitutions(context, parse_substitution(read_text(path)))
     try:
         yaml_text.load(text)
     except yaml.YAMLError:

@@ -13,6 +13,7 @@ from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+from enclave_launch.boundary.files import read_text
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
@@ -67,7 +68,7 @@ def to_parameters_list(
 
 def _read(context: LaunchContext, path: pathlib.Path) -> Any:
     generated = context.host.parameter_file(str(path))
-    return _parse(path.read_text(encoding="utf-8") if generated is None else generated)
+    return _parse(read_text(path) if generated is None else generated)
 
 
 @lru_cache(maxsize=256)

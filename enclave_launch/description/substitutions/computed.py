@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import importlib
 import math
-import shlex
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.files import read_text
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
+    MAX_TEXT,
     Substitution,
     SubstitutionFailure,
     normalize_to_list_of_substitutions,
@@ -17,6 +18,7 @@ from enclave_launch.description.substitution import (
 )
 from enclave_launch.description.templates import TemplateSubstitution, described, template
 from enclave_launch.diagnostics import command_stderr
+from enclave_launch.frontend import shell_words
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
@@ -45,7 +47,7 @@ class Command(TemplateSubstitution):
 
     def perform(self, context: LaunchContext) -> str:
         text = perform_substitutions(context, self.command)
-        words = shlex.split(text)
+        words = shell_words.split_words(text)
         mode = perform_substitutions(context, self.on_stderr)
         if mode not in _MODES:
             raise SubstitutionFailure(
@@ -154,8 +156,7 @@ class FileContent(TemplateSubstitution):
     def perform(self, context: LaunchContext) -> str:
         path = perform_substitutions(context, self.path)
         try:
-            with open(path) as file:
-                return file.read()
+            return read_text(path, MAX_TEXT)
         except FileNotFoundError:
             raise SubstitutionFailure(f"File not found: {path}") from None
 
