@@ -26,6 +26,10 @@ class Code(str, Enum):
     NODE_NAME_REPEATED = "node-name-repeated", "Several nodes have the same fully qualified name"
     NOT_FORESEEABLE = "not-foreseeable", "An action only exists once a callback has run"
     PACKAGE_NOT_INSTALLED = "package-not-installed", "A placeholder stands for a package"
+    PARAMETERS_UNKNOWN = (
+        "parameters-unknown",
+        "A parameter file cannot be read, so names made from it are not known",
+    )
     PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file is not there"
     PROGRAM_NOT_INSTALLED = "program-not-installed", "A placeholder stands for what a program would write"
     PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start is not there"
@@ -132,6 +136,13 @@ def package_not_installed(package: str, placeholder: str) -> Diagnostic:
 
 def parameter_file_missing(path: str) -> Diagnostic:
     return Diagnostic(Code.PARAMETER_FILE_MISSING, path, f"Parameter file path is not a file: {path}")
+
+
+def parameters_unknown(process: str, path: str, why: str, place: SourceLocation) -> Diagnostic:
+    text = f"the parameters that {process} would read from {path} are not known: {why}"
+    return Diagnostic(
+        Code.PARAMETERS_UNKNOWN, process, text, place, "rcl would not start the node with it: mend the file"
+    )
 
 
 def program_not_installed(program: str) -> Diagnostic:

@@ -4,10 +4,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.enclave import EnclaveScope
@@ -41,6 +42,16 @@ class ResolveOptions:
     no_python: bool = False
     launch_configurations: Mapping[str, str] = field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        """One path or name may be given where several can be: text is not taken letter by letter."""
+        for name in ("prefixes", "manifests", "library_folders"):
+            object.__setattr__(self, name, tuple(map(Path, _several(getattr(self, name)))))
+        for name in ("accept_prefixes", "accept_middlewares"):
+            object.__setattr__(self, name, _several(getattr(self, name)))
+        if isinstance(self.policy, str):
+            object.__setattr__(self, "policy", Path(self.policy))
+        object.__setattr__(self, "enclave_scope", EnclaveScope(self.enclave_scope))
+
     def host_options(self) -> dict[str, object]:
         """What the evaluation's host is told, in a dry run and live alike."""
         return {
@@ -54,6 +65,10 @@ class ResolveOptions:
         document = _read_policy(self.policy) if self.policy else None
         admission = AdmissionOptions(frozenset(self.accept_prefixes), frozenset(self.accept_middlewares))
         return PlanOptions(self.enclave_scope, PolicyOptions(self.accept_patterns, document), admission)
+
+
+def _several(given: Any) -> tuple[Any, ...]:
+    return (given,) if isinstance(given, (str, os.PathLike)) else tuple(given)
 
 
 def _read_policy(path: Path) -> PolicyDocument:

@@ -28,6 +28,7 @@ from enclave_launch.diagnostics import (
     library_version,
     no_manifest,
     not_foreseeable,
+    parameters_unknown,
 )
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope, assign_enclave
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
@@ -39,6 +40,8 @@ from enclave_launch.process import (
     ResolvedComponent,
     ResolvedProcess,
 )
+from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.source_location import SourceLocation
 from nodl.node_interface import RANDOM_ENDING, NodeInterface
 
 
@@ -93,6 +96,27 @@ class PlannedProcess(NamedTuple):
     middleware: str = DEFAULT_MIDDLEWARE
 
     @property
+    def package(self) -> str | None:
+        return self.process.package
+
+    @property
+    def executable(self) -> str:
+        return self.process.executable
+
+    @property
+    def cmd(self) -> tuple[str, ...]:
+        """Without what ``--secure`` appends."""
+        return self.process.cmd
+
+    @property
+    def parameters(self) -> Mapping[str, ParameterValue]:
+        return self.process.parameters
+
+    @property
+    def location(self) -> SourceLocation:
+        return self.process.location
+
+    @property
     def name(self) -> str | None:
         """The node name: launch's, else the manifest's, else launch's placeholder."""
         if self.process.name == UNSPECIFIED_NODE_NAME and self.nodes:
@@ -116,6 +140,18 @@ class PlannedComponent(NamedTuple):
     missing: Missing | None = None
     origin: InterfaceOrigin | None = None
     doubt: str = ""
+
+    @property
+    def package(self) -> str:
+        return self.component.package
+
+    @property
+    def plugin(self) -> str:
+        return self.component.plugin
+
+    @property
+    def location(self) -> SourceLocation:
+        return self.component.location
 
     @property
     def enclave(self) -> str | None:
@@ -337,6 +373,8 @@ def _problems(
         if process.missing:
             yield no_manifest(*process.missing, process.process.location)
         yield from process.refusals
+        for path, why in process.process.unread_parameter_files:
+            yield parameters_unknown(process.process.process_name, path, why, process.process.location)
     for component in components:
         if component.missing:
             yield no_manifest(*component.missing, component.component.location)

@@ -62,6 +62,7 @@ class ResolvedProcess(NamedTuple):
     cwd: str | None = None
     shell: bool = False
     parameter_files: Mapping[str, str] = MappingProxyType({})  # "<params:N>" -> YAML text
+    unread_parameter_files: tuple[tuple[str, str], ...] = ()  # path, and why it could not be read
     prefix: tuple[str, ...] = ()  # words of cmd before the program: launch-prefix
     final_environment: Mapping[str, str] = MappingProxyType({})  # all of it, inherited variables included
 

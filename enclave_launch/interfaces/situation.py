@@ -62,5 +62,6 @@ def _parameters(process: ResolvedProcess, namespace: str, name: str) -> Mapping[
     return resolve_parameters(
         tokens,
         parse_ros_arguments(process.cmd).parameters,
-        lambda path: parameters_of_text(written[path]) if path in written else None,
-    )
+        lambda path: parameters_of_text(written[path], path) if path in written else None,
+        process.cwd,
+    ).values

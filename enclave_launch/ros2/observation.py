@@ -40,6 +40,7 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
     fqn = str(action.node_name)
     namespace, _, name = fqn.rpartition("/")
     number, label = next_process_name(action, context, cmd)
+    parameters = resolve_parameters(_fqn_tokens(fqn), arguments.parameters)
     return ResolvedProcess(
         number=number,
         kind=_kind(action),
@@ -51,7 +52,8 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
         fqn=fqn,
         cmd=cmd,
         remaps=tuple(RemapRule(source, target) for source, target in action.expanded_remapping_rules or ()),
-        parameters=resolve_parameters(_fqn_tokens(fqn), arguments.parameters),
+        parameters=parameters.values,
+        unread_parameter_files=parameters.unread,
         environment={},
         enclave=EnclaveRequest(
             enclave_attribute(action, context), scope_in_force(context), arguments.enclave

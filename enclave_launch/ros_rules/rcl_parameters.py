@@ -17,13 +17,30 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from enclave_launch.boundary.files import read_text
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
 
 Section = Mapping[str, ParameterValue]
+
+
+class UnreadableParameters(Exception):
+    """A parameter file of which nothing is known: rcl would refuse to start the node, or it is only there later."""
+
+    def __init__(self, path: str, why: str) -> None:
+        self.path, self.why = path, why
+        super().__init__(f"{path}: {why}")
+
+
+class ResolvedParameters(NamedTuple):
+    """What a node sees; ``unread`` are files that may say more, each with the reason."""
+
+    values: dict[str, ParameterValue]
+    unread: tuple[tuple[str, str], ...] = ()
+
+
 Generated = Callable[[str], Mapping[str, Section] | None]
 
 EVERY_NODE = "/**"
@@ -46,15 +63,21 @@ def resolve_parameters(
     fqn_tokens: Sequence[str | None],
     sources: Iterable[ParameterFile | ParameterRule],
     generated: Generated = lambda path: None,
-) -> dict[str, ParameterValue]:
+    directory: str | None = None,
+) -> ResolvedParameters:
     """``fqn_tokens``: namespace tokens and name; ``None`` for one that launch does not know (only
-    wildcards match it). ``generated`` gives the content of files that launch writes itself.
-
-    Files that cannot be read contribute nothing: the started process reports them.
+    wildcards match it). ``generated`` gives the content of files that launch writes itself; ``directory`` is where
+    the process runs (``None``: here).
     """
     sections: dict[str, dict[str, dict[int, ParameterValue]]] = {}
+    unread: list[tuple[str, str]] = []
     for source in sources:
-        for section, values in _sections_of(source, generated).items():
+        try:
+            found = _sections_of(source, generated, directory or "")
+        except UnreadableParameters as error:
+            unread.append((error.path, error.why))
+            continue
+        for section, values in found.items():
             slots = sections.setdefault(section, {})
             for name, value in values.items():
                 slots.setdefault(name, {})[_slot(value)] = value
@@ -62,15 +85,17 @@ def resolve_parameters(
     for section, parameters in sections.items():
         if section_applies(section, fqn_tokens):
             resolved.update({name: slots[min(slots)] for name, slots in parameters.items()})
-    return resolved
+    return ResolvedParameters(resolved, tuple(unread))
 
 
-def _sections_of(source: ParameterFile | ParameterRule, generated: Generated) -> Mapping[str, Section]:
+def _sections_of(
+    source: ParameterFile | ParameterRule, generated: Generated, directory: str
+) -> Mapping[str, Section]:
     if isinstance(source, ParameterRule):
         value = _parse_value(source.value)
         return {source.node or EVERY_NODE: {source.name: value}} if value is not None else {}
     known = generated(source.path)
-    return _read_file(source.path) if known is None else known
+    return _read_file(os.path.join(directory, source.path)) if known is None else known
 
 
 def _slot(value: ParameterValue) -> int:
@@ -135,22 +160,23 @@ def _parse_value(text: str) -> ParameterValue | None:
 @lru_cache(maxsize=256)
 def _read_cached(path: str, _modified: int, _size: int) -> Mapping[str, Section]:
     try:
-        return parameters_of_text(read_text(path))
-    except (OSError, UnicodeDecodeError):
-        return {}
+        text = read_text(path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise UnreadableParameters(path, str(error)) from error
+    return parameters_of_text(text, path)
 
 
 @lru_cache(maxsize=256)
-def parameters_of_text(text: str) -> Mapping[str, Section]:
-    """The sections of a parameter file; none where it is no YAML."""
+def parameters_of_text(text: str, path: str) -> Mapping[str, Section]:
+    """The sections of the parameter file ``path``. Raises ``UnreadableParameters`` where it is no YAML."""
     import yaml
 
     from enclave_launch.boundary.yaml_nodes import compose
 
     try:
         document = compose(text)
-    except yaml.YAMLError:
-        return {}
+    except yaml.YAMLError as error:
+        raise UnreadableParameters(path, f"not YAML: {' '.join(str(error).split())}") from error
     sections: dict[str, dict[str, ParameterValue]] = {}
     if document is not None:
         _collect_sections(document, (), sections)
@@ -160,8 +186,8 @@ def parameters_of_text(text: str) -> Mapping[str, Section]:
 def _read_file(path: str) -> Mapping[str, Section]:
     try:
         status = os.stat(path)
-    except OSError:
-        return {}
+    except OSError as error:
+        raise UnreadableParameters(path, str(error)) from error
     return _read_cached(os.path.abspath(path), status.st_mtime_ns, status.st_size)
 
 

@@ -8,6 +8,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -178,3 +179,16 @@ def test_an_enclave_changed_after_provisioning_starts_nothing(case: str, tmp_pat
     if case != "another signature":  # which a cheap look does not see: DDS refuses that process
         assert "is no longer what was provisioned for this launch" in text
         assert "process started" not in text
+
+
+@pytest.mark.parametrize("prefixes", [str(DEMO), DEMO, [str(DEMO)], (DEMO,), iter([DEMO])])
+def test_one_prefix_is_one_prefix_however_it_is_given(prefixes: Any) -> None:
+    assert ResolveOptions(prefixes=prefixes).prefixes == (DEMO,)
+
+
+def test_a_plan_reads_as_one_would_say_it() -> None:
+    plan = resolve(DEMO / "share/demo_nodes/launch/talker_listener.launch.xml", options=OPTIONS)
+    talker, listener = plan.processes
+    assert (talker.name, talker.package, talker.executable) == ("talker", "demo_nodes", "talker")
+    assert talker.enclave is not None and talker.enclave.path == "/"
+    assert talker.location.line == 5 and listener.parameters["count"] == 5

@@ -25,7 +25,7 @@ def resolved(tmp_path: Path, line: str, fqn: str = "/ns/n", **files: str) -> dic
         (tmp_path / f"{name}.yaml").write_text(text)
     words = ["--ros-args", *(str(tmp_path / w) if w.endswith(".yaml") else w for w in line.split())]
     tokens = [None if token == "?" else token for token in fqn.split("/") if token]
-    return resolve_parameters(tokens, parse_ros_arguments(words).parameters)
+    return resolve_parameters(tokens, parse_ros_arguments(words).parameters).values
 
 
 EVERY = "/**: {ros__parameters: {%s}}"
@@ -93,19 +93,35 @@ def test_a_rule_for_a_node(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_scalars_by_rcls_rules(text: str, value: object) -> None:
-    found = resolve_parameters(["n"], [ParameterRule("p", text)])["p"]
+    found = resolve_parameters(["n"], [ParameterRule("p", text)]).values["p"]
     assert (found, type(found)) == (value, type(value))
 
 
 @pytest.mark.parametrize("text", ["", "{a: 1}", "[", "[[1]]", "a: b"])
 def test_what_rcl_refuses_has_no_value(text: str) -> None:
-    assert resolve_parameters(["n"], [ParameterRule("p", text)]) == {}
+    assert resolve_parameters(["n"], [ParameterRule("p", text)]).values == {}
 
 
 @pytest.mark.parametrize("text", ["", "- 1", "a: [", "just text", "\x00", "/**: {ros__parameters: 3}"])
 def test_files_that_are_no_parameter_files(tmp_path: Path, text: str) -> None:
     assert resolved(tmp_path, "--params-file a.yaml", a=text) == {}
-    assert resolve_parameters(["n"], [ParameterFile(str(tmp_path / "nowhere"))]) == {}
+
+
+@pytest.mark.parametrize("text", ["a: [", "\x00", None])
+def test_a_file_that_cannot_be_read_is_never_nothing(tmp_path: Path, text: str | None) -> None:
+    if text is not None:
+        (tmp_path / "a.yaml").write_text(text)
+    found = resolve_parameters(
+        ["n"], [ParameterRule("p", "1"), ParameterFile("a.yaml")], directory=str(tmp_path)
+    )
+    assert found.values == {"p": 1}
+    ((path, why),) = found.unread
+    assert path == str(tmp_path / "a.yaml") and why
+
+
+def test_a_relative_file_is_read_where_the_process_runs(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("/**: {ros__parameters: {x: 3}}")
+    assert resolve_parameters(["n"], [ParameterFile("a.yaml")], directory=str(tmp_path)).values == {"x": 3}
 
 
 def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:
@@ -159,4 +175,6 @@ def test_what_is_written_is_read_back_as_rcl_reads_it(value: Any) -> None:
     node = root.value[0][1].value[0][1].value[0][1]
     plain = node.value if node.style is None else None
     found = as_rcl_reads(value)
-    assert found == (resolve_parameters([], [ParameterRule("p", plain)]).get("p") if plain else node.value)
+    assert found == (
+        resolve_parameters([], [ParameterRule("p", plain)]).values.get("p") if plain else node.value
+    )

@@ -205,6 +205,8 @@ class Node(ExecuteProcess):
     def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
         fields = super().resolved_fields(context)
         place: SourceLocation = fields["location"]
+        sources = self.ros_arguments().parameters
+        parameters = self.__parameters.resolve(self.__name_tokens(), sources, fields["cwd"])
         return fields | {
             "kind": self.process_kind,
             "package": None if self.__package is None else _performed(context, self.__package),
@@ -213,7 +215,8 @@ class Node(ExecuteProcess):
             "namespace": self.__expanded_namespace,
             "fqn": self.node_name,
             "remaps": tuple([placed(rule, place) for rule in self.__expanded_remappings or ()]),
-            "parameters": self.__parameters.resolve(self.__name_tokens(), self.ros_arguments().parameters),
+            "parameters": parameters.values,
+            "unread_parameter_files": parameters.unread,
             "parameter_files": self.__parameters.written_files(context),
         }
 

@@ -14,6 +14,7 @@ from enclave_launch.diagnostics import parameter_file_missing
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import (
+    ResolvedParameters,
     Section,
     as_rcl_reads,
     parameters_of_text,
@@ -52,7 +53,7 @@ class NodeParameters:
         """A file of the user's, or one that was made from such a file by substitutions."""
         text = context.host.parameter_file(path)
         if text is not None:
-            self.__written[path] = parameters_of_text(text)
+            self.__written[path] = parameters_of_text(text, path)
         elif not os.path.isfile(path):
             context.host.warn(parameter_file_missing(path))
             return ()
@@ -67,10 +68,13 @@ class NodeParameters:
         return path
 
     def resolve(
-        self, name_tokens: Sequence[str | None], sources: Sequence[ParameterFile | ParameterRule]
-    ) -> dict[str, ParameterValue]:
+        self,
+        name_tokens: Sequence[str | None],
+        sources: Sequence[ParameterFile | ParameterRule],
+        directory: str | None,
+    ) -> ResolvedParameters:
         """What the node sees after rcl has merged everything on its command line."""
-        return resolve_parameters(name_tokens, sources, self.__written.get)
+        return resolve_parameters(name_tokens, sources, self.__written.get, directory)
 
     def written_files(self, context: LaunchContext) -> dict[str, str]:
         """Path to text of the files that were generated for this node."""
