@@ -17,6 +17,7 @@ from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 
 if TYPE_CHECKING:
+    from enclave_launch.runtime.companion import LaunchCompanion
     from keystore.formats.policy_xml import PolicyDocument
     from keystore.steps.options import ProvisionOptions
 
@@ -99,4 +100,5 @@ class RunSettings:
     debug: bool = False
     allow_late: bool = False
     secrets: frozenset[str] = frozenset()
+    companion: LaunchCompanion | None = None
     log_limit: int | None = None

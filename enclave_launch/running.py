@@ -105,4 +105,5 @@ def _options(launch: Launch, settings: RunSettings) -> RunOptions:
         needs_ros_services=bool(evaluated.evaluation.launcher_calls),
         launch_configurations=evaluated.source.launch_configurations,
         host_options=dict(evaluated.source.host_options),
+        companion=settings.companion,
     )

@@ -18,6 +18,7 @@ from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.host.base_host import BaseHost
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
+from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.gate import EnclaveGate, Grant
 from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.live_process import LiveProcess
@@ -44,6 +45,7 @@ class LiveHost(BaseHost):
         fail: Callable[[EnclaveLaunchError], None],
         services: RosServices | None = None,
         observe: Observer = unobserved,
+        companion: LaunchCompanion | None = None,
         **options: Any,
     ) -> None:
         super().__init__(**options)
@@ -57,6 +59,7 @@ class LiveHost(BaseHost):
         self._secrets = secrets
         self._fail = fail
         self._services = services
+        self._companion = companion
         self._parameter_directory: Path | None = None
         self._parameter_files: dict[str, str] = {}
         self._tasks: set[asyncio.Task[None]] = set()
@@ -106,6 +109,8 @@ class LiveHost(BaseHost):
             return
         if self._gate is not None:
             self._gate.ensure_components(components)
+        if self._companion is not None:
+            self._companion.loading(components)
         assert (
             self._services is not None
         )  # the service refuses to start without, where the plan has components
@@ -175,13 +180,14 @@ class LiveHost(BaseHost):
     ) -> ProcessSpec:
         grant = await self._granted(process)
         environment = {name: value for name, value in base.items() if name not in self._secrets}
-        return ProcessSpec(
+        spec = ProcessSpec(
             cmd=(*process.cmd, *grant.arguments),
             environment={**environment, **grant.environment},
             cwd=process.cwd,
             shell=process.shell,
             emulate_tty=emulate_tty,
         )
+        return self._companion.prepared(process, spec) if self._companion is not None else spec
 
     async def _granted(self, process: ResolvedProcess) -> Grant:
         if self._gate is None:

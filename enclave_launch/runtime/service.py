@@ -31,13 +31,21 @@ from enclave_launch.description.location import place_of
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.evaluation.evaluate import Arguments, evaluation_surroundings, top_description
 from enclave_launch.runtime.back_pressure import BackPressure
+from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.gate import EnclaveGate
 from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging
 from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
 from enclave_launch.runtime.process_tree import ProcessTree
 from enclave_launch.runtime.ros_services import RosServices
-from enclave_launch.runtime.run_events import LaunchFailed, LaunchOver, LaunchStarted, Observer, unobserved
+from enclave_launch.runtime.run_events import (
+    LaunchFailed,
+    LaunchOver,
+    LaunchStarted,
+    Observer,
+    RunEvent,
+    unobserved,
+)
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 from enclave_launch.runtime.warden_process import WardenProcess
 
@@ -60,6 +68,7 @@ class RunOptions(NamedTuple):
     needs_ros_services: bool = False
     log_limit: int | None = None
     host_options: Mapping[str, Any] = MappingProxyType({})
+    companion: LaunchCompanion | None = None
 
 
 def run_launch(
@@ -118,7 +127,7 @@ class LaunchService:
         warden: WardenProcess | None = None,
         observe: Observer = unobserved,
     ) -> None:
-        self._observe = observe
+        self._observe = _told_to(options.companion, observe)
         self._launch_file = os.path.abspath(launch_file)
         self._arguments = arguments
         self._gate = gate
@@ -152,6 +161,10 @@ class LaunchService:
             self._log = self._open_log(tree)
             stack.callback(self._log.close)
             stack.enter_context(captured_logging(self._log))
+            companion = self._options.companion
+            if companion is not None:
+                companion.opened(self)
+                stack.push_async_callback(companion.closed)
             self._host = LiveHost(
                 tree,
                 self._log,
@@ -160,6 +173,7 @@ class LaunchService:
                 fail=self._on_failure,
                 services=self._services,
                 observe=self._observe,
+                companion=companion,
                 **self._options.host_options,
             )
             stack.push_async_callback(self._host.close)
@@ -171,6 +185,10 @@ class LaunchService:
         if not self._shutting_down:
             self._context.emit_event_sync(Shutdown(reason=reason, due_to_sigint=due_to_sigint))
         self._enter_shutdown()
+
+    def say(self, level: Level, message: str) -> None:
+        """A line of the launch log, for a companion."""
+        self._say(level, message)
 
     def on_signal(self, number: Signals) -> None:
         if number is not SIGINT:
@@ -340,6 +358,19 @@ def _many_descriptors() -> Iterator[None]:
         yield
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+
+
+def _told_to(companion: LaunchCompanion | None, observe: Observer) -> Observer:
+    """The companion first: what it adds to the record is there when others look."""
+    if companion is None:
+        return observe
+    told = companion
+
+    def both(event: RunEvent) -> None:
+        told.happened(event)
+        observe(event)
+
+    return both
 
 
 class _Over(Exception):

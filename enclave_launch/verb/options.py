@@ -47,6 +47,7 @@ def build_parser() -> argparse.ArgumentParser:
     _add_inspection(parser.add_argument_group("looking without starting"))
     _add_evaluation(parser.add_argument_group("evaluating the launch file"))
     _add_running(parser.add_argument_group("running"))
+    _add_recording(parser.add_argument_group("recording what nodes ask for"))
     return parser
 
 
@@ -108,11 +109,11 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
     """Also those of ``ros2 launch``."""
     group.add_argument(
         "--nodl",
-        metavar="FILE",
+        metavar="FILE|DIR",
         action="append",
         type=Path,
         default=[],
-        help="use this NoDL manifest where definitions conflict (repeatable)",
+        help="use this NoDL manifest, or those of a folder, where definitions conflict (repeatable)",
     )
     group.add_argument(
         "--missing-nodl",
@@ -243,6 +244,31 @@ def _add_running(group: argparse._ArgumentGroup) -> None:
     )
     group.add_argument(
         "--launch-prefix-filter", metavar="REGEX", help="only where the executable's name matches"
+    )
+
+
+def _add_recording(group: argparse._ArgumentGroup) -> None:
+    group.add_argument(
+        "--learn",
+        metavar="DIR",
+        type=Path,
+        help="run the launch, record what its nodes ask for, and write their manifests into DIR",
+    )
+    group.add_argument(
+        "--learn-for",
+        metavar="TIME",
+        help="end the learning run when nothing new was asked for during TIME, such as 10s (default: at Ctrl-C)",
+    )
+    group.add_argument(
+        "--learn-isolation",
+        choices=("auto", "local", "none"),
+        default="auto",
+        help="keep the learning run in a network namespace, else on this machine (auto), only the latter, or not",
+    )
+    group.add_argument(
+        "--learn-parameters",
+        action="store_true",
+        help="a second run with marker values decides which names come from which parameters",
     )
 
 

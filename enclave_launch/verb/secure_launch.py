@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
     from enclave_launch.options import ResolveOptions, RunSettings
     from enclave_launch.plan import LaunchPlan
+    from enclave_launch.runtime.companion import LaunchCompanion
     from enclave_launch.verb.target import Target
 
 
@@ -66,9 +67,22 @@ def _main(options: argparse.Namespace) -> int:
     keystore = _keystore(options)
     if _only_looking(options):
         return _show_plan(_resolve(target, options), options, keystore)
+    if options.learn is not None:
+        from enclave_launch.verb.learn import learn_launch
+
+        return learn_launch(target, options, lambda companion: _start(target, options, keystore, companion))
+    return _start(target, options, keystore)
+
+
+def _start(
+    target: Target,
+    options: argparse.Namespace,
+    keystore: str | None,
+    companion: LaunchCompanion | None = None,
+) -> int:
     if keystore is None:
-        return _launch_plainly(target, options)
-    return _launch(_resolve(target, options), options, keystore)
+        return _launch_plainly(target, options, companion)
+    return _launch(_resolve(target, options), options, keystore, companion)
 
 
 def _check_prefixes(prefixes: Iterable[Path]) -> None:
@@ -206,16 +220,20 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
     return "\n".join(map(printable, lines)) + "\n"
 
 
-def _launch_plainly(target: Target, options: argparse.Namespace) -> int:
+def _launch_plainly(
+    target: Target, options: argparse.Namespace, companion: LaunchCompanion | None = None
+) -> int:
     """Without enclaves nobody has to know what the nodes say to each other."""
     from enclave_launch.flow import evaluate_launch, run
 
     launch = evaluate_launch(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
-    return run(launch, options=_run_settings(options))
+    return run(launch, options=_run_settings(options, companion))
 
 
-def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int:
+def _launch(
+    plan: LaunchPlan, options: argparse.Namespace, keystore: str, companion: LaunchCompanion | None = None
+) -> int:
     from enclave_launch.flow import provision, run
     from enclave_launch.verb.security import expiry_notices, repair_notices, security_options
 
@@ -227,7 +245,7 @@ def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str) -> int
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
     _warn((*repair_notices(launch), *launch.report.warnings, *expiry_notices(launch, options.warn_expiry)))
-    return run(launch, options=_run_settings(options))
+    return run(launch, options=_run_settings(options, companion))
 
 
 def _check_before_keys_are_made(plan: LaunchPlan) -> None:
@@ -244,7 +262,7 @@ def _check_before_keys_are_made(plan: LaunchPlan) -> None:
         require_rclpy()
 
 
-def _run_settings(options: argparse.Namespace) -> RunSettings:
+def _run_settings(options: argparse.Namespace, companion: LaunchCompanion | None = None) -> RunSettings:
     from enclave_launch.options import RunSettings
 
     if options.show_all_subprocesses_output:
@@ -255,6 +273,7 @@ def _run_settings(options: argparse.Namespace) -> RunSettings:
         debug=options.debug,
         allow_late=options.allow_late,
         secrets=secrets,
+        companion=companion,
         log_limit=options.log_limit,
     )
 

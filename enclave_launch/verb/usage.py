@@ -48,6 +48,9 @@ FOR_PLAN = frozenset(
 )
 """Options of the plan: an unsecured launch makes none."""
 
+FOR_LEARN = frozenset({"learn_for", "learn_isolation", "learn_parameters"})
+"""Options of a learning run."""
+
 _VIEWS = ("explain", "dump_params", "show_args", "print_description")
 
 
@@ -72,6 +75,10 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
     if "format" in given and (views or not options.dry_run):
         beside = f" beside {_flags(parser._actions, views)}" if views else ""
         raise UsageError(f"--format has no effect{beside}: it is for --dry-run; nothing was started")
+    if options.learn is None:
+        check_needs_secure(parser._actions, given & FOR_LEARN, "--learn")
+    elif views or options.dry_run:
+        raise UsageError("--learn runs the launch; nothing else is looked at")
     if not options.secure:
         check_needs_secure(parser._actions, given & FOR_SECURE)
         if not views and not options.dry_run:

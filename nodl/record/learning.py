@@ -16,6 +16,7 @@ from nodl.record.assembly import Record
 from nodl.record.lines import Run
 from nodl.record.origins import (
     FIXED,
+    MARKER,
     Name,
     Observation,
     Origin,
@@ -162,6 +163,8 @@ def _entries(seen: Sequence[_Seen]) -> Iterable[Entry]:
     origins = origins_of(observations)
     done: set[object] = set()
     for name, origin in origins.items():
+        if MARKER in name.name:
+            continue  # what followed it was seen under its usual name too
         key = (name.kind, name.type, origin.source) if origin.source else name
         if key in done:
             continue

@@ -20,6 +20,9 @@ from nodl.node_interface import EndpointKind
 _NEVER = re.compile(r"(frame|frame_id|type)\Z")
 _PREFERRED = re.compile(r"(topic|topic_name)\Z")
 
+MARKER = "enclave_launch_marker_"
+"""Values that a run for learning gives in place of a user's begin so; none is a name that a manifest may have."""
+
 Inputs = Mapping[str, object]
 """Parameters by name; words of the command line as ``<1>``, ``<2>``."""
 

@@ -1,0 +1,180 @@
+"""``--learn``: a launch is run to see what its nodes ask for; records and manifests end in a folder. Writes them.
+
+    DIR/records/RUN.record            what was recorded, one file for each run
+    DIR/PACKAGE__PROGRAM.nodl.yaml    one manifest for each node of a program, made of all records of the folder
+
+Manifests are made anew from all records each time and united with what stands in them: nothing goes away because it
+was not seen this time.
+"""
+
+from __future__ import annotations
+
+import os
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterable
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import NamedTuple
+
+from enclave_launch.errors import ManifestError
+from enclave_launch.recording.recording import Recording
+from enclave_launch.runtime.companion import LaunchControl
+from enclave_launch.runtime.run_events import RunEvent
+from nodl.record.assembly import Record, read_record
+from nodl.record.learning import Learnt, LearntNode, learn
+from nodl.record.lines import EndpointMade, Line, NodeMade, Run, StateEntered
+from nodl.record.manifest import manifest_file_name, manifest_text
+
+RECORDS = "records"
+_LONGEST_START = 15.0
+"""Seconds that a process may take from its start to its first word to rcl before nobody waits for it any more."""
+
+
+class QuietWatch:
+    """Ends the launch when nothing new was asked for during ``patience`` seconds; ``None``: never."""
+
+    def __init__(self, patience: float | None) -> None:
+        self._patience = patience
+        self._known: set[tuple[object, ...]] = set()
+        self._last = time.monotonic()
+        self._launch: LaunchControl | None = None
+        self._recording: Recording | None = None
+        self._over = False
+
+    def opened(self, launch: LaunchControl, recording: Recording) -> None:
+        self._launch, self._recording = launch, recording
+        self._last = time.monotonic()
+
+    def added(self, line: Line) -> None:
+        what = _news(line)
+        if what is not None and what not in self._known:
+            self._known.add(what)
+            self._last = time.monotonic()
+
+    def happened(self, event: RunEvent) -> None:
+        """What processes print, and that they end, is no news."""
+
+    def looked(self) -> None:
+        if self._patience is None or self._launch is None or self._recording is None or self._over:
+            return
+        now = time.monotonic()
+        if self._recording.running and not self._starting(now) and now - self._last >= self._patience:
+            self._over = True
+            self._launch.say(
+                "INFO", f"no new endpoint for {self._patience:g} s: what was to be seen was seen"
+            )
+            self._launch.shut_down("learnt")
+
+    def closed(self) -> None:
+        """Nothing to tidy up."""
+
+    def _starting(self, now: float) -> bool:
+        """Whether a process that began a short while ago has said nothing to rcl yet."""
+        assert self._recording is not None
+        record = self._recording.record
+        speaking = {p.started.pid for p in record.attributed() if p.started is not None}
+        return any(
+            pid not in speaking and now - since < _LONGEST_START
+            for pid, since in self._recording.running.items()
+        )
+
+
+def _news(line: Line) -> tuple[object, ...] | None:
+    """What a line tells that may not have been told before."""
+    if isinstance(line, EndpointMade):
+        return (line.kind, line.fqn, line.written)
+    if isinstance(line, NodeMade):
+        return (line.fqn,)
+    return (line.pid, line.node, line.state) if isinstance(line, StateEntered) else None
+
+
+class LearntFolder(NamedTuple):
+    """``files``: manifests by path; ``notes``: what a person should know of them."""
+
+    files: dict[Path, LearntNode]
+    notes: tuple[str, ...]
+
+
+def new_run(launch_file: str, distro: str, isolation: str, *, secured: bool = False) -> Run:
+    """Named by the time, so that runs sort in the order in which they were made."""
+    now = datetime.now(timezone.utc)
+    identifier = f"{now:%Y%m%dT%H%M%S}-{os.getpid():x}{int(now.microsecond / 1000):03x}"
+    return Run(identifier, launch_file, distro, isolation, now.isoformat(timespec="seconds"), secured)
+
+
+def keep_record(folder: Path, run: Run, data: bytes) -> Path:
+    """The record of ``run`` in the folder. Raises ``ManifestError`` where it cannot be written."""
+    path = folder / RECORDS / f"{run.id}.record"
+    _write(path, data)
+    return path
+
+
+def write_manifests(folder: Path) -> LearntFolder:
+    """The manifests of all records in ``folder``. Raises ``ManifestError`` for one that cannot be written, or that
+    somebody has made unreadable."""
+    records = [_read(path) for path in sorted((folder / RECORDS).glob("*.record"))]
+    learnt = learn(records)
+    programs = Counter((node.key.package, node.key.executable, node.key.plugin) for node in learnt.nodes)
+    files: dict[Path, LearntNode] = {}
+    for node in learnt.nodes:
+        alone = programs[node.key.package, node.key.executable, node.key.plugin] == 1
+        path = folder / manifest_file_name(node, alone)
+        _write(path, _manifest(node, path).encode())
+        files[path] = node
+    _drop_other_form(folder, files)
+    return LearntFolder(files, tuple(_notes(learnt, records)))
+
+
+def _drop_other_form(folder: Path, files: dict[Path, LearntNode]) -> None:
+    """A program that showed a second node gets a file for each; the file for the whole would contradict them."""
+    for path, node in files.items():
+        whole = folder / manifest_file_name(node, alone=True)
+        if whole not in files and whole.exists() and whole != path:
+            whole.unlink()
+
+
+def _manifest(node: LearntNode, path: Path) -> str:
+    import yaml
+
+    try:
+        before = path.read_text(encoding="utf-8") if path.exists() else ""
+        return manifest_text(node, before)
+    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ManifestError(f"{path}: what stands there cannot be read: {error}; move it away") from error
+
+
+def _read(path: Path) -> Record:
+    try:
+        return read_record(path.read_bytes())
+    except OSError as error:
+        raise ManifestError(f"{path}: cannot be read: {error.strerror}") from error
+
+
+def _notes(learnt: Learnt, records: Iterable[Record]) -> Iterable[str]:
+    for node in learnt.nodes:
+        yield from (
+            f"{node.program}, node {node.key.node}: {text}" for text in (*node.incomplete, *node.notes)
+        )
+    for pattern in learnt.unforeseeable:
+        yield f"nodes {pattern} have another name in each run: no manifest can name them"
+    for record in records:
+        yield from (f"run {record.run.id}: {complaint.why}" for complaint in record.complaints)
+
+
+def _write(path: Path, data: bytes) -> None:
+    """Whole or not at all."""
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        try:
+            with os.fdopen(handle, "wb") as file:
+                file.write(data)
+            os.chmod(name, 0o644)
+            os.replace(name, path)
+        except BaseException:
+            os.unlink(name)
+            raise
+    except OSError as error:
+        raise ManifestError(f"{path}: cannot be written: {error.strerror}") from error

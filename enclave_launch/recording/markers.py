@@ -1,0 +1,95 @@
+"""``--learn-parameters``: a second run of the same launch with marker values, which decides what matching cannot.
+
+Every parameter and argument that may be the source of a recorded name gets a value that nothing else has; names that
+follow come from it, those that do not are fixed. Reads the records of the folder; changes command lines.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+from enclave_launch.policy.program_inputs import own_words
+from enclave_launch.process import ResolvedProcess
+from nodl.record.asked import all_asked
+from nodl.record.assembly import read_record
+from nodl.record.origins import MARKER, arguments_as_inputs, candidates
+
+
+class Questions(NamedTuple):
+    """By program (package, executable): the inputs that some recorded name may come from."""
+
+    inputs: Mapping[tuple[str, str], frozenset[str]]
+
+    def __bool__(self) -> bool:
+        return any(self.inputs.values())
+
+    @property
+    def shown(self) -> str:
+        names = {f"{program}: {name}" for (_, program), found in self.inputs.items() for name in found}
+        return ", ".join(sorted(names))
+
+
+class Marked(NamedTuple):
+    """A command line with markers, and the values that the process now has."""
+
+    cmd: tuple[str, ...]
+    parameters: dict[str, object]
+    arguments: tuple[str, ...]
+
+
+def questions(folder: Path) -> Questions:
+    """What the records of ``folder`` leave to decide. Components are left out: their parameters do not come with a
+    command line."""
+    found: dict[tuple[str, str], set[str]] = {}
+    for path in sorted(folder.glob("records/*.record")):
+        for node in all_asked(read_record(path.read_bytes()).attributed()):
+            if not node.executable:
+                continue
+            inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
+            sources = {source for asked in node.endpoints for source in candidates(asked.written, inputs)}
+            found.setdefault((node.package, node.executable), set()).update(s.parameter for s in sources)
+    return Questions({program: frozenset(names) for program, names in found.items()})
+
+
+class MarkerRun:
+    """Hands out markers, each once."""
+
+    def __init__(self, asked: Questions) -> None:
+        self._asked = asked
+        self._count = 0
+
+    def mark(self, process: ResolvedProcess, cmd: tuple[str, ...]) -> Marked:
+        """``cmd`` with a marker in place of each value in question; later ROS arguments win over earlier ones."""
+        wanted = self._asked.inputs.get(
+            (process.package or "", process.executable.rpartition("/")[2]), frozenset()
+        )
+        parameters = {
+            name: self._marker(value) for name, value in sorted(process.parameters.items()) if name in wanted
+        }
+        words = own_words(process)
+        arguments = [self._next() if f"<{place}>" in wanted else word for place, word in enumerate(words, 1)]
+        marked = _with_words(cmd, dict(zip(words, arguments, strict=True)))
+        if parameters:
+            marked += ("--ros-args",)
+            for name, value in parameters.items():
+                marked += ("-p", f"{name}:={_yaml(value)}")
+        return Marked(marked, parameters, tuple(arguments))
+
+    def _marker(self, value: object) -> object:
+        return tuple(self._next() for _ in value) if isinstance(value, tuple) else self._next()
+
+    def _next(self) -> str:
+        self._count += 1
+        return f"{MARKER}{self._count}"
+
+
+def _yaml(value: object) -> str:
+    return f"[{', '.join(value)}]" if isinstance(value, tuple) else str(value)
+
+
+def _with_words(cmd: tuple[str, ...], replaced: Mapping[str, str]) -> tuple[str, ...]:
+    """The words before ``--ros-args``, exchanged; launch puts a program's own arguments there."""
+    end = cmd.index("--ros-args") if "--ros-args" in cmd else len(cmd)
+    return (cmd[:1] + tuple(replaced.get(word, word) for word in cmd[1:end])) + cmd[end:]

@@ -1,0 +1,249 @@
+"""The record of one launch: every process gets the recorder, what it writes is read as it grows.
+
+Goes along with a launch (``runtime.companion``). The record lies in a folder of its own that only who knows its name
+can enter: processes of other users must be able to write there, strangers must not. Reads and writes the record; next
+are the listeners: learning, audit, denials.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import shutil
+import subprocess
+import tempfile
+import time
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from enclave_launch.errors import RuntimeFailure
+from enclave_launch.policy.program_inputs import own_words
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.recording.build import recorder_library
+from enclave_launch.recording.environment import RECORD_VARIABLE, with_recorder
+from enclave_launch.recording.markers import Marked, MarkerRun
+from enclave_launch.recording.programs import look_at_command
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+from enclave_launch.runtime.companion import LaunchControl
+from enclave_launch.runtime.process_tree import ProcessSpec
+from enclave_launch.runtime.run_events import ProcessExited, ProcessStarted, RunEvent
+from nodl.record.assembly import Record
+from nodl.record.lines import Line, LineReader, LoadedComponent, Run, StartedProcess, line_text
+
+INTERVAL = 0.1
+"""Seconds between two looks at the record."""
+
+
+class Listener(Protocol):
+    """Told in the event loop. ``added``: ``line`` is in the record already."""
+
+    def opened(self, launch: LaunchControl, recording: Recording) -> None: ...
+
+    def added(self, line: Line) -> None: ...
+
+    def happened(self, event: RunEvent) -> None: ...
+
+    def looked(self) -> None:
+        """After each look at the record."""
+
+    def closed(self) -> None:
+        """Every process has ended and every line was added."""
+
+
+class Unrecorded(NamedTuple):
+    """A process that cannot be recorded, or was not, and why."""
+
+    process: str
+    why: str
+
+
+class Recording:
+    """``record`` is complete when the launch is over; ``data`` is its text."""
+
+    def __init__(
+        self, run: Run, listeners: Sequence[Listener] = (), markers: MarkerRun | None = None
+    ) -> None:
+        self.run = run
+        self.record = Record([run])
+        self.unrecorded: list[Unrecorded] = []
+        self.running: dict[int, float] = {}  # pid -> when it was started
+        self.data = b""
+        self._listeners = tuple(listeners)
+        self._markers = markers
+        self._processes: dict[str, ResolvedProcess] = {}
+        self._marked: dict[str, Marked] = {}
+        self._reader = LineReader()
+        self._folder: Path | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._launch: LaunchControl | None = None
+
+    # LaunchCompanion
+
+    def opened(self, launch: LaunchControl) -> None:
+        self._launch = launch
+        self._folder = Path(tempfile.mkdtemp(prefix="enclave_launch_record_"))
+        self._folder.chmod(0o711)
+        shutil.copyfile(recorder_library(), self._library)
+        self._library.chmod(0o755)
+        self._file.touch()
+        self._file.chmod(0o622)
+        self._try_it()
+        self._write(self.run)
+        for listener in self._listeners:
+            listener.opened(launch, self)
+        self._task = asyncio.get_running_loop().create_task(self._watch())
+
+    def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
+        self._processes[process.process_name] = process
+        program = look_at_command(spec.cmd, spec.environment.get("PATH", os.defpath))
+        if program.obstacle:
+            self._not_recorded(process.process_name, program.obstacle)
+        if self._markers is not None:
+            self._marked[process.process_name] = self._markers.mark(process, spec.cmd)
+            spec = spec._replace(cmd=self._marked[process.process_name].cmd)
+        worn = with_recorder(spec.environment, str(self._library), str(self._file), program.sanitizer)
+        return spec._replace(environment=worn)
+
+    def happened(self, event: RunEvent) -> None:
+        if isinstance(event, ProcessStarted):
+            self.running[event.pid] = time.monotonic()
+            process = self._processes[event.name]
+            self._write(_started(process, event.pid, self._marked.get(event.name)))
+        elif isinstance(event, ProcessExited):
+            self.running.pop(event.pid, None)
+        for listener in self._listeners:
+            listener.happened(event)
+
+    def loading(self, components: Sequence[ResolvedComponent]) -> None:
+        for component in components:
+            self._write(_component(component))
+
+    async def closed(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        try:
+            self._look()
+            self._reader.close()
+            self.record.complaints = list(self._reader.complaints)
+            self._name_the_silent()
+            for listener in self._listeners:
+                listener.closed()
+        finally:
+            if self._folder is not None:
+                shutil.rmtree(self._folder, ignore_errors=True)
+
+    # what listeners ask for
+
+    def say_warning(self, text: str) -> None:
+        if self._launch is not None:
+            self._launch.say("WARNING", text)
+
+    @property
+    def _library(self) -> Path:
+        assert self._folder is not None
+        return self._folder / "recorder.so"
+
+    @property
+    def _file(self) -> Path:
+        assert self._folder is not None
+        return self._folder / "record"
+
+    def _try_it(self) -> None:
+        """One program with the recorder, before any node depends on it: a folder without execution, or a libc of
+        another kind, is told now."""
+        environment = {
+            **os.environ,
+            "LD_PRELOAD": str(self._library),
+            RECORD_VARIABLE: str(self._file),
+        }
+        ran = subprocess.run(
+            ["/bin/sh", "-c", ":"], env=environment, capture_output=True, text=True, check=False
+        )
+        heard = self._file.read_bytes()
+        self._file.write_bytes(b"")
+        if b'"what":"loaded"' not in heard:
+            said = ran.stderr.strip() or "the dynamic linker did not load it"
+            raise RuntimeFailure(
+                f"the recorder does not work here: {said}; set TMPDIR to a folder from which programs may be run"
+            )
+
+    def _write(self, line: Run | StartedProcess | LoadedComponent) -> None:
+        with self._file.open("ab") as file:
+            file.write(line_text(line))
+
+    async def _watch(self) -> None:
+        try:
+            while True:
+                await asyncio.sleep(INTERVAL)
+                self._look()
+                for listener in self._listeners:
+                    listener.looked()
+        except OSError as error:
+            self.say_warning(f"the record of this launch cannot be read any more: {error}")
+
+    def _look(self) -> None:
+        with self._file.open("rb") as file:
+            file.seek(len(self.data))
+            new = file.read()
+        self.data += new
+        for line in self._reader.feed(new):
+            if not isinstance(line, Run):
+                self.record.add(line)
+            for listener in self._listeners:
+                listener.added(line)
+
+    def _not_recorded(self, process: str, why: str) -> None:
+        if Unrecorded(process, why) not in self.unrecorded:
+            self.unrecorded.append(Unrecorded(process, why))
+            self.say_warning(f"{process} is not recorded: {why}")
+
+    def _name_the_silent(self) -> None:
+        known = {item.process for item in self.unrecorded}
+        for started in self.record.silent():
+            if started.process not in known:
+                why = "nothing was heard of it: it or what started it does not keep LD_PRELOAD"
+                self._not_recorded(started.process, why)
+
+
+def _started(process: ResolvedProcess, pid: int, marked: Marked | None) -> StartedProcess:
+    parameters = {**process.parameters, **(marked.parameters if marked else {})}
+    return StartedProcess(
+        pid=pid,
+        process=process.process_name,
+        package=process.package or "",
+        executable=process.executable,
+        kind=process.kind,
+        fqn=process.fqn or "",
+        location=str(process.location),
+        arguments=marked.arguments if marked else tuple(own_words(process)),
+        rules=tuple(parse_ros_arguments(process.cmd).remaps),
+        parameters=_plain(parameters),
+    )
+
+
+def _component(component: ResolvedComponent) -> LoadedComponent:
+    rules = [f"{rule.source}:={rule.target}" for rule in component.remaps]
+    rules += [f"__node:={component.name}"] if component.name else []
+    rules += [f"__ns:={component.namespace}"] if component.namespace else []
+    return LoadedComponent(
+        container=component.container,
+        package=component.package,
+        plugin=component.plugin,
+        name=component.name,
+        namespace=component.namespace,
+        location=str(component.location),
+        rules=tuple(rules),
+        parameters=_plain(component.parameters),
+    )
+
+
+def _plain(parameters: Mapping[str, object]) -> dict[str, object]:
+    """Only what may be a name: texts and lists of them."""
+    return {
+        name: value
+        for name, value in parameters.items()
+        if isinstance(value, (str, bool))
+        or (isinstance(value, tuple) and all(isinstance(v, str) for v in value))
+    }

@@ -1,0 +1,41 @@
+"""Who goes along with a launch: may change what each process is started with, and is told what happens.
+
+Stronger than an observer of events (``run_events``): its answers are awaited, and it lives from before the first
+process until after the last. The runtime knows only this; recorders, audits and the like are handed in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.runtime.launch_log import Level
+from enclave_launch.runtime.process_tree import ProcessSpec
+from enclave_launch.runtime.run_events import RunEvent
+
+
+class LaunchControl(Protocol):
+    """What a companion may do to the launch."""
+
+    def say(self, level: Level, message: str) -> None:
+        """A line of the launch log."""
+
+    def shut_down(self, reason: str) -> None: ...
+
+
+class LaunchCompanion(Protocol):
+    """``opened`` comes before the first process, ``closed`` after the last one has ended."""
+
+    def opened(self, launch: LaunchControl) -> None:
+        """:raises EnclaveLaunchError: it cannot go along, so nothing is started."""
+
+    def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
+        """What to start, when everything else has been decided; asked before each start."""
+
+    def happened(self, event: RunEvent) -> None: ...
+
+    def loading(self, components: Sequence[ResolvedComponent]) -> None:
+        """Components are about to be loaded into a container that runs."""
+
+    async def closed(self) -> None: ...

@@ -1,0 +1,94 @@
+"""``secure-launch --learn DIR``: run a launch to learn what its nodes ask for, and write their manifests."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from enclave_launch.errors import UsageError
+from enclave_launch.recording.isolation import DEVICES_STAY_REAL, Isolation, isolate
+from enclave_launch.recording.learning import (
+    LearntFolder,
+    QuietWatch,
+    keep_record,
+    new_run,
+    write_manifests,
+)
+from enclave_launch.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from enclave_launch.recording.markers import MarkerRun
+    from enclave_launch.runtime.companion import LaunchCompanion
+    from enclave_launch.verb.target import Target
+
+Start = Callable[["LaunchCompanion"], int]
+"""Run the launch with a companion; gives the exit status."""
+
+
+def seconds(text: str | None) -> float | None:
+    """``10s``, ``2m`` as seconds. Raises ``UsageError``."""
+    from keystore.errors import KeystoreError
+    from keystore.formats.validity import parse_duration
+
+    if text is None:
+        return None
+    try:
+        return parse_duration(text).total_seconds()
+    except KeystoreError as error:
+        raise UsageError(f"--learn-for: {error}") from error
+
+
+def learn_launch(target: Target, options: argparse.Namespace, start: Start) -> int:
+    """Record one run (and a second one for ``--learn-parameters``), then write what was learnt. Gives the exit status
+    of the launch."""
+    patience = seconds(options.learn_for)
+    folder = Path(options.learn).absolute()
+    isolation = isolate(options.learn_isolation)
+    _say(
+        f"learning: every process runs as ever{'' if options.secure else ', unsecured'}; {DEVICES_STAY_REAL}"
+    )
+    _say(f"kept apart by: {isolation.value}")
+    status = _record(target, options, folder, isolation, patience, start)
+    if options.learn_parameters:
+        from enclave_launch.recording.markers import MarkerRun, questions
+
+        asked = questions(folder)
+        if asked:
+            _say(f"a second run, with marker values for {asked.shown}")
+            marked = MarkerRun(asked)
+            status = max(status, _record(target, options, folder, isolation, patience or 5.0, start, marked))
+    _report(write_manifests(folder), folder)
+    return status
+
+
+def _record(
+    target: Target,
+    options: argparse.Namespace,
+    folder: Path,
+    isolation: Isolation,
+    patience: float | None,
+    start: Start,
+    markers: MarkerRun | None = None,
+) -> int:
+    run = new_run(target.launch_file, options.distro or "", isolation.value, secured=options.secure)
+    recording = Recording(run, [QuietWatch(patience)], markers)
+    status = start(recording)
+    keep_record(folder, run, recording.data)
+    return status
+
+
+def _report(learnt: LearntFolder, folder: Path) -> None:
+    for path, node in learnt.files.items():
+        runs = f"{len(node.runs)} run{'s' * (len(node.runs) != 1)}"
+        print(f"{path}: node {node.key.node} of {node.program}, {len(node.entries)} endpoints, {runs}")
+    for note in learnt.notes:
+        _say(f"warning: {note}")
+    if not learnt.files:
+        _say(f"warning: no node was recorded; {folder} has no manifest")
+
+
+def _say(text: str) -> None:
+    print(f"secure-launch: {text}", file=sys.stderr)

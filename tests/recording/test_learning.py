@@ -1,0 +1,189 @@
+"""Learning on real rclpy: one launch teaches, another one of the same programs is planned as it really is."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from enclave_launch.flow import resolve
+from enclave_launch.options import ResolveOptions
+from enclave_launch.policy.derivation import LIST_NAMES
+from nodl.document import read_document
+from nodl.name_template import NameTemplate, ParameterPart
+from nodl.record.asked import all_asked
+from nodl.record.assembly import Record, read_record
+from nodl.verb import main as secure_nodl
+from tests.recording.conftest import ROOT, rclpy_python
+
+WORKSPACE = ROOT / "fixtures" / "rclpy_ws"
+LAUNCH_FILES = WORKSPACE / "share" / "rclpy_nodes" / "launch"
+RELEASES = ("jazzy", "kilted")
+
+Graph = dict[str, dict[str, set[str]]]
+
+
+class Learnt(NamedTuple):
+    release: str
+    folder: Path
+    output: str
+
+
+def environment(release: str, folder: Path, **more: str) -> dict[str, str]:
+    """A domain that nobody else uses, on loopback."""
+    return {
+        **os.environ,
+        "RCLPY_PYTHON": str(rclpy_python(release)),
+        "ROS_DOMAIN_ID": str(random.SystemRandom().randint(100, 200)),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_LOG_DIR": str(folder / "log"),
+        "ROS_DISTRO": release,
+        **more,
+    }
+
+
+def secure_launch(*arguments: str, variables: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "enclave_launch", "--prefix", str(WORKSPACE), *arguments]
+    return subprocess.run(
+        command, env=variables, cwd=ROOT, capture_output=True, text=True, check=False, timeout=120
+    )
+
+
+@pytest.fixture(scope="session", params=RELEASES)
+def learnt(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Learnt:
+    release: str = request.param
+    folder = tmp_path_factory.mktemp(release)
+    into = folder / "learnt"
+    ran = secure_launch(
+        *("--learn", str(into), "--learn-for", "3s", "--learn-isolation", "local"),
+        *("rclpy_nodes", "learn.launch.xml"),
+        variables=environment(release, folder),
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    return Learnt(release, into, ran.stdout + ran.stderr)
+
+
+def record_of(learnt: Learnt) -> Record:
+    (file,) = (learnt.folder / "records").glob("*.record")
+    return read_record(file.read_bytes())
+
+
+def test_a_learning_run_says_what_it_is(learnt: Learnt) -> None:
+    assert "unsecured" in learnt.output
+    assert "kept apart by: discovery on this machine only, in a DDS domain of its own" in learnt.output
+    assert "device files are not kept apart" in learnt.output
+
+
+def test_nothing_of_the_record_is_lost(learnt: Learnt) -> None:
+    record = record_of(learnt)
+    assert record.complaints == []
+    assert record.silent() == []
+    assert len(all_asked(record.attributed())) == 12
+
+
+def template(learnt: Learnt, file: str, place: int = 0) -> NameTemplate:
+    (node,) = read_document(learnt.folder / file)
+    return node.interface.endpoints[place].name
+
+
+def test_manifests_hold_names_as_sources_write_them(learnt: Learnt) -> None:
+    (node,) = read_document(learnt.folder / "rclpy_nodes__services.nodl.yaml")
+    assert node.interface.package == "rclpy_nodes"
+    assert [str(endpoint.name) for endpoint in node.interface.endpoints] == [
+        "set",
+        "~/reload",
+        "/inner/gather",
+    ]
+
+
+def test_names_from_parameters_and_arguments_say_so(learnt: Learnt) -> None:
+    assert template(learnt, "rclpy_nodes__listener.nodl.yaml", 1).parts == (ParameterPart("input_topic"),)
+    assert template(learnt, "rclpy_nodes__lister.nodl.yaml").parts == (
+        ParameterPart("source_list", None, "each"),
+    )
+    assert template(learnt, "rclpy_nodes__mux.nodl.yaml", 1).parts == (ParameterPart("inputs.*.topic"),)
+    assert template(learnt, "rclpy_nodes__relay.nodl.yaml").parts == (ParameterPart("<2>"),)
+
+
+def test_a_lifecycle_node_that_was_active_is_complete(learnt: Learnt) -> None:
+    text = (learnt.folder / "rclpy_nodes__lifecycle.nodl.yaml").read_text()
+    (node,) = read_document(learnt.folder / "rclpy_nodes__lifecycle.nodl.yaml")
+    assert node.interface.lifecycle and "incomplete" not in text
+    assert [str(endpoint.name) for endpoint in node.interface.endpoints] == ["configured", "activated"]
+
+
+def test_the_records_bear_out_the_manifests(learnt: Learnt, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["check-record", str(learnt.folder), "--nodl", str(learnt.folder), "--judge", "manifest"]
+    status = secure_nodl(arguments)
+    output = capsys.readouterr().out
+    assert status == 0, output
+    assert output.count("as recorded") == 12
+    assert not any(word in output for word in ("missing:", "never seen:", "wrong:"))
+
+
+def test_a_manifest_that_lacks_a_name_fails_against_the_record(
+    learnt: Learnt, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for file in learnt.folder.glob("*.nodl.yaml"):
+        text = file.read_text().replace("name: chatter\n", "name: gibberish\n")
+        (tmp_path / file.name).write_text(text)
+    assert (
+        secure_nodl(["check-record", str(learnt.folder), "--nodl", str(tmp_path), "--judge", "manifest"]) == 1
+    )
+    output = capsys.readouterr().out
+    assert "missing: /speaker: publisher /gossip (written 'chatter', std_msgs/msg/String)" in output
+    assert "never seen: /speaker: publisher /gibberish" in output
+
+
+def planned(launch_file: str, learnt: Learnt) -> Graph:
+    options = ResolveOptions(
+        prefixes=(WORKSPACE,), manifests=(learnt.folder,), distro=learnt.release, infer=False
+    )
+    plan = resolve(LAUNCH_FILES / launch_file, options=options)
+    assert plan.problems == ()
+    graph: Graph = {}
+    for enclave in plan.derived.policy.enclaves:
+        for profile in enclave.profiles:
+            node = graph.setdefault(f"{profile.ns.rstrip('/')}/{profile.node}", {})
+            for rule in profile.rules:
+                node.setdefault(LIST_NAMES[rule.operation], set()).add(rule.expression)
+    return graph
+
+
+@pytest.fixture
+def live_graph(learnt: Learnt, tmp_path: Path) -> Iterator[Graph]:
+    """Of another launch file than the one that was learnt, while it runs."""
+    variables = environment(learnt.release, tmp_path)
+    command = [sys.executable, "-m", "enclave_launch", "--prefix", str(WORKSPACE)]
+    launch = subprocess.Popen(
+        [*command, "rclpy_nodes", "other.launch.xml"],
+        env=variables,
+        cwd=ROOT,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+    try:
+        look = [str(rclpy_python(learnt.release)), str(Path(__file__).parent / "live_graph.py"), "12"]
+        seen = subprocess.run(look, env=variables, capture_output=True, text=True, check=True, timeout=90)
+        yield {
+            node: {kind: {row[0] for row in rows} for kind, rows in kinds.items() if rows}
+            for node, kinds in json.loads(seen.stdout.splitlines()[-1]).items()
+        }
+    finally:
+        launch.send_signal(signal.SIGINT)
+        launch.wait(30)
+
+
+def test_the_plan_of_another_launch_is_its_live_graph(learnt: Learnt, live_graph: Graph) -> None:
+    plan = planned("other.launch.xml", learnt)
+    assert sorted(plan) == sorted(live_graph)
+    for node, kinds in live_graph.items():
+        assert plan[node] == kinds, node
