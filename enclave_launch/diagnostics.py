@@ -20,6 +20,10 @@ class Code(str, Enum):
 
     # of the evaluation
     COMMAND_STDERR = "command-stderr", "A command of the launch file wrote to stderr"
+    EXECUTABLE_NOT_BUILT = (
+        "executable-not-built",
+        "A placeholder stands for an executable that a package lacks",
+    )
     INCLUDE_LEFT_OUT = "include-left-out", "An included file belongs to a package that is not installed"
     LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description calls itself deprecated"
     LOG_LEVEL_MISSING = "log-level-missing", "The action log needs a level since this distribution"
@@ -102,7 +106,7 @@ def command_stderr(message: str, command: str) -> Diagnostic:
 
 def include_left_out(path: str) -> Diagnostic:
     return Diagnostic(
-        Code.INCLUDE_LEFT_OUT, path, f"not included, because its package is not installed: {path}"
+        Code.INCLUDE_LEFT_OUT, path, f"not included, because its package is not installed or lacks it: {path}"
     )
 
 
@@ -127,6 +131,11 @@ def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
 
 def not_foreseeable(what: str, location: SourceLocation) -> Diagnostic:
     return Diagnostic(Code.NOT_FORESEEABLE, what, f"not foreseeable: {what}", location)
+
+
+def executable_not_built(package: str, executable: str, placeholder: str) -> Diagnostic:
+    text = f"package '{package}' has no executable '{executable}' yet; using {placeholder} in its place"
+    return Diagnostic(Code.EXECUTABLE_NOT_BUILT, f"{package}/{executable}", text)
 
 
 def package_not_installed(package: str, placeholder: str) -> Diagnostic:

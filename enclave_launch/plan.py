@@ -362,8 +362,9 @@ def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess
 
 
 def _bare_enclaves(processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
-    """Enclaves that must exist although no node of them is known: executables to which the launch file gives one."""
-    return tuple(p.enclave.path for p in processes if p.enclave and not p.nodes and not p.missing)
+    """Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
+    without a manifest, which must not be missing from what a person looks at."""
+    return tuple(p.enclave.path for p in processes if p.enclave and not p.nodes)
 
 
 def _problems(

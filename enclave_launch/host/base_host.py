@@ -7,7 +7,12 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.diagnostics import Diagnostic, package_not_installed, program_not_installed
+from enclave_launch.diagnostics import (
+    Diagnostic,
+    executable_not_built,
+    package_not_installed,
+    program_not_installed,
+)
 from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult
 from enclave_launch.ros_rules.distro import choose_release
 from nodl import ament_index
@@ -78,7 +83,14 @@ class BaseHost:
     def _find_executable(self, prefix: str, package: str, executable: str) -> str:
         if self.is_missing(prefix):
             return os.path.join(prefix, "lib", package, executable)
-        return ament_index.executable_path(package, executable, [prefix])
+        try:
+            return ament_index.executable_path(package, executable, [prefix])
+        except ament_index.ExecutableNotFoundError:
+            if not self.allow_missing_packages:
+                raise
+        placeholder = os.path.join(MISSING_PREFIX, package, "lib", package, os.path.basename(executable))
+        self.warn(executable_not_built(package, executable, placeholder))
+        return placeholder
 
     def is_missing(self, path: str) -> bool:
         return self.allow_missing_packages and path.startswith(f"{MISSING_PREFIX}/")

@@ -47,6 +47,7 @@ class Host(Protocol):
 
     release: Release
     no_python: bool
+    allow_missing_packages: bool
 
     @property
     def loop(self) -> Any:

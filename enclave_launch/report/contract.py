@@ -83,6 +83,9 @@ class Enclave(_Strict, frozen=True):
     """What one enclave may do: final names, sorted."""
 
     nodes: list[str]
+    permissions_unknown: list[str] = Field(
+        description="processes and components of it of which nothing is known; then the lists are not all"
+    )
     publish: list[str]
     subscribe: list[str]
     call_services: list[str]

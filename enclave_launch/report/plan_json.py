@@ -9,6 +9,7 @@ from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.process import RemapRule
+from enclave_launch.report.unknown import label, unknown_by_enclave
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
 from keystore.formats.policy import EnclavePolicy, Qualifier
@@ -92,8 +93,13 @@ def _enclaves(plan: LaunchPlan) -> dict[str, dict[str, list[str]]]:
     nodes: dict[str, list[str]] = {}
     for node in plan.nodes:
         nodes.setdefault(node.enclave, []).append(node.fqn)
+    unknown = unknown_by_enclave(plan)
     return {
-        enclave.path: {"nodes": sorted(set(nodes.get(enclave.path, []))), **allowed_names(enclave)}
+        enclave.path: {
+            "nodes": sorted(set(nodes.get(enclave.path, []))),
+            "permissions_unknown": [label(item) for item in unknown.get(enclave.path, ())],
+            **allowed_names(enclave),
+        }
         for enclave in plan.derived.policy.enclaves
     }
 

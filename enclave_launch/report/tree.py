@@ -9,6 +9,7 @@ from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.plan_json import allowed_names
+from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_enclave
 from keystore.formats.policy import EnclavePolicy
 
 _LABELS = {
@@ -42,6 +43,8 @@ def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) ->
     if plan.launcher and plan.launcher.enclave == enclave.path:
         branches.append((f"the launcher itself, node {plan.launcher.fqn}", ()))
     branches.extend(_permissions(plan, enclave))
+    if unknown := unknown_by_enclave(plan).get(enclave.path):
+        branches.append((f"{UNKNOWN} of {' '.join(map(label, unknown))}", ()))
     branches.extend((str(gain), ()) for gain in gains if gain.enclave == enclave.path)
     merged = f"  (shared by {len(processes)} processes)" if len(processes) > 1 else ""
     return f"enclave {enclave.path}{merged}", branches
@@ -50,7 +53,7 @@ def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) ->
 def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     process = item.process
     what = f"{process.package}/{process.executable}" if process.package else process.executable
-    names = " ".join(dict.fromkeys(node.fqn for node in item.nodes)) or item.fqn or ""
+    names = shown_fqn(item)
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
     source = f", {_origin(item)}" if item.origin not in (None, InterfaceOrigin.PACKAGE) else ""
@@ -61,13 +64,17 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     )
     also = f", behind {shlex.join(process.prefix)}" if process.prefix else ""
     also += f", domain {item.domain}" if item.domain else ""
+    also += f": {UNKNOWN}" if item.missing else ""
     head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{source}{also}{event})"
     loaded: list[Branch] = [
-        (f"component {component.component.package} {component.component.plugin} as {component.fqn}", ())
-        for component in plan.components
-        if component.container is item
+        (_component(component), ()) for component in plan.components if component.container is item
     ]
     return head, loaded
+
+
+def _component(item: PlannedComponent) -> str:
+    unknown = f"  ({UNKNOWN})" if item.missing else ""
+    return f"component {item.component.package} {item.component.plugin} as {item.fqn}{unknown}"
 
 
 def _origin(item: PlannedProcess | PlannedComponent) -> str:
@@ -95,10 +102,7 @@ def _permissions(plan: LaunchPlan, enclave: EnclavePolicy) -> Iterator[Branch]:
 def _outside(plan: LaunchPlan) -> list[Branch]:
     without: list[Branch] = [_process(item, plan) for item in plan.processes if item.enclave is None]
     without += [
-        (
-            f"component {item.component.package} {item.component.plugin} as {item.fqn} in {item.component.container}",
-            (),
-        )
+        (f"{_component(item)} in {item.component.container}", ())
         for item in plan.components
         if item.container is None
     ]

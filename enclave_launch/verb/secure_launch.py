@@ -200,23 +200,24 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
 
 def _policy_text(plan: LaunchPlan) -> str:
     """Raises ``ManifestError`` when there is no enclave to write: SROS2's schema wants at least one."""
+    from keystore.formats.policy import Policy
     from keystore.formats.policy_xml import policy_xml
 
-    if not plan.derived.policy.enclaves:
+    if not any(enclave.profiles for enclave in plan.derived.policy.enclaves):
         nothing = "no enclave with known permissions: there is no policy to print"
         raise ManifestError("\n".join((*map(str, plan.problems), nothing)))
-    return policy_xml(plan.derived.policy).decode()
+    known = tuple(enclave for enclave in plan.derived.policy.enclaves if enclave.profiles)
+    return policy_xml(Policy(known)).decode()
 
 
 def _explained(plan: LaunchPlan, subject: str) -> str:
-    from enclave_launch.policy.explanation import explain
+    from enclave_launch.report.explained import explained
 
-    lines = explain(plan.derived, subject)
+    lines = explained(plan, subject)
     if not lines:
         known = " ".join(enclave.path for enclave in plan.derived.policy.enclaves)
-        raise UsageError(
-            f"{subject!r} is no enclave, node, topic, service or action of this launch; enclaves: {known}"
-        )
+        what = "enclave, node, process, topic, service or action"
+        raise UsageError(f"{subject!r} is no {what} of this launch; enclaves: {known}")
     return "\n".join(map(printable, lines)) + "\n"
 
 

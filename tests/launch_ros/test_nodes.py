@@ -111,7 +111,10 @@ def test_missing_packages_can_be_allowed(launched: Evaluate) -> None:
 
 def test_an_installed_package_still_needs_its_program(launched: Evaluate) -> None:
     with pytest.raises(LaunchFileError, match="executable 'nothing' not found"):
-        launched('<node pkg="pk" exec="nothing"/>', allow_missing_packages=True)
+        launched('<node pkg="pk" exec="nothing"/>')
+    looked = launched('<node pkg="pk" exec="nothing"/>', allow_missing_packages=True)
+    assert looked.processes[0].cmd[0] == "/missing/pk/lib/pk/nothing"
+    assert [warning.subject for warning in looked.warnings] == ["pk/nothing"]
 
 
 def test_ten_nodes_of_one_name_are_warned_about(launched: Evaluate) -> None:

@@ -211,7 +211,7 @@ def _global_parameters(context: LaunchContext) -> Iterator[Any]:
             yield normalize_parameter_dict({item[0]: item[1]})
             continue
         path = Path(item).resolve()
-        if not path.is_file():
+        if not path.is_file() and not context.host.allow_missing_packages:
             raise AssertionError(f"the file of set_parameters_from_file does not exist: {path}")
         yield ParameterFile(path)
 

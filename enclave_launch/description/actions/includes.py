@@ -35,9 +35,10 @@ OpenFile = tuple[str, dict[str, Any]]
 
 
 def left_out(include: IncludeLaunchDescription, context: LaunchContext) -> bool:
-    """Whether ``include`` names a file of a package that is not installed; that gives a warning."""
+    """Whether ``include`` names a file that may be missing and is: of a package that is not installed or not built.
+    That gives a warning."""
     location = include.launch_description_source.expand(context)
-    if not context.host.is_missing(location) or os.path.exists(location):
+    if os.path.exists(location) or not context.host.allow_missing_packages:
         return False
     context.host.warn(include_left_out(location))
     return True

@@ -19,6 +19,7 @@ from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
 from enclave_launch.description.parameters.types import EvaluatedParameters, EvaluatedParameterValue
+from enclave_launch.diagnostics import parameter_file_missing
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.rcl_parameters import section_applies
@@ -68,6 +69,9 @@ def to_parameters_list(
 
 def _read(context: LaunchContext, path: pathlib.Path) -> Any:
     generated = context.host.parameter_file(str(path))
+    if generated is None and context.host.allow_missing_packages and not path.is_file():
+        context.host.warn(parameter_file_missing(str(path)))
+        return {}
     return _parse(read_text(path) if generated is None else generated)
 
 

@@ -92,6 +92,9 @@ def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
             yield "-p", f"{item[0]}:={item[1]}"
             continue
         path = os.path.abspath(item)
+        if not os.path.isfile(path) and context.host.allow_missing_packages:
+            context.host.warn(parameter_file_missing(path))
+            continue
         if not os.path.isfile(path):
             raise AssertionError(f"the file of set_parameters_from_file does not exist: {path}")
         yield "--params-file", path

@@ -1,0 +1,42 @@
+"""``--explain SUBJECT``: all that a plan can say of an enclave, node, process, component, topic or service."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
+from enclave_launch.policy.explanation import explain
+from enclave_launch.report.unknown import UNKNOWN, is_unknown, label, unknown_by_enclave
+
+
+def explained(plan: LaunchPlan, subject: str) -> list[str]:
+    """Lines; empty when ``subject`` is nothing of this launch. Processes go by the names that the tree prints."""
+    lines = explain(plan.derived, subject)
+    path = subject if subject.startswith("/") else f"/{subject}"
+    lines += [line for item in unknown_by_enclave(plan).get(path, ()) for line in _unknown(item)]
+    planned: list[PlannedProcess | PlannedComponent] = [*plan.processes, *plan.components]
+    for item in planned:
+        if subject.strip("[]") == label(item) or (is_unknown(item) and path == item.fqn):
+            lines += _of_process(plan, item)
+    return lines
+
+
+def _of_process(plan: LaunchPlan, item: PlannedProcess | PlannedComponent) -> Iterator[str]:
+    if isinstance(item, PlannedProcess):
+        enclave = item.enclave
+        why = f"in enclave {enclave.path} ({enclave.reason.value})" if enclave else "without an enclave"
+        yield f"process {label(item)} {why}"
+    if is_unknown(item):
+        yield from _unknown(item)
+    for fqn in dict.fromkeys(node.fqn for node in item.nodes):
+        if fqn != label(item):
+            yield from explain(plan.derived, fqn)
+
+
+def _unknown(item: PlannedProcess | PlannedComponent) -> Iterator[str]:
+    why = (
+        f"no NoDL manifest for {item.missing.subject}: {item.missing.why}"
+        if item.missing
+        else "it is no node"
+    )
+    yield f"{label(item)}: {UNKNOWN}: {why}"

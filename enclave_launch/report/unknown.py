@@ -1,0 +1,41 @@
+"""What a plan does not know: processes and components without interfaces, by enclave. Only reads."""
+
+from __future__ import annotations
+
+from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
+from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
+
+UNKNOWN = "permissions unknown"
+
+
+def unknown_by_enclave(plan: LaunchPlan) -> dict[str, list[PlannedProcess | PlannedComponent]]:
+    """Of each enclave, in launch order, those of which nothing says what they do. An ``executable`` counts among
+    them unless a policy file speaks for its enclave."""
+    answered = {enclave.path for enclave in plan.derived.policy.enclaves if enclave.profiles}
+    unknown: dict[str, list[PlannedProcess | PlannedComponent]] = {}
+    for process in plan.processes:
+        if (
+            process.enclave
+            and is_unknown(process)
+            and (process.missing or process.enclave.path not in answered)
+        ):
+            unknown.setdefault(process.enclave.path, []).append(process)
+    for component in plan.components:
+        if component.enclave and is_unknown(component):
+            unknown.setdefault(component.enclave, []).append(component)
+    return unknown
+
+
+def is_unknown(item: PlannedProcess | PlannedComponent) -> bool:
+    return not item.nodes
+
+
+def label(item: PlannedProcess | PlannedComponent) -> str:
+    """As the tree names it."""
+    return item.process.process_name if isinstance(item, PlannedProcess) else item.fqn
+
+
+def shown_fqn(item: PlannedProcess) -> str:
+    """Its nodes, or what launch knows of the name: without a placeholder for a namespace that nobody gave."""
+    names = " ".join(dict.fromkeys(node.fqn for node in item.nodes))
+    return names or (item.fqn or "").replace(UNSPECIFIED_NODE_NAMESPACE, "")
