@@ -24,6 +24,7 @@ PACKAGE_DATA = {
 ENTRY_POINTS = {
     "console_scripts": [
         "secure-launch = enclave_launch.verb.secure_launch:main",
+        "secure-plan = enclave_launch.verb.secure_plan:main",
         "secure-keystore = keystore.verb:main",
         "secure-nodl = nodl.verb:main",
     ],

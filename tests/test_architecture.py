@@ -31,6 +31,7 @@ FLOORS = (
     {"plan"},
     {"options", "prefixes", "security_environment", "served_domains"},
     {"interfaces"},
+    {"review"},
     {"report", "runtime"},
     {"recording", "secured"},
     {"running"},

@@ -53,7 +53,7 @@ class Reason(NamedTuple):
     """Why a permission is there. ``place``: file:line of the manifest, source or policy, or a table row.
 
     ``written`` is the name as found there; ``rules`` the remap rules that changed it; ``note`` what else
-    a reader should know.
+    a reader should know; ``type`` the interface's, empty where it is not known.
     """
 
     node: str
@@ -62,6 +62,7 @@ class Reason(NamedTuple):
     written: str
     rules: tuple[ParsedRule, ...] = ()
     note: str = ""
+    type: str = ""
 
 
 class Permission(NamedTuple):
@@ -144,7 +145,7 @@ class _Collector:
             self._result.warnings.append(name_unremappable(self._fqn, template.text, where))
         try:
             for final_operation, resolved in self._resolve(operation, template.text, place):
-                reason = Reason(self._fqn, "declared", place, written, resolved.rules, note)
+                reason = Reason(self._fqn, "declared", place, written, resolved.rules, note, endpoint.type)
                 self._result.permissions.append(Permission(final_operation, resolved.name, reason))
                 if endpoint.introspected:
                     self._introspection(final_operation, resolved.name, reason)
@@ -225,7 +226,7 @@ class _Collector:
         note = (
             f"a pattern, because {why or 'only a part of the name is known'}; accepted by --accept-patterns"
         )
-        reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note)
+        reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note, endpoint.type)
         self._result.permissions.append(Permission(operation, name, reason))
         self._result.warnings.append(
             pattern_accepted(self._fqn, operation.value, name, note, SourceLocation.read(place))

@@ -94,6 +94,33 @@ class Enclave(_Strict, frozen=True):
     serve_actions: list[str]
 
 
+Operation = Literal[
+    "publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"
+]
+
+
+class Interface(_Strict, frozen=True):
+    """One permission of a node, with its reason."""
+
+    operation: Operation
+    name: str = Field(description="final; wildcards where a description or an option asks for them")
+    type: str = Field(description="empty when not known")
+    built_in: bool = Field(description="every node has it; no description asks for it")
+    place: str = Field(description="file:line of the description, or the row of the table")
+    written: str = Field(description="the name as found there")
+    remapped_by: list[str]
+    note: str
+
+
+class Node(_Strict, frozen=True):
+    """One node under its final name."""
+
+    fqn: str
+    enclave: str
+    program: str = Field(description="package/executable or package/plugin")
+    interfaces: list[Interface]
+
+
 class Diagnostic(_Strict, frozen=True):
     """One thing a person should know; ``code`` is stable (``enclave_launch.diagnostics.Code``)."""
 
@@ -113,5 +140,6 @@ class DryRun(_Strict, frozen=True):
     processes: list[Process]
     components: list[Component]
     enclaves: dict[str, Enclave]
-    warnings: list[str] = Field(..., description="every diagnostic as one message for a person, errors first")
+    nodes: list[Node]
+    warnings: list[str] = Field(description="every diagnostic as one message for a person, errors first")
     diagnostics: list[Diagnostic]

@@ -8,11 +8,12 @@ from enclave_launch.boundary.terminal import json_text
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
+from enclave_launch.policy.node_permissions import Reason
 from enclave_launch.process import RemapRule
 from enclave_launch.report.unknown import label, unknown_by_enclave
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
-from keystore.formats.policy import EnclavePolicy, Qualifier
+from keystore.formats.policy import EnclavePolicy, Qualifier, Rule
 
 VERSION = 1
 
@@ -24,6 +25,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
         "processes": [_process(item, security) for item in plan.processes],
         "components": [_component(item) for item in plan.components],
         "enclaves": _enclaves(plan),
+        "nodes": _nodes(plan),
         "warnings": [str(told) for told in (*plan.problems, *plan.warnings)],
         "diagnostics": [
             *(_diagnostic(problem, "error") for problem in plan.problems),
@@ -101,6 +103,42 @@ def _enclaves(plan: LaunchPlan) -> dict[str, dict[str, list[str]]]:
             **allowed_names(enclave),
         }
         for enclave in plan.derived.policy.enclaves
+    }
+
+
+def _nodes(plan: LaunchPlan) -> list[dict[str, object]]:
+    """Every node with what it asks for and what it has as every node, sorted by name."""
+    programs = {
+        (
+            node.enclave,
+            node.fqn,
+        ): f"{node.interface.package}/{node.interface.executable or node.interface.plugin}"
+        for node in plan.nodes
+    }
+    found: dict[tuple[str, str], list[dict[str, object]]] = {key: [] for key in programs}
+    for enclave, reasons in plan.derived.reasons.items():
+        for rule, why in reasons.items():
+            for reason in why:
+                if rule.qualifier is Qualifier.ALLOW and (enclave, reason.node) in found:
+                    found[enclave, reason.node].append(_interface(rule, reason))
+    return [
+        {"fqn": fqn, "enclave": enclave, "program": programs[enclave, fqn], "interfaces": interfaces}
+        for (enclave, fqn), interfaces in sorted(found.items(), key=lambda item: (item[0][1], item[0][0]))
+    ]
+
+
+def _interface(rule: Rule, reason: Reason) -> dict[str, object]:
+    return {
+        "operation": LIST_NAMES[rule.operation],
+        "name": rule.expression,
+        "type": reason.type,
+        "built_in": reason.origin == "built-in",
+        "place": reason.place,
+        "written": reason.written,
+        "remapped_by": [
+            f"{each.text} at {each.origin}" if each.origin else each.text for each in reason.rules
+        ],
+        "note": reason.note,
     }
 
 

@@ -45,7 +45,7 @@ def build_parser() -> argparse.ArgumentParser:
     add_security_options(parser.add_argument_group("security"))
     add_policy_options(parser.add_argument_group("what each node may do"))
     _add_inspection(parser.add_argument_group("looking without starting"))
-    _add_evaluation(parser.add_argument_group("evaluating the launch file"))
+    add_evaluation_options(parser.add_argument_group("evaluating the launch file"))
     _add_running(parser.add_argument_group("running"))
     _add_recording(parser.add_argument_group("recording what nodes ask for"))
     return parser
@@ -191,7 +191,7 @@ def _add_inspection(group: argparse._ArgumentGroup) -> None:
     )
 
 
-def _add_evaluation(group: argparse._ArgumentGroup) -> None:
+def add_evaluation_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--prefix",
         metavar="DIR",

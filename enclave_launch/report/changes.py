@@ -1,0 +1,68 @@
+"""What differs between two plans, as text for a terminal, as Markdown for a pull request and as plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from enclave_launch.review.changes import Changes, EnclaveChange
+
+_NONE = "no enclave, node, permission or flow differs"
+
+
+def changes_text(changed: Changes) -> str:
+    """Lines with ``+`` and ``-``, as of a diff; ends with a newline."""
+    return "\n".join([*_lines(changed)] or [_NONE]) + "\n"
+
+
+def changes_markdown(changed: Changes) -> str:
+    """For the description or a comment of a pull request."""
+    verdict = "**Rights grew.**" if changed.rights_grew else "No enclave may do more than before."
+    if changed.is_empty:
+        return f"### Security review\n\n{_NONE.capitalize()}.\n"
+    body = "\n".join(_lines(changed))
+    return f"### Security review\n\n{verdict}\n\n```diff\n{body}\n```\n"
+
+
+def changes_document(changed: Changes) -> dict[str, object]:
+    """For programs; every list sorted."""
+    return {
+        "version": 1,
+        "rights_grew": changed.rights_grew,
+        "enclaves": [
+            {
+                "enclave": change.enclave,
+                "new": change.is_new,
+                "gone": change.is_gone,
+                "added": [grant._asdict() for grant in change.added],
+                "removed": [grant._asdict() for grant in change.removed],
+            }
+            for change in changed.enclaves
+        ],
+        "nodes_added": list(changed.nodes_added),
+        "nodes_removed": list(changed.nodes_removed),
+        "moved": [move._asdict() for move in changed.moved],
+        "flows_added": [list(flow) for flow in changed.flows_added],
+        "flows_removed": [list(flow) for flow in changed.flows_removed],
+    }
+
+
+def _lines(changed: Changes) -> Iterator[str]:
+    yield from (f"+ node {node}" for node in changed.nodes_added)
+    yield from (f"- node {node}" for node in changed.nodes_removed)
+    yield from (
+        f"! node {move.node} moves from enclave {move.before} to {move.after}" for move in changed.moved
+    )
+    for change in changed.enclaves:
+        yield from _enclave(change)
+    yield from (f"+ flow {source} -> {target}" for source, target in changed.flows_added)
+    yield from (f"- flow {source} -> {target}" for source, target in changed.flows_removed)
+
+
+def _enclave(change: EnclaveChange) -> Iterator[str]:
+    sign = "+" if change.is_new else "-" if change.is_gone else " "
+    yield f"{sign} enclave {change.enclave}"
+    for mark, grants in (("+", change.added), ("-", change.removed)):
+        yield from (f"{mark}   {grant}" for grant in grants if grant not in change.built_in)
+        hidden = sum(grant in change.built_in for grant in grants)
+        if hidden:
+            yield f"{mark}   and {hidden} that every node has"

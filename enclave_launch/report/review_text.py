@@ -1,0 +1,83 @@
+"""Plans, findings and suggestions of a review as text for a terminal, and as plain values."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from enclave_launch.review.document import OPERATIONS, Grant, PlanDocument, Told
+from enclave_launch.review.similarity import Merge, Split
+
+Judged = Sequence[tuple[Told, "str | None"]]
+
+
+def plan_text(plan: PlanDocument) -> str:
+    """Each enclave with its nodes and what they ask for; what every node has is counted."""
+    return "\n".join(line for path in sorted(plan.enclaves) for line in _enclave(plan, path)) + "\n"
+
+
+def _enclave(plan: PlanDocument, path: str) -> Iterator[str]:
+    nodes = plan.nodes_of(path)
+    asked = frozenset[Grant]().union(*(node.own for node in nodes))
+    shown = asked if nodes else plan.enclaves[path]
+    yield f"enclave {path}"
+    yield from (f"  node {node.fqn}  ({node.program})" for node in nodes)
+    for operation in OPERATIONS:
+        names = sorted(grant.name for grant in shown if grant.operation == operation)
+        if names:
+            yield f"  {operation.replace('_', ' ')}: {' '.join(names)}"
+    hidden = len(plan.enclaves[path] - shown)
+    if hidden:
+        yield f"  and {hidden} that every node has"
+
+
+def findings_text(judged: Judged) -> str:
+    """One paragraph each, open ones first, and a last line that counts them."""
+    lines: list[str] = []
+    for told, accepted in sorted(judged, key=lambda item: (item[1] is not None, item[0].severity)):
+        place = f"{told.file}:{told.line}: " if told.file else ""
+        head = f"accepted ({accepted})" if accepted is not None else told.severity
+        lines.append(f"{head}: {place}{told.text} [{told.code}]")
+        if told.remedy and accepted is None:
+            lines.append(f"  {told.remedy}")
+    open_ones = [told for told, accepted in judged if accepted is None]
+    errors = sum(told.severity == "error" for told in open_ones)
+    accepted_ones = f", {len(judged) - len(open_ones)} accepted" if len(judged) > len(open_ones) else ""
+    lines.append(f"{_count(errors, 'error')}, {_count(len(open_ones) - errors, 'warning')}{accepted_ones}")
+    return "\n".join(lines) + "\n"
+
+
+def findings_document(judged: Judged) -> dict[str, object]:
+    return {
+        "version": 1,
+        "findings": [{**told._asdict(), "accepted": accepted} for told, accepted in judged],
+    }
+
+
+def suggestions_text(merges: Sequence[Merge], splits: Sequence[Split]) -> str:
+    lines = [line for merge in merges for line in _merge(merge)]
+    lines += [line for split in splits for line in _split(split)]
+    return (
+        "\n".join(lines or ["no two enclaves are alike, and no enclave holds more than its nodes ask for"])
+        + "\n"
+    )
+
+
+def _merge(merge: Merge) -> Iterator[str]:
+    yield (
+        f"merge {merge.one} and {merge.two}: {merge.similarity:.0%} alike, "
+        f"costs {_count(merge.cost, 'permission')} in excess"
+    )
+    yield from (f"  {enclave} would gain: {_names(gained)}" for enclave, gained in merge.excess)
+
+
+def _split(split: Split) -> Iterator[str]:
+    yield f"split {split.enclave}: saves {_count(split.gain, 'permission')}"
+    yield from (f"  {node} would lose: {_names(saved)}" for node, saved in split.saved)
+
+
+def _names(grants: Sequence[Grant]) -> str:
+    return ", ".join(map(str, grants))
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,8 @@
+"""Questions that a reviewer asks of a plan, answered without running anything. Pure: values in, values out.
+
+document.py           a plan, fresh or read back from the dry run's JSON, as what a review needs of it
+changes.py            two plans -> what was added, removed and moved, and whether rights grew
+information_flow.py   a plan -> which enclave can influence which, over any number of hops
+similarity.py         a plan -> enclaves worth merging or splitting, with what that costs
+expectations.py       rules that a repository keeps ("the camera never reaches /cmd_vel") and accepted findings
+"""

@@ -1,0 +1,99 @@
+"""What differs between two plans, and whether anybody may do more than before. Pure.
+
+Read as a review reads it: enclaves and nodes that came and went, nodes that moved to another enclave, permissions of
+each enclave that were added and removed, and the flows between enclaves that this opens or closes.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from enclave_launch.review.document import Grant, PlanDocument
+from enclave_launch.review.information_flow import FlowGraph, flow_graph
+
+
+class EnclaveChange(NamedTuple):
+    """``added`` and ``removed`` are sorted; ``built_in``: those among them that every node has and nobody asks for.
+
+    ``is_new`` and ``is_gone``: the enclave as a whole.
+    """
+
+    enclave: str
+    added: tuple[Grant, ...]
+    removed: tuple[Grant, ...]
+    built_in: frozenset[Grant]
+    is_new: bool = False
+    is_gone: bool = False
+
+
+class Move(NamedTuple):
+    """A node that runs in another enclave than before."""
+
+    node: str
+    before: str
+    after: str
+
+
+class Changes(NamedTuple):
+    """Everything sorted. ``flows_*``: pairs of enclaves of which the first can influence the second directly."""
+
+    enclaves: tuple[EnclaveChange, ...]
+    nodes_added: tuple[str, ...]
+    nodes_removed: tuple[str, ...]
+    moved: tuple[Move, ...]
+    flows_added: tuple[tuple[str, str], ...]
+    flows_removed: tuple[tuple[str, str], ...]
+
+    @property
+    def rights_grew(self) -> bool:
+        """Some enclave may do something that it could not do before; a new enclave is all new rights."""
+        return any(change.added for change in self.enclaves)
+
+    @property
+    def is_empty(self) -> bool:
+        return not any(self)
+
+
+def changes(before: PlanDocument, after: PlanDocument) -> Changes:
+    homes_before = {node.fqn: node.enclave for node in before.nodes}
+    homes_after = {node.fqn: node.enclave for node in after.nodes}
+    edges_before, edges_after = _edges(flow_graph(before)), _edges(flow_graph(after))
+    return Changes(
+        tuple(_enclave_changes(before, after)),
+        tuple(sorted(homes_after.keys() - homes_before.keys())),
+        tuple(sorted(homes_before.keys() - homes_after.keys())),
+        tuple(
+            Move(node, homes_before[node], homes_after[node])
+            for node in sorted(homes_before.keys() & homes_after.keys())
+            if homes_before[node] != homes_after[node]
+        ),
+        tuple(sorted(edges_after - edges_before)),
+        tuple(sorted(edges_before - edges_after)),
+    )
+
+
+def _enclave_changes(before: PlanDocument, after: PlanDocument) -> list[EnclaveChange]:
+    found = []
+    for path in sorted(before.enclaves.keys() | after.enclaves.keys()):
+        old, new = before.enclaves.get(path), after.enclaves.get(path)
+        change = EnclaveChange(
+            path,
+            tuple(sorted((new or frozenset()) - (old or frozenset()))),
+            tuple(sorted((old or frozenset()) - (new or frozenset()))),
+            _built_in(before, path) | _built_in(after, path),
+            is_new=old is None,
+            is_gone=new is None,
+        )
+        if change.added or change.removed or change.is_new or change.is_gone:
+            found.append(change)
+    return found
+
+
+def _built_in(plan: PlanDocument, enclave: str) -> frozenset[Grant]:
+    nodes = plan.nodes_of(enclave)
+    own, everywhere = frozenset[Grant](), frozenset[Grant]()
+    return everywhere.union(*(node.built_in for node in nodes)) - own.union(*(node.own for node in nodes))
+
+
+def _edges(graph: FlowGraph) -> set[tuple[str, str]]:
+    return {(source, target) for source, hops in graph.items() for target in hops}

@@ -1,0 +1,101 @@
+"""A plan as a review sees it: enclaves with their permissions, nodes with theirs, and what was told.
+
+Made from the dry run's JSON, so that a plan that was saved (or comes from another machine or revision) and one that was
+just resolved are the same thing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Literal, NamedTuple
+
+Operation = Literal[
+    "publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"
+]
+OPERATIONS: tuple[Operation, ...] = (
+    "publish",
+    "subscribe",
+    "call_services",
+    "serve_services",
+    "call_actions",
+    "serve_actions",
+)
+
+
+class Grant(NamedTuple):
+    """One permission: an operation on a final name, which may hold wildcards."""
+
+    operation: Operation
+    name: str
+
+    def __str__(self) -> str:
+        return f"{self.operation.replace('_', ' ')} {self.name}"
+
+
+class NodeView(NamedTuple):
+    """One node under its final name. ``own``: what it asks for itself; ``built_in``: what every node has."""
+
+    fqn: str
+    enclave: str
+    program: str
+    own: frozenset[Grant]
+    built_in: frozenset[Grant]
+
+    @property
+    def grants(self) -> frozenset[Grant]:
+        return self.own | self.built_in
+
+
+class Told(NamedTuple):
+    """A problem or warning of the plan."""
+
+    severity: Literal["error", "warning"]
+    code: str
+    subject: str
+    file: str | None
+    line: int
+    text: str
+    remedy: str
+
+
+class PlanDocument(NamedTuple):
+    """``enclaves``: path -> all that DDS lets it do, the union of its nodes."""
+
+    enclaves: Mapping[str, frozenset[Grant]]
+    nodes: tuple[NodeView, ...]
+    told: tuple[Told, ...]
+
+    def nodes_of(self, enclave: str) -> tuple[NodeView, ...]:
+        return tuple(node for node in self.nodes if node.enclave == enclave)
+
+
+def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
+    """Of a document that ``report.contract.DryRun`` accepts."""
+    return PlanDocument(
+        {path: grants_of(lists) for path, lists in document["enclaves"].items()},
+        tuple(_node(node) for node in document.get("nodes", ())),
+        tuple(Told(**told) for told in document.get("diagnostics", ())),
+    )
+
+
+def grants_of(lists: Mapping[str, Sequence[str]]) -> frozenset[Grant]:
+    """Of the contract's six lists of names; what else the mapping holds is left alone."""
+    return frozenset(Grant(operation, name) for operation in OPERATIONS for name in lists.get(operation, ()))
+
+
+def _node(node: Mapping[str, Any]) -> NodeView:
+    return NodeView(
+        node["fqn"],
+        node["enclave"],
+        node["program"],
+        _grants(node["interfaces"], built_in=False),
+        _grants(node["interfaces"], built_in=True),
+    )
+
+
+def _grants(interfaces: Iterable[Mapping[str, Any]], *, built_in: bool) -> frozenset[Grant]:
+    return frozenset(
+        Grant(interface["operation"], interface["name"])
+        for interface in interfaces
+        if interface["built_in"] is built_in
+    )

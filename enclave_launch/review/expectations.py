@@ -1,0 +1,179 @@
+"""What a repository expects of its plans: flows that must never be, and findings that somebody accepted. Pure.
+
+A file ``enclaves.review.yaml`` beside the launch files, under version control:
+
+    never:
+      - from: /camera          # an enclave or a node; wildcards as in permissions
+        to: /base              # the same, or a topic, service or action: whoever may receive on it
+        why: images come from a vendor's binary
+    accept:
+      - code: name-unremappable
+        subject: /camera*      # optional: what it is about
+        why: the driver writes the double underscore
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from fnmatch import fnmatchcase
+from typing import Any, NamedTuple
+
+from enclave_launch.errors import UsageError
+from enclave_launch.review.document import Grant, PlanDocument, Told, plan_from_document
+from enclave_launch.review.information_flow import Step, flow_graph, shortest_paths
+
+_TAKES: Mapping[str, bool] = {"subscribe": True, "serve_services": True, "serve_actions": True}
+
+
+class Never(NamedTuple):
+    """No influence from ``source`` to ``target``, over any number of enclaves."""
+
+    source: str
+    target: str
+    why: str
+
+
+class Accepted(NamedTuple):
+    code: str
+    subject: str
+    why: str
+
+    def covers(self, told: Told) -> bool:
+        return told.code == self.code and fnmatchcase(told.subject, self.subject)
+
+
+class Expectations(NamedTuple):
+    never: tuple[Never, ...] = ()
+    accept: tuple[Accepted, ...] = ()
+
+    def reason_to_accept(self, told: Told) -> str | None:
+        """Why somebody accepted ``told``; ``None`` when nobody did."""
+        return next((accepted.why for accepted in self.accept if accepted.covers(told)), None)
+
+
+class Broken(NamedTuple):
+    """A rule that the plan breaks: the shortest way on which it does. Without steps both ends are one enclave."""
+
+    rule: Never
+    source: str
+    target: str
+    steps: tuple[Step, ...]
+
+
+def read_expectations(content: Any, place: str) -> Expectations:
+    """Of a parsed YAML document. Raises ``UsageError`` for anything that is not as the module head says."""
+    if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
+        raise UsageError(f"{place}: expected a mapping with 'never' and 'accept'")
+    return Expectations(
+        tuple(
+            Never(*_texts(item, ("from", "to"), ("why",), f"{place}: never"))
+            for item in _items(content, "never", place)
+        ),
+        tuple(
+            _accepted(*_texts(item, ("code", "why"), ("subject",), f"{place}: accept"))
+            for item in _items(content, "accept", place)
+        ),
+    )
+
+
+def rule_findings(document: Mapping[str, Any], rules: Iterable[Never]) -> list[Told]:
+    """A forbidden flow is an error, a rule that names nothing in this plan a warning."""
+    broken, idle = broken_rules(plan_from_document(document), rules)
+    forbidden = [
+        Told(
+            "error",
+            "flow-forbidden",
+            found.source,
+            None,
+            0,
+            _told(found),
+            "remove one of these steps, or the rule",
+        )
+        for found in broken
+    ]
+    unknown = "correct its names, or remove it"
+    return forbidden + [
+        Told(
+            "warning",
+            "rule-idle",
+            rule.source,
+            None,
+            0,
+            f"no {rule.source} or no {rule.target} in this plan",
+            unknown,
+        )
+        for rule in idle
+    ]
+
+
+def _nothing(rule: Never) -> str:
+    return f"this plan has no {rule.source}, or nothing that receives on {rule.target}"
+
+
+def _told(found: Broken) -> str:
+    rule = found.rule
+    ways = "; ".join(f"{step.source} -> {step.target} by {step.hops[0]}" for step in found.steps)
+    how = ways or f"both are in enclave {found.source}"
+    return f"{rule.source} must never reach {rule.target}{f' ({rule.why})' if rule.why else ''}: {how}"
+
+
+def broken_rules(plan: PlanDocument, rules: Iterable[Never]) -> tuple[list[Broken], list[Never]]:
+    """Rules that the plan breaks, each with one shortest way, and rules that name nothing in the plan."""
+    graph = flow_graph(plan)
+    broken, idle = [], []
+    for rule in rules:
+        sources, targets = _enclaves_named(plan, rule.source), _enclaves_receiving(plan, rule.target)
+        if not sources or not targets:
+            idle.append(rule)
+            continue
+        ways = [_way(graph, source, target) for source in sources for target in targets]
+        shortest = min(
+            (way for way in ways if way is not None), key=lambda way: (len(way[2]), way), default=None
+        )
+        if shortest is not None:
+            broken.append(Broken(rule, *shortest))
+    return broken, idle
+
+
+def _way(graph: Any, source: str, target: str) -> tuple[str, str, tuple[Step, ...]] | None:
+    if source == target:
+        return source, target, ()
+    paths = shortest_paths(graph, source, target)
+    return (source, target, paths[0]) if paths else None
+
+
+def _enclaves_named(plan: PlanDocument, pattern: str) -> list[str]:
+    of_nodes = {node.enclave for node in plan.nodes if fnmatchcase(node.fqn, pattern)}
+    return sorted(of_nodes | {path for path in plan.enclaves if fnmatchcase(path, pattern)})
+
+
+def _enclaves_receiving(plan: PlanDocument, pattern: str) -> list[str]:
+    named = _enclaves_named(plan, pattern)
+    return named or sorted(
+        path for path, grants in plan.enclaves.items() if any(_receives(grant, pattern) for grant in grants)
+    )
+
+
+def _receives(grant: Grant, pattern: str) -> bool:
+    return grant.operation in _TAKES and fnmatchcase(grant.name, pattern)
+
+
+def _items(content: Mapping[str, Any], key: str, place: str) -> list[Any]:
+    items = content.get(key) or []
+    if not isinstance(items, list):
+        raise UsageError(f"{place}: '{key}' must be a list")
+    return items
+
+
+def _texts(item: Any, needed: tuple[str, ...], optional: tuple[str, ...], place: str) -> list[str]:
+    if not isinstance(item, Mapping) or item.keys() - {*needed, *optional} or not item.keys() >= set(needed):
+        also = f", and may have {', '.join(optional)}" if optional else ""
+        raise UsageError(f"{place}: each entry needs {', '.join(needed)}{also}; this one is {item!r}")
+    values = [item.get(key, "") for key in (*needed, *optional)]
+    if not all(isinstance(value, str) for value in values):
+        raise UsageError(f"{place}: texts expected in {item!r}")
+    return values
+
+
+def _accepted(code: str, why: str, subject: str) -> Accepted:
+    return Accepted(code, subject or "*", why)

@@ -1,0 +1,185 @@
+"""Which enclave can influence which, directly and over others. Pure.
+
+The question of the design article "ROS 2 Security Enclaves" and of the paper's future work: a permission says what one
+participant may do, but a message that it reads can change what it writes. So influence is transitive: whoever publishes
+what another subscribes, calls what it serves, or serves what it calls (the answer flows back), reaches it and all that
+it reaches. Every enclave is taken to let everything through; that errs on the side of flows that do not happen.
+
+What every node has (parameter services, /rosout, /clock ...) counts only where asked for: almost everybody may publish
+/parameter_events, which would connect all with all.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable, Iterator, Mapping
+from itertools import pairwise
+from typing import NamedTuple
+
+from enclave_launch.review.document import Grant, Operation, PlanDocument
+from keystore.formats.permissions_patterns import can_meet
+from nodl.remap import ACTION_SERVICES, ACTION_TOPICS
+
+# Of two enclaves, the first does this and the second that: what flows from the first to the second. The answers of a
+# server flow back.
+_MEETS: Mapping[Operation, Operation] = {
+    "publish": "subscribe",
+    "call_services": "serve_services",
+    "serve_services": "call_services",
+}
+# What an action consists of (design article "Actions"), by what its client and its server do with it.
+_PARTS_OF_ACTIONS: Mapping[Operation, tuple[Operation, Operation]] = {
+    "call_actions": ("call_services", "subscribe"),
+    "serve_actions": ("serve_services", "publish"),
+}
+
+
+class Hop(NamedTuple):
+    """One way from an enclave to another: what the first does, on which name of its own permissions."""
+
+    operation: Operation
+    name: str
+
+    def __str__(self) -> str:
+        verb, _, kind = self.operation.partition("_")
+        what = f"{kind.removesuffix('s') or 'topic'} {self.name}"
+        return f"answers of {what}" if verb == "serve" else what
+
+
+class Step(NamedTuple):
+    source: str
+    target: str
+    hops: tuple[Hop, ...]
+
+
+FlowGraph = Mapping[str, Mapping[str, tuple[Hop, ...]]]
+"""Source enclave -> target enclave -> the ways from one to the other, sorted; no enclave flows to itself."""
+
+
+def flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
+    """Between the enclaves of ``plan``; every enclave is a key. ``built_in``: count what every node has, too."""
+    grants = {path: _flowing(plan, path, built_in) for path in sorted(plan.enclaves)}
+    return _graph(grants)
+
+
+def node_flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
+    """Between nodes, by what each asks for itself: the flows that there would be with an enclave for each node."""
+    return _graph({node.fqn: node.grants if built_in else node.own for node in plan.nodes})
+
+
+def shortest_paths(graph: FlowGraph, source: str, target: str) -> list[tuple[Step, ...]]:
+    """All shortest ways from ``source`` to ``target``, sorted; empty when there is none."""
+    distances = _distances(graph, source)
+    if target not in distances or source == target:
+        return []
+    return [
+        tuple(Step(one, two, graph[one][two]) for one, two in pairwise(path))
+        for path in _paths_back(graph, distances, target)
+    ]
+
+
+def reached_from(graph: FlowGraph, source: str) -> frozenset[str]:
+    """All that ``source`` can influence, itself left out."""
+    return frozenset(_distances(graph, source)) - {source}
+
+
+def opened_by_sharing(plan: PlanDocument) -> list[tuple[str, str, str]]:
+    """Flows that exist only because nodes share an enclave: (enclave, node that is influenced, node that then is).
+
+    In an enclave of its own the first node could not pass anything on to the second.
+    """
+    nodes = node_flow_graph(plan)
+    opened = []
+    for enclave in sorted(plan.enclaves):
+        together = sorted({node.fqn for node in plan.nodes_of(enclave)})
+        reach = {node: reached_from(nodes, node) for node in together}
+        opened += [
+            (enclave, one, two)
+            for one in together
+            for two in together
+            if one != two and two not in reach[one]
+        ]
+    return opened
+
+
+def _flowing(plan: PlanDocument, enclave: str, built_in: bool) -> frozenset[Grant]:
+    if built_in:
+        return plan.enclaves[enclave]
+    nodes = plan.nodes_of(enclave)
+    everywhere = frozenset[Grant]().union(*(node.built_in for node in nodes)) - frozenset[Grant]().union(
+        *(node.own for node in nodes)
+    )
+    return plan.enclaves[enclave] - everywhere
+
+
+def _graph(grants: Mapping[str, Iterable[Grant]]) -> FlowGraph:
+    parts = {holder: [part for grant in own for part in _parts(grant)] for holder, own in grants.items()}
+    takers = _Takers({holder: [part for part, _ in own] for holder, own in parts.items()})
+    graph: dict[str, dict[str, tuple[Hop, ...]]] = {}
+    for source, own in parts.items():
+        hops: dict[str, set[Hop]] = {}
+        for part, grant in own:
+            if part.operation in _MEETS:
+                for target in takers.of(Grant(_MEETS[part.operation], part.name)):
+                    hops.setdefault(target, set()).add(Hop(*grant))
+        graph[source] = {
+            target: tuple(sorted(ways)) for target, ways in sorted(hops.items()) if target != source
+        }
+    return graph
+
+
+def _parts(grant: Grant) -> list[tuple[Grant, Grant]]:
+    """What ``grant`` is made of, each part with ``grant`` itself: topics and services stand for themselves."""
+    if grant.operation not in _PARTS_OF_ACTIONS:
+        return [(grant, grant)]
+    service, topic = _PARTS_OF_ACTIONS[grant.operation]
+    return [
+        *((Grant(service, f"{grant.name}/_action/{part}"), grant) for part in ACTION_SERVICES),
+        *((Grant(topic, f"{grant.name}/_action/{part}"), grant) for part in ACTION_TOPICS),
+    ]
+
+
+class _Takers:
+    """Who holds a grant that meets another: a look-up, and a comparison only where wildcards are."""
+
+    def __init__(self, grants: Mapping[str, Iterable[Grant]]) -> None:
+        self._holders: dict[Grant, set[str]] = {}
+        for holder, own in grants.items():
+            for grant in own:
+                self._holders.setdefault(grant, set()).add(holder)
+        self._patterns = [grant for grant in self._holders if _is_pattern(grant.name)]
+
+    def of(self, wanted: Grant) -> set[str]:
+        candidates = self._holders if _is_pattern(wanted.name) else self._patterns
+        met = [
+            grant
+            for grant in candidates
+            if grant.operation == wanted.operation and can_meet(grant.name, wanted.name)
+        ]
+        return self._holders.get(wanted, set()).union(*(self._holders[grant] for grant in met))
+
+
+def _is_pattern(name: str) -> bool:
+    return any(character in name for character in "*?[")
+
+
+def _distances(graph: FlowGraph, source: str) -> dict[str, int]:
+    distances = {source: 0}
+    waiting = deque([source])
+    while waiting:
+        here = waiting.popleft()
+        for there in graph.get(here, {}):
+            if there not in distances:
+                distances[there] = distances[here] + 1
+                waiting.append(there)
+    return distances
+
+
+def _paths_back(graph: FlowGraph, distances: Mapping[str, int], target: str) -> Iterator[list[str]]:
+    if distances[target] == 0:
+        yield [target]
+        return
+    for before in sorted(graph):
+        if target in graph[before] and distances.get(before) == distances[target] - 1:
+            for path in _paths_back(graph, distances, before):
+                yield [*path, target]

@@ -1,0 +1,80 @@
+"""Enclaves that could be one, and enclaves that should be several: the paper's question of similar policies. Pure.
+
+One enclave less is one key, one certificate and one signed document less to renew; the price is that each process in it
+may then do what the others may (the excess). The same number, the other way round, is what a split saves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import combinations
+from typing import NamedTuple
+
+from enclave_launch.review.document import Grant, PlanDocument
+
+
+class Merge(NamedTuple):
+    """``similarity``: permissions that both have over those that either has, 0 to 1. ``excess``: what each gains."""
+
+    one: str
+    two: str
+    similarity: float
+    excess: tuple[tuple[str, tuple[Grant, ...]], ...]
+
+    @property
+    def cost(self) -> int:
+        return sum(len(gained) for _, gained in self.excess)
+
+
+class Split(NamedTuple):
+    """``saved``: for each node of the enclave what it may do today and does not ask for."""
+
+    enclave: str
+    saved: tuple[tuple[str, tuple[Grant, ...]], ...]
+
+    @property
+    def gain(self) -> int:
+        return sum(len(grants) for _, grants in self.saved)
+
+
+def merges(plan: PlanDocument, *, least_similarity: float = 0.5) -> list[Merge]:
+    """Pairs of enclaves that are alike, cheapest first. What every node has is left out of the comparison."""
+    own = {path: _asked_for(plan, path) for path in plan.enclaves}
+    found = [
+        Merge(one, two, _similarity(own[one], own[two]), _excess(own, one, two))
+        for one, two in combinations(sorted(own), 2)
+        if own[one] and own[two]
+    ]
+    alike = [merge for merge in found if merge.similarity >= least_similarity]
+    return sorted(alike, key=lambda merge: (merge.cost, -merge.similarity, merge.one, merge.two))
+
+
+def splits(plan: PlanDocument) -> list[Split]:
+    """Enclaves in which nodes may do what only others ask for, those that save most first."""
+    found = []
+    for path in plan.enclaves:
+        asked = _asked_for(plan, path)
+        nodes = plan.nodes_of(path)
+        saved = tuple((node.fqn, tuple(sorted(asked - node.own))) for node in nodes if asked - node.own)
+        if len(nodes) > 1 and saved:
+            found.append(Split(path, saved))
+    return sorted(found, key=lambda split: (-split.gain, split.enclave))
+
+
+def _asked_for(plan: PlanDocument, enclave: str) -> frozenset[Grant]:
+    return _union(node.own for node in plan.nodes_of(enclave))
+
+
+def _union(sets: Iterable[frozenset[Grant]]) -> frozenset[Grant]:
+    return frozenset[Grant]().union(*sets)
+
+
+def _similarity(one: frozenset[Grant], two: frozenset[Grant]) -> float:
+    return len(one & two) / len(one | two)
+
+
+def _excess(
+    own: dict[str, frozenset[Grant]], one: str, two: str
+) -> tuple[tuple[str, tuple[Grant, ...]], ...]:
+    gains = ((one, tuple(sorted(own[two] - own[one]))), (two, tuple(sorted(own[one] - own[two]))))
+    return tuple(gain for gain in gains if gain[1])

@@ -1,0 +1,54 @@
+"""``secure-plan VERB``: what works on plans without running anything. A verb is a file."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+
+from enclave_launch.boundary.terminal import safe_output
+from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.verb.secure_plan import check, diff, flow, show, suggest
+
+VERBS = (show, check, diff, flow, suggest)
+DESCRIPTION = """\
+Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
+revisions, ask which enclave can influence which. A plan is a launch file, given as to secure-launch, or the
+JSON that secure-launch --dry-run --format json printed (a file that ends in .json).
+"""
+
+
+def build_parser() -> argparse.ArgumentParser:
+    """One subparser for each verb, described by the head of its file."""
+    from enclave_launch import __version__
+
+    raw = argparse.RawDescriptionHelpFormatter
+    parser = argparse.ArgumentParser(prog="secure-plan", description=DESCRIPTION, formatter_class=raw)
+    parser.add_argument("--version", action="version", version=f"secure-plan {__version__}")
+    verbs = parser.add_subparsers(metavar="VERB", required=True)
+    for verb in VERBS:
+        head = verb.__doc__ or ""
+        name = verb.__name__.rpartition(".")[2]
+        below = verbs.add_parser(name, help=head.partition("\n")[0], description=head, formatter_class=raw)
+        verb.add_arguments(below)
+        below.set_defaults(verb=verb.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line ``argv``. Gives the exit status, never a traceback for what a user can cause."""
+    with safe_output():
+        options = build_parser().parse_args(argv)
+        try:
+            status: int = options.verb(options)
+            sys.stdout.flush()
+            return status
+        except EnclaveLaunchError as error:
+            print(f"secure-plan: error: {error}", file=sys.stderr)
+            return error.exit_status
+        except KeyboardInterrupt:
+            return 130
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0

@@ -1,0 +1,70 @@
+"""Plans as the verbs are given them: a launch file with its arguments, or a saved dry run."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from enclave_launch.boundary.files import read_text
+from enclave_launch.errors import UsageError
+from enclave_launch.verb.options import add_evaluation_options, add_policy_options
+
+LARGEST_PLAN = 256 << 20  # bytes
+WORDS = "PLAN.json | PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
+
+
+def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
+    """What says which plan: the words, and how a launch file is resolved."""
+    parser.add_argument("words", nargs="+", metavar=WORDS)
+    add_resolving_options(parser)
+
+
+def add_resolving_options(parser: argparse.ArgumentParser) -> None:
+    """As of ``secure-launch``; without effect on a saved plan."""
+    add_policy_options(parser.add_argument_group("what each node may do"))
+    add_evaluation_options(parser.add_argument_group("evaluating the launch file"))
+    parser.set_defaults(
+        launch_prefix=None, launch_prefix_filter=None
+    )  # only of use where something is started
+
+
+def read_plan(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
+    """The dry run's JSON document of the plan that ``words`` name.
+
+    Raises ``UsageError`` (no such file, not a plan) and what ``resolve`` raises.
+    """
+    if len(words) == 1 and words[0].endswith(".json"):
+        return read_saved(Path(words[0]))
+    from enclave_launch.flow import resolve
+    from enclave_launch.report.plan_json import plan_document
+    from enclave_launch.verb.secure_launch import resolve_options
+    from enclave_launch.verb.target import find_target
+    from nodl.ament_index import search_prefixes
+
+    target = find_target(words, search_prefixes(options.prefix))
+    return plan_document(resolve(target.launch_file, target.arguments, options=resolve_options(options)))
+
+
+def read_saved(file: Path) -> Mapping[str, Any]:
+    """Raises ``UsageError`` for a file that cannot be read or is not the JSON of a dry run of this version."""
+    from pydantic import ValidationError
+
+    from enclave_launch.report.contract import DryRun
+
+    try:
+        document: Mapping[str, Any] = json.loads(read_text(file, limit=LARGEST_PLAN))
+        DryRun(**document)
+    except OSError as error:
+        raise UsageError(f"{file}: {error.strerror}") from error
+    except ValidationError as error:
+        first = error.errors()[0]
+        place = ".".join(map(str, first["loc"]))
+        raise UsageError(
+            f"{file} is not the JSON of secure-launch --dry-run: {place}: {first['msg']}"
+        ) from error
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"{file} is not the JSON of secure-launch --dry-run: {error}") from error
+    return document

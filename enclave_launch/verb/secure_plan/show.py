@@ -1,0 +1,25 @@
+"""Print the plan: enclaves, nodes, permissions."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from enclave_launch.boundary.terminal import json_text
+from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_plan_arguments(parser)
+    parser.add_argument("--format", choices=("text", "json"), default="text")
+
+
+def run(options: argparse.Namespace) -> int:
+    from enclave_launch.report.review_text import plan_text
+    from enclave_launch.review.document import plan_from_document
+
+    document = read_plan(options.words, options)
+    as_json = options.format == "json"
+    text = f"{json_text(document, indent=2)}\n" if as_json else plan_text(plan_from_document(document))
+    sys.stdout.write(text)
+    return 0

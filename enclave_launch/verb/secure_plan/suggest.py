@@ -1,0 +1,29 @@
+"""Name enclaves that could be merged, with what that costs, and enclaves to split, with what that saves."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_plan_arguments(parser)
+    parser.add_argument(
+        "--similarity",
+        type=float,
+        default=0.5,
+        metavar="0..1",
+        help="least share of common permissions of a merge (default: 0.5)",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    from enclave_launch.report.review_text import suggestions_text
+    from enclave_launch.review.document import plan_from_document
+    from enclave_launch.review.similarity import merges, splits
+
+    plan = plan_from_document(read_plan(options.words, options))
+    sys.stdout.write(suggestions_text(merges(plan, least_similarity=options.similarity), splits(plan)))
+    return 0

@@ -1,0 +1,160 @@
+"""Each check with an example that triggers it and the neighbour that does not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from enclave_launch.errors import UsageError
+from enclave_launch.review.checks import RULES, check_plan
+from enclave_launch.review.document import Told
+from enclave_launch.review.expectations import read_expectations, rule_findings
+from tests.review.conftest import ROBOT, Asked, document
+
+
+def two(one: Asked, other: Asked) -> dict[str, Any]:
+    return document({"/one": {"/n1": one}, "/two": {"/n2": other}})
+
+
+def codes(checked: dict[str, Any]) -> set[str]:
+    found = {told.code for told in check_plan(checked)}
+    assert found <= RULES.keys()
+    return found
+
+
+@pytest.mark.parametrize(
+    ("code", "triggers", "does_not"),
+    [
+        ("no-publisher", ({"subscribe": ["/x"]}, {}), ({"subscribe": ["/x"]}, {"publish": ["/x"]})),
+        (
+            "no-publisher",
+            ({"subscribe": ["/x"]}, {"publish": ["/a/*"]}),
+            ({"subscribe": ["/a/x"]}, {"publish": ["/a/*"]}),
+        ),
+        ("no-subscriber", ({"publish": ["/x"]}, {}), ({"publish": ["/x"]}, {"subscribe": ["/x"]})),
+        (
+            "no-server",
+            ({"call_services": ["/x"]}, {}),
+            ({"call_services": ["/x"]}, {"serve_services": ["/x"]}),
+        ),
+        ("no-server", ({"call_actions": ["/x"]}, {}), ({"call_actions": ["/x"]}, {"serve_actions": ["/x"]})),
+        (
+            "nearly-the-same-name",
+            ({"publish": ["/robot/cmd_vel"]}, {"subscribe": ["/robotcmd_vel"]}),
+            ({"publish": ["/robot/cmd_vel"]}, {"subscribe": ["/robot/odometry"]}),
+        ),
+        (
+            "nearly-the-same-name",
+            ({"publish": ["/cmd_vel_nav"]}, {"subscribe": ["/cmd_vel_nv"]}),
+            ({"publish": ["/robot1/cmd_vel"]}, {"subscribe": ["/robot2/cmd_vel"]}),
+        ),
+        (
+            "types-differ",
+            ({"publish": ["/x std_msgs/msg/String"]}, {"subscribe": ["/x std_msgs/msg/Int32"]}),
+            ({"publish": ["/x std_msgs/msg/String"]}, {"subscribe": ["/x std_msgs/msg/String"]}),
+        ),
+        ("wildcard", ({"publish": ["/x*"]}, {}), ({"publish": ["/x"]}, {})),
+    ],
+)
+def test_a_check_finds_what_it_is_for_and_not_its_neighbour(
+    code: str, triggers: tuple[Asked, Asked], does_not: tuple[Asked, Asked]
+) -> None:
+    assert code in codes(two(*triggers))
+    assert code not in codes(two(*does_not))
+
+
+def test_a_node_name_that_two_nodes_have() -> None:
+    assert "node-name-twice" in codes(document({"/a": {"/n": {}}, "/b": {"/n": {}}}))
+    assert "node-name-twice" not in codes(document({"/a": {"/n": {}}, "/b": {"/m": {}}}))
+
+
+def test_an_enclave_whose_nodes_gain_by_sharing() -> None:
+    assert "enclave-shared" in codes(document({"/a": {"/n": {"publish": ["/x"]}, "/m": {}}}))
+    assert "enclave-shared" not in codes(document({"/a": {"/n": {"publish": ["/x"]}}, "/b": {"/m": {}}}))
+
+
+def process(**values: Any) -> dict[str, Any]:
+    return {
+        "fqn": "/n",
+        "executable": "e",
+        "environment": {},
+        "parameters": {},
+        "launch_file": "f.launch.xml",
+        "line": 3,
+        **values,
+    }
+
+
+@pytest.mark.parametrize(
+    ("code", "triggers", "does_not"),
+    [
+        (
+            "security-variable-set",
+            {"environment": {"ROS_SECURITY_ENABLE": "false"}},
+            {"environment": {"ROS_HOME": "/x"}},
+        ),
+        (
+            "secret-in-parameters",
+            {"parameters": {"mqtt.password": "x"}},
+            {"parameters": {"mqtt.password": ""}},
+        ),
+        ("secret-in-parameters", {"parameters": {"api_key": "x"}}, {"parameters": {"keyboard": "x"}}),
+    ],
+)
+def test_what_a_process_is_given(code: str, triggers: dict[str, Any], does_not: dict[str, Any]) -> None:
+    found = check_plan({**document({}), "processes": [process(**triggers)]})
+    assert [(told.code, told.file, told.line) for told in found] == [(code, "f.launch.xml", 3)]
+    assert check_plan({**document({}), "processes": [process(**does_not)]}) == []
+
+
+def rules(**entry: str) -> Any:
+    return read_expectations(
+        {"never": [{key.rstrip("_"): value for key, value in entry.items()}]}, "r.yaml"
+    ).never
+
+
+@pytest.mark.parametrize("target", ["/base", "/drive", "/ba*"])
+def test_a_forbidden_flow_is_an_error_that_shows_the_way(target: str) -> None:
+    (told,) = rule_findings(document(ROBOT), rules(from_="/camera", to=target, why="vendor's binary"))
+    assert (told.severity, told.code) == ("error", "flow-forbidden")
+    assert told.text == (
+        f"/camera must never reach {target} (vendor's binary): "
+        "/camera -> /planner by topic /image; /planner -> /base by action /drive"
+    )
+
+
+def test_a_flow_that_does_not_exist_is_not_told() -> None:
+    assert rule_findings(document(ROBOT), rules(from_="/logger", to="/base")) == []
+
+
+def test_a_rule_that_names_nothing_is_told_since_it_protects_nothing() -> None:
+    (told,) = rule_findings(document(ROBOT), rules(from_="/camra", to="/base"))
+    assert (told.severity, told.code) == ("warning", "rule-idle")
+
+
+def test_an_accepted_finding_is_the_one_that_was_named() -> None:
+    accept = read_expectations(
+        {"accept": [{"code": "wildcard", "subject": "/x*", "why": "driver"}]}, "r.yaml"
+    )
+    told = Told("warning", "wildcard", "/x*", None, 0, "", "")
+    assert accept.reason_to_accept(told) == "driver"
+    assert accept.reason_to_accept(told._replace(subject="/y*")) is None
+    assert accept.reason_to_accept(told._replace(code="no-server")) is None
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        [],
+        {"nevr": []},
+        {"never": "x"},
+        {"never": [{"from": "/a"}]},
+        {"never": [{"from": "/a", "to": 3}]},
+        {"accept": [{"code": "wildcard"}]},
+        {"accept": [{"code": "wildcard", "why": "x", "until": "y"}]},
+    ],
+)
+def test_rules_that_are_not_understood_are_wrong_usage(content: Any) -> None:
+    with pytest.raises(UsageError, match=r"^r\.yaml: "):
+        read_expectations(content, "r.yaml")
