@@ -106,7 +106,7 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
     "permissions, unsigned": (unsigned_change, "is no longer what was provisioned .* other permissions"),
     "key readable by others": (
         lambda keystore: (keystore / "enclaves/key.pem").chmod(0o644),
-        "the private key others could read its private key",
+        "others could read its private key",
     ),
     "key removed": (lambda keystore: (keystore / "enclaves/key.pem").unlink(), "no private key"),
     "governance removed": (
