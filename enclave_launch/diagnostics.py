@@ -7,6 +7,7 @@ SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
@@ -56,6 +57,10 @@ class Code(str, Enum):
         "A component goes into a container that is not of this launch",
     )
     ENCLAVE_ATTRIBUTE_UNUSED = "enclave-attribute-unused", "The process names another enclave itself"
+    ENCLAVE_OF_SEVERAL_LAUNCHES = (
+        "enclave-of-several-launches",
+        "Another launch on the keystore uses the enclave too",
+    )
     ENCLAVE_SHARED_WITH_LAUNCHER = "enclave-shared-with-launcher", "A process has the launcher's enclave"
     EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
     # of what could take an enclave away
@@ -255,6 +260,16 @@ def enclave_attribute_unused(process: str, enclave: str, attribute: str, place: 
     own = f"{process} has --enclave {enclave} in its own ROS arguments"
     text = f"{own}; its enclave attribute {attribute!r} is not used"
     return Diagnostic(Code.ENCLAVE_ATTRIBUTE_UNUSED, process, text, place)
+
+
+def enclave_of_several_launches(enclave: str, others: Sequence[str], added: Sequence[str]) -> Diagnostic:
+    some = f"{', '.join(added[:4])}{f' and {len(added) - 4} more' if len(added) > 4 else ''}"
+    cost = f"; its processes may then also {some}" if added else ""
+    text = f"enclave {enclave} is shared with {', '.join(others)}{cost}"
+    remedy = (
+        "--enclave-scope gives enclaves of their own, secure-keystore shares drops what is not used any more"
+    )
+    return Diagnostic(Code.ENCLAVE_OF_SEVERAL_LAUNCHES, enclave, text, remedy=remedy)
 
 
 def enclave_shared_with_launcher(enclave: str) -> Diagnostic:

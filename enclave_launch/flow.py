@@ -99,11 +99,14 @@ def provision(
 ) -> ProvisionedLaunch:
     """Bring every enclave of ``plan`` to exactly its planned permissions; idempotent.
 
-    Raises ``ManifestError`` for a plan with problems (nothing is written then) and ``ProvisionError``.
+    Where other launches have shares of the same enclaves, they keep them. The launch counts as running on the keystore
+    while the result lives. Raises ``ManifestError`` for a plan with problems (nothing is written then) and
+    ``ProvisionError``.
     """
-    from enclave_launch.secured import ProvisionedLaunch, provision_policies
+    from enclave_launch.secured import ProvisionedLaunch, launch_owner, provision_policies
     from enclave_launch.security_environment import SecuritySettings
     from enclave_launch.served_domains import with_domains
+    from keystore.disk.share_files import LaunchHold
     from keystore.steps.options import ProvisionOptions
 
     if plan.problems:
@@ -111,6 +114,7 @@ def provision(
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
     asked = chosen.keystore or ProvisionOptions()
+    asked = asked._replace(launch=asked.launch or LaunchHold(settings.keystore, launch_owner(plan)))
     wanted = with_domains(plan, asked, os.environ)
     report = provision_policies(settings, plan, wanted)
     return ProvisionedLaunch(plan, settings, report, wanted, asked)

@@ -7,9 +7,11 @@ what was provisioned (a few file reads) and hands out the arguments and variable
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Mapping
 from typing import NamedTuple
 
+from enclave_launch.diagnostics import enclave_of_several_launches
 from enclave_launch.errors import ProvisionError
 from enclave_launch.plan import LaunchPlan, PlannedProcess
 from enclave_launch.process import ResolvedProcess
@@ -62,6 +64,26 @@ def provision_policies(
         raise ProvisionError(f"{error} ({places(plan, error.domains)})") from error
     except KeystoreError as error:
         raise ProvisionError(str(error)) from error
+
+
+def launch_owner(plan: LaunchPlan) -> str:
+    """Whose share of an enclave this launch's permissions are: the launch file, whatever its arguments, or the program
+    that made the launch description itself."""
+    return os.path.realpath(sys.argv[0] if plan.launch_file.startswith("<") else plan.launch_file)
+
+
+def told_of_shares(plan: LaunchPlan, keystore: str) -> LaunchPlan:
+    """The plan with a warning for each enclave that other launches on ``keystore`` have shares of. Reads only.
+
+    Raises ``ProvisionError`` for shares that cannot be read.
+    """
+    from keystore.steps.sharing import shared_enclaves
+
+    try:
+        found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
+    except KeystoreError as error:
+        raise ProvisionError(str(error)) from error
+    return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
 
 
 class PlanProvider:
@@ -154,7 +176,7 @@ class PlanProvider:
         if wrong:
             raise ProvisionError(
                 f"enclave {enclave} in {keystore} is no longer what was provisioned for this launch: "
-                f"{'; '.join(wrong)}. {_who_changed_it(wrong)}"
+                f"{'; '.join(wrong)}. Find out who changed it; a new launch provisions it again"
             )
 
     def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
@@ -162,15 +184,3 @@ class PlanProvider:
         if planned.enclave is not None and (OVERRIDE in environment or OVERRIDE in os.environ):
             variables[OVERRIDE] = planned.enclave.path
         return Grant(enclave_arguments(planned), variables)
-
-
-def _who_changed_it(wrong: tuple[str, ...]) -> str:
-    from keystore.steps.enclave_state import OTHER_PERMISSIONS
-
-    if OTHER_PERMISSIONS in wrong:
-        return (
-            "Another launch on this keystore that has an enclave of this name provisions its own permissions: give "
-            "each launch enclaves or a keystore of its own. If there is none, find out who changed it; a new launch "
-            "provisions it again"
-        )
-    return "Find out who changed it; a new launch provisions it again"

@@ -19,6 +19,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from keystore.disk.share_files import LaunchHold as LaunchHold
     from keystore.errors import KeystoreError as KeystoreError
     from keystore.formats.subject import SubjectScheme as SubjectScheme
     from keystore.signing.ca_access import CaAccess as CaAccess
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from keystore.steps.enclaves import apply_policy as apply_policy
     from keystore.steps.enclaves import create_enclave as create_enclave
     from keystore.steps.enclaves import create_enclaves as create_enclaves
+    from keystore.steps.enclaves import drop_shares as drop_shares
     from keystore.steps.enclaves import list_enclaves as list_enclaves
     from keystore.steps.expiry import Expiry as Expiry
     from keystore.steps.expiry import StatusReport as StatusReport
@@ -50,6 +52,8 @@ if TYPE_CHECKING:
     from keystore.steps.report import ProvisionReport as ProvisionReport
     from keystore.steps.rollover import Step as Step
     from keystore.steps.rollover import roll_over as roll_over
+    from keystore.steps.sharing import LaunchShares as LaunchShares
+    from keystore.steps.sharing import list_shares as list_shares
     from keystore.verification import Finding as Finding
     from keystore.verification import Severity as Severity
     from keystore.verification import VerifyReport as VerifyReport
@@ -63,6 +67,10 @@ _HOMES = {
     "apply_policy": "steps.enclaves",
     "create_enclave": "steps.enclaves",
     "create_enclaves": "steps.enclaves",
+    "drop_shares": "steps.enclaves",
+    "LaunchHold": "disk.share_files",
+    "LaunchShares": "steps.sharing",
+    "list_shares": "steps.sharing",
     "list_enclaves": "steps.enclaves",
     "KeystoreError": "errors",
     "PublicFiles": "steps.bundle",

@@ -66,7 +66,7 @@ def _main(options: argparse.Namespace) -> int:
             return _show_file(target, options)
     keystore = _keystore(options)
     if _only_looking(options):
-        return _show_plan(_resolve(target, options), options, keystore)
+        return _show_plan(_planned(target, options, keystore), options, keystore)
     if options.learn is not None:
         from enclave_launch.verb.learn import learn_launch
 
@@ -82,7 +82,17 @@ def _start(
 ) -> int:
     if keystore is None:
         return _launch_plainly(target, options, companion)
-    return _launch(_resolve(target, options), options, keystore, companion)
+    return _launch(_planned(target, options, keystore), options, keystore, companion)
+
+
+def _planned(target: Target, options: argparse.Namespace, keystore: str | None) -> LaunchPlan:
+    """The plan; with a keystore it says what is shared with other launches there."""
+    plan = _resolve(target, options)
+    if keystore is None or not os.path.isdir(keystore):
+        return plan
+    from enclave_launch.secured import told_of_shares
+
+    return told_of_shares(plan, keystore)
 
 
 def _check_prefixes(prefixes: Iterable[Path]) -> None:

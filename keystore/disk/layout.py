@@ -30,6 +30,7 @@ NEXT = "private/next"
 SUPERSEDED = "private/superseded.json"
 """Of earlier versions; taken over into the register."""
 REGISTER = "private/register.json"
+SHARES = "private/shares"
 
 KEY, CERT = "key.pem", "cert.pem"
 PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"
@@ -61,6 +62,12 @@ def ca_key_uri(role: Role) -> str:
 def enclave_directory(enclave: str) -> str:
     """``enclaves/a/b``; raises InvalidEnclaveName, so that no path is ever built from an unchecked name."""
     return "/".join((ENCLAVES, *segments(validate_enclave_name(enclave))))
+
+
+def shares(enclave: str) -> str:
+    """``private/shares/e.front.camera.json``; ``.`` cannot occur in a name."""
+    name = "".join(f".{part}" for part in segments(validate_enclave_name(enclave)))
+    return f"{SHARES}/e{name}.json"
 
 
 def enclave_links(enclave: str, *, crl: bool = False) -> dict[str, str]:

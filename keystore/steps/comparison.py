@@ -24,10 +24,12 @@ from keystore.formats.permissions import permissions_document
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register
 from keystore.formats.role import Role
+from keystore.formats.shares import Share
 from keystore.formats.validity import Validity, later, utc_now
-from keystore.steps.enclave_state import EnclaveState, PermissionsSource, Reissue, inspect
+from keystore.steps.enclave_state import OTHER_PERMISSIONS, EnclaveState, PermissionsSource, Reissue, inspect
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.report import EnclaveReport, ProvisionReport
+from keystore.steps.sharing import EnclaveShare, kept_shares
 
 
 class WantedEnclave(NamedTuple):
@@ -35,6 +37,8 @@ class WantedEnclave(NamedTuple):
 
     permissions: PermissionsSource
     reissue: Reissue = Reissue.NOTHING
+    share: EnclaveShare | None = None
+    """Where ``permissions`` are those of several launches."""
 
 
 def compare(
@@ -59,10 +63,12 @@ def compare(
     states = []
     for name, one in wanted.items():
         states.append(inspect_wanted(view, register, name, one, options, now))
-        if not states[-1].is_good:
+        if not states[-1].is_good or (one.share is not None and not one.share.is_recorded()):
             return None
     ends = _first_end(view, (state.validity for state in states))
-    return ProvisionReport(root, (), tuple(as_found(state) for state in states), ends=ends)
+    more = [state.reasons[0] for state in states if state.reasons]
+    more += kept_shares(one.share for one in wanted.values() if one.share is not None)
+    return ProvisionReport(root, (), tuple(as_found(state) for state in states), tuple(more), ends)
 
 
 def _refuse_unless_it_can_be_made(view: KeystoreView, options: ProvisionOptions) -> None:
@@ -100,7 +106,7 @@ def differences(
     register = read_register(root)
     refuse_foreign_authorities(view, register)
     now = chosen.now or utc_now()
-    wanted = WantedEnclave(permissions_source(policy, chosen))
+    wanted = wanted_enclave(root, policy, chosen)
     state = inspect_wanted(view, register, policy.path, wanted, chosen, now)
     reasons = [] if state.is_good else [*state.reasons]
     if not governance_stands(view, chosen.domains, register):
@@ -118,14 +124,41 @@ def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
     return options._replace(domains=governance_domains(view) if view.is_complete else Domains.single(0))
 
 
+def domains_of(enclave: str, options: ProvisionOptions) -> Domains:
+    """The domains that the permissions of one enclave are for."""
+    return options.enclave_domains.get(enclave) or options.domains or Domains.single(0)
+
+
 def permissions_source(policy: EnclavePolicy, options: ProvisionOptions) -> PermissionsSource:
     """Makes the document of exactly this policy."""
-    domains = options.enclave_domains.get(policy.path) or options.domains or Domains.single(0)
+    domains = domains_of(policy.path, options)
 
     def document(subject: str, validity: Validity) -> bytes:
         return permissions_document(subject, policy, validity=validity, domains=domains, rmw=options.rmw)
 
     return document
+
+
+def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions) -> WantedEnclave:
+    """Exactly this policy; of a launch, its share beside those of others."""
+    if options.launch is None:
+        return WantedEnclave(permissions_source(policy, options))
+    owner, domains = options.launch.owner, domains_of(policy.path, options)
+    mine = Share(owner, domains, policy.profiles)
+    share = EnclaveShare(root, policy.path, owner, mine, options.rmw, options.launch)
+    return WantedEnclave(share.document, share=share)
+
+
+def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> EnclaveState:
+    """A bundle does not tell whose share is whose: permissions that hold all of ours are taken as a union."""
+    from keystore.steps.signing_here import beyond_and_missing  # parses: only where documents differ
+
+    beyond, missing = beyond_and_missing(view, state, wanted)
+    if missing or not beyond:
+        return state
+    some = f"{', '.join(beyond[:4])}{' ...' if len(beyond) > 4 else ''}"
+    said = f"enclave {state.enclave} may do more in this bundle than this launch asks for ({some})"
+    return state._replace(permissions=False, reasons=(said,))
 
 
 def as_found(state: EnclaveState) -> EnclaveReport:
@@ -143,6 +176,8 @@ def inspect_wanted(
 ) -> EnclaveState:
     """The enclave's state against what is wanted; what is asked to be issued anew counts as a difference."""
     state = inspect(view, register, enclave, wanted.permissions, now, later(now, options.renew_within))
+    if wanted.share is not None and register is None and state.reasons == (OTHER_PERMISSIONS,):
+        state = _with_shares_of_others(view, state, wanted)
     if wanted.reissue is Reissue.NOTHING or state.reissue is Reissue.KEY_PAIR:
         return state
     return state._replace(reissue=wanted.reissue, permissions=True, reasons=(*state.reasons, "asked for"))

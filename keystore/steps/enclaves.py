@@ -15,6 +15,7 @@ from keystore.steps.enclave_state import PermissionsSource
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import bring_about, provision
 from keystore.steps.report import ProvisionReport
+from keystore.steps.sharing import given_up
 
 
 def create_enclaves(
@@ -65,3 +66,17 @@ def list_enclaves(keystore: Path | str) -> list[str]:
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     return view.enclaves()
+
+
+def drop_shares(
+    keystore: Path | str, owner: str, *, options: ProvisionOptions | None = None
+) -> ProvisionReport:
+    """Take the shares of a launch out of every enclave; what no other launch asks for is taken away for good.
+
+    Raises InvalidInput when it has none, or while a launch runs on one of these enclaves.
+    """
+    root = resolve_root(keystore)
+    KeystoreView(root).require_complete()
+    chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
+    wanted = {one.enclave: WantedEnclave(one.document, share=one) for one in given_up(root, owner)}
+    return bring_about(root, wanted, chosen)

@@ -5,6 +5,7 @@ from datetime import datetime, timedelta
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
+from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
 from keystore.formats.validity import DEFAULT_BACKDATE
 from keystore.signing.ca_access import CaAccess
@@ -42,6 +43,9 @@ class ProvisionOptions(NamedTuple):
     durable: bool = True
     progress: Progress | None = None
     now: datetime | None = None
+    launch: LaunchHold | None = None
+    """The launch whose share of the enclaves this is: shares of other launches stay, the enclaves get all of them
+    together. None: the enclaves get exactly what is given, and no launch has a share."""
     revoke: bool = True
     """Revoke certificates whose rights shrink or whose key is not safe; without it they are usable until they end."""
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})

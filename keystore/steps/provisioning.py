@@ -11,14 +11,17 @@ by the next one, because the comparison finds every missing step again.
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
+from keystore.disk import layout, store
 from keystore.disk.safe_files import resolve_root
+from keystore.disk.share_files import read_shares
 from keystore.errors import InvalidInput, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.validity import utc_now
-from keystore.steps.comparison import WantedEnclave, compare, permissions_source, with_domains
+from keystore.steps.comparison import WantedEnclave, compare, wanted_enclave, with_domains
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.report import ProvisionReport
+from keystore.steps.sharing import refuse_running
 
 
 def provision(
@@ -31,10 +34,29 @@ def provision(
     """
     root = resolve_root(keystore)
     chosen = with_domains(root, options or ProvisionOptions())
-    wanted = {
-        policy.path: WantedEnclave(permissions_source(policy, chosen)) for policy in _distinct(enclaves)
-    }
-    return bring_about(root, wanted, chosen)
+    policies = _distinct(enclaves)
+    if chosen.launch is not None:
+        chosen.launch.take()
+    else:
+        refuse_running(root, (policy.path for policy in policies))
+    report = bring_about(
+        root, {policy.path: wanted_enclave(root, policy, chosen) for policy in policies}, chosen
+    )
+    if chosen.launch is not None:
+        chosen.launch.take()  # a new keystore had no place for it before
+        chosen.launch.enclaves.update(policy.path for policy in policies)
+    else:
+        drop_share_files(root, [policy.path for policy in policies], chosen)
+    return report
+
+
+def drop_share_files(root: Path, enclaves: Iterable[str], options: ProvisionOptions) -> None:
+    """They were given exactly what was asked for: nothing of it is a launch's any more."""
+    stale = [name for name in enclaves if read_shares(root, name)]
+    if stale:
+        with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
+            for name in stale:
+                opened.remove(layout.shares(name))
 
 
 def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:

@@ -25,6 +25,7 @@ from keystore.steps.enclave_writing import EnclaveWriter
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import Progress, ProvisionOptions
 from keystore.steps.report import EnclaveReport, ProvisionReport
+from keystore.steps.sharing import kept_shares
 from keystore.steps.signing_here import refuse_without_keys
 
 # Bounds what an interrupted run loses, and how often the disk is waited for.
@@ -47,9 +48,11 @@ def reconcile(
         warnings += _exposures(view)
         check_distinct(dict.fromkeys((*view.enclaves(), *wanted)))
         writer = EnclaveWriter(opened, view, options, now)
+        wanted = {name: _as_it_is_now(one) for name, one in wanted.items()}
         states = [inspect_wanted(view, register, name, one, options, now) for name, one in wanted.items()]
         refuse_without_keys(view, states, wanted)
         writer.check_subjects(states)
+        _record_shares(opened, wanted)
         reports = _write_all(opened, writer, states, wanted, options.progress)
         if writer.has_revoked:
             publish_crl(opened, options.access, now)
@@ -57,7 +60,23 @@ def reconcile(
                 "certificates were revoked: deploy crl.pem to every host and restart what runs there; participants "
                 "read it when they start"
             )
+    warnings += kept_shares(one.share for one in wanted.values() if one.share is not None)
     return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
+
+
+def _as_it_is_now(one: WantedEnclave) -> WantedEnclave:
+    """Under the lock: shares that others wrote since the comparison count."""
+    if one.share is None:
+        return one
+    share = replace(one.share)
+    return one._replace(share=share, permissions=share.document)
+
+
+def _record_shares(opened: Store, wanted: Mapping[str, WantedEnclave]) -> None:
+    with opened.batch() as batch:
+        for one in wanted.values():
+            if one.share is not None and not one.share.is_recorded():
+                one.share.record(opened, batch)
 
 
 @contextmanager

@@ -116,6 +116,7 @@ def revoke_replaced(opened: Store, names: Iterable[str], access: CaAccess, now: 
 def _delete(opened: Store, name: str) -> None:
     """Exactly the files of this enclave; the root's governance belongs to the keystore."""
     directory = layout.enclave_directory(name)
+    opened.remove(layout.shares(name))
     for file in _DELETE_ORDER:
         if not (name == "/" and file == layout.ENCLAVE_GOVERNANCE):
             opened.remove(f"{directory}/{file}")

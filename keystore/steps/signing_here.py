@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
@@ -11,8 +12,10 @@ from keystore.formats.permissions_change import grant_for, taken_away
 from keystore.formats.role import Role
 from keystore.formats.subject import subject_name
 from keystore.signing import smime
-from keystore.steps.comparison import WantedEnclave
 from keystore.steps.enclave_state import OTHER_PERMISSIONS, EnclaveState, Reissue
+
+if TYPE_CHECKING:
+    from keystore.steps.comparison import WantedEnclave
 
 _SHOWN = 10
 
@@ -44,22 +47,32 @@ def refuse_without_keys(
 def _reasons(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> Iterator[str]:
     for reason in state.reasons:
         yield reason
-        if reason == OTHER_PERMISSIONS and state.facts is not None and state.facts.common_name is not None:
+        if reason == OTHER_PERMISSIONS:
             yield from _permission_differences(view, state, wanted)
 
 
 def _permission_differences(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> Iterator[str]:
-    assert state.facts is not None
-    subject, place = subject_name(state.facts.common_name or ""), layout.PERMISSIONS
+    beyond, missing = beyond_and_missing(view, state, wanted)
+    for words, found in (("lacks", missing), ("has beyond it", beyond)):
+        if found:
+            yield f"{words} {', '.join(found[:4])}{' ...' if len(found) > 4 else ''}"
+
+
+def beyond_and_missing(
+    view: KeystoreView, state: EnclaveState, wanted: WantedEnclave
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """What the signed permissions grant beyond what is wanted, and what they lack; both empty for what cannot be
+    read."""
+    if state.facts is None or state.facts.common_name is None:
+        return (), ()
+    subject, place = subject_name(state.facts.common_name), layout.PERMISSIONS
     try:
         signed = safe_files.read(view.root, f"{layout.enclave_directory(state.enclave)}/{layout.PERMISSIONS}")
         present = grant_for(smime.read(signed, place).document, subject, place)
         document = wanted.permissions(subject, state.facts.validity)
         asked = grant_for(document, subject, place) if document is not None else None
     except KeystoreError:
-        return
+        return (), ()
     if present is None or asked is None:
-        return
-    for words, lost in (("lacks", taken_away(asked, present)), ("has beyond it", taken_away(present, asked))):
-        if lost:
-            yield f"{words} {', '.join(lost[:4])}{' ...' if len(lost) > 4 else ''}"
+        return (), ()
+    return taken_away(present, asked), taken_away(asked, present)

@@ -18,7 +18,7 @@ from keystore.formats.policy import PolicyError
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
-    "governance",
+    "governance", "shares",
 )  # fmt: skip
 
 

@@ -77,7 +77,7 @@ def _check_directory(root: Path, relative: str, info: os.stat_result, names: lis
         )  # fmt: skip
         return
     yield from _check_owner(root, relative, info, private=relative.split("/")[0] == layout.PRIVATE)
-    if relative in _TOP or relative == layout.RETIRED or relative.startswith(layout.NEXT):
+    if relative in _TOP or relative in (layout.RETIRED, layout.SHARES) or relative.startswith(layout.NEXT):
         return
     if relative.startswith(layout.ENCLAVES + "/"):
         name = relative.removeprefix(layout.ENCLAVES)
@@ -120,6 +120,8 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
     secret = directory == layout.PRIVATE or name == layout.KEY
     yield from _check_owner(root, relative, info, private=secret)
     if relative in _KNOWN or (directory == layout.RETIRED and name.endswith(".cert.pem")):
+        return
+    if directory == layout.SHARES and name.endswith((".json", ".lock")):
         return
     if relative in _NEXT_CAS:
         return

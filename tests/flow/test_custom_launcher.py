@@ -21,6 +21,7 @@ from enclave_launch import (
     resolve,
     run_async,
 )
+from enclave_launch.secured import PlanProvider
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
 TALKER_LISTENER = DEMO / "share" / "demo_nodes" / "launch" / "talker_listener.launch.xml"
@@ -66,23 +67,35 @@ def test_provisioning_twice_changes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_node_taken_out_of_the_launch_file_takes_exactly_its_permissions_with_it(tmp_path: Path) -> None:
-    both = tmp_path / "both.launch.xml"
-    both.write_text(
+    file = tmp_path / "robot.launch.xml"
+    file.write_text(
         '<launch><node pkg="demo_nodes" exec="talker"/>\n<node pkg="demo_nodes" exec="listener"/></launch>'
     )
-    one = tmp_path / "one.launch.xml"
-    one.write_text('<launch><node pkg="demo_nodes" exec="talker"/></launch>')
 
     def topics() -> set[str]:
         text = (tmp_path / "ks" / "enclaves" / "permissions.xml").read_text()
         return {piece.split("</topic>")[0] for piece in text.split("<topic>")[1:]}
 
-    provision(resolve(both, options=OPTIONS), tmp_path / "ks")
+    provision(resolve(file, options=OPTIONS), tmp_path / "ks")
     with_listener = topics()
-    provision(resolve(one, options=OPTIONS), tmp_path / "ks")
+    file.write_text('<launch><node pkg="demo_nodes" exec="talker"/></launch>')
+    provision(resolve(file, options=OPTIONS), tmp_path / "ks")
     assert {name for name in with_listener - topics() if "listener" not in name} == set()
     assert not any("listener" in name for name in topics())
     assert "rt/chatter" in topics() and "rr/talker/get_parametersReply" in topics()
+
+
+def test_two_launch_files_on_one_keystore_both_keep_what_they_need(tmp_path: Path) -> None:
+    files = []
+    for name in ("talker", "listener"):
+        files.append(tmp_path / f"{name}.launch.xml")
+        files[-1].write_text(f'<launch><node pkg="demo_nodes" exec="{name}"/></launch>')
+    first = provision(resolve(files[0], options=OPTIONS), tmp_path / "ks")
+    provision(resolve(files[1], options=OPTIONS), tmp_path / "ks")
+    text = (tmp_path / "ks" / "enclaves" / "permissions.xml").read_text()
+    assert "rr/talker/get_parametersReply" in text and "rr/listener/get_parametersReply" in text
+    process = first.plan.processes[0].process
+    assert PlanProvider(first).ensure(process), "the one that runs starts its next process"
 
 
 def test_a_plan_with_problems_is_not_provisioned(tmp_path: Path) -> None:

@@ -75,15 +75,21 @@ def test_renewal_by_another_tool_goes_unnoticed(
     respawn(running)
 
 
-def test_another_launch_with_other_permissions_for_the_same_enclave(
+def test_another_launch_in_the_same_enclave_adds_its_share_and_disturbs_nobody(
     running: PlanProvider, tmp_path: Path, keystore: Path
 ) -> None:
-    provision(plan_of(tmp_path, OTHER_TALKER), keystore)
-    with pytest.raises(
-        ProvisionError, match=r"enclave / .* other permissions\. Another launch on this keystore"
-    ):
-        respawn(running)
-    provision(plan_of(tmp_path, TALKER), keystore)
+    (tmp_path / "other").mkdir()
+    provision(plan_of(tmp_path / "other", OTHER_TALKER), keystore)
+    permissions = (keystore / "enclaves/permissions.xml").read_text()
+    assert "rt/chatter" in permissions and "rt/news" in permissions
+    respawn(running)
+
+
+def test_the_launch_file_edited_and_started_again_while_it_runs(
+    running: PlanProvider, tmp_path: Path, keystore: Path
+) -> None:
+    launch = provision(plan_of(tmp_path, OTHER_TALKER), keystore)
+    assert "keeps what this launch no longer asks for (publish /chatter)" in str(launch.report.warnings)
     respawn(running)
 
 

@@ -1,0 +1,190 @@
+"""The permissions of an enclave that several launches share: each replaces its own share, all get the union.
+
+While another process runs on one of the shares nothing is taken from the enclave: a launch that asks for less than
+before keeps what it had until it starts without anyone beside it. Then what it gave up ends for good, as any right
+that is taken away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+from keystore.disk import layout
+from keystore.disk.governance_file import governance_domains
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.share_files import LaunchHold, enclaves_with_shares, is_running, read_shares
+from keystore.disk.store import PRIVATE_MODE, Batch, Store
+from keystore.disk.view import KeystoreView
+from keystore.errors import InvalidInput, printable
+from keystore.formats.permissions import permissions_document
+from keystore.formats.permissions_names import full_name
+from keystore.formats.policy import EnclavePolicy, Profile, Qualifier
+from keystore.formats.shares import (
+    Share,
+    is_part_of,
+    merged_profiles,
+    shares_json,
+    united,
+    united_domains,
+)
+from keystore.formats.validity import Validity
+
+
+@dataclass(frozen=True)
+class EnclaveShare:
+    """The share of ``owner`` in one enclave, with those of others as they stand when it is first asked.
+
+    ``mine`` None: the owner gives its share up.
+    """
+
+    root: Path
+    enclave: str
+    owner: str
+    mine: Share | None
+    rmw: str | None = None
+    hold: LaunchHold | None = None
+
+    def document(self, subject: str, validity: Validity) -> bytes:
+        """The permissions of all shares together. Raises InvalidInput where they cannot be united."""
+        domains = united_domains(self.shares) if self.shares else governance_domains(KeystoreView(self.root))
+        policy = united(self.enclave, self.shares)
+        return permissions_document(subject, policy, validity=validity, domains=domains, rmw=self.rmw)
+
+    @cached_property
+    def present(self) -> tuple[Share, ...]:
+        return read_shares(self.root, self.enclave)
+
+    @cached_property
+    def shares(self) -> tuple[Share, ...]:
+        """All shares as they are to be: ours replaced, or only extended while others run on the enclave."""
+        others = tuple(share for share in self.present if share.owner != self.owner)
+        if self.mine is None:
+            return others
+        before = next((share for share in self.present if share.owner == self.owner), None)
+        mine = Share(self.owner, self.mine.domains, merged_profiles(self.mine.profiles))
+        if before is not None and _loses(before, mine) and self._is_in_use(others):
+            profiles = merged_profiles((*before.profiles, *mine.profiles))
+            mine = Share(self.owner, united_domains((before, mine)), profiles)
+        return tuple(sorted((*others, mine)))
+
+    def _is_in_use(self, others: Iterable[Share]) -> bool:
+        if self.hold is not None and (self.enclave in self.hold.enclaves or not self.hold.is_alone()):
+            return True
+        return any(is_running(self.root, share.owner) for share in others)
+
+    def is_recorded(self) -> bool:
+        """Whether the keystore has exactly these shares; one without ``private/`` records none."""
+        return self.present == self.shares or not (self.root / layout.PRIVATE).is_dir()
+
+    def record(self, opened: Store, batch: Batch) -> None:
+        """Before the document that follows from it."""
+        opened.ensure_directory(layout.SHARES)
+        if self.shares:
+            batch.file(layout.shares(self.enclave), shares_json(self.shares), PRIVATE_MODE)
+        else:
+            opened.remove(layout.shares(self.enclave))
+
+    def kept(self) -> tuple[str, ...]:
+        """What stays of our own share though it is not asked for any more, for a person."""
+        mine = next((share for share in self.shares if share.owner == self.owner), None)
+        if mine is None or self.mine is None or is_part_of(mine.profiles, self.mine.profiles):
+            return ()
+        return tuple(sorted(_words(mine.profiles) - _words(self.mine.profiles)))
+
+
+def _loses(before: Share, mine: Share) -> bool:
+    return not is_part_of(before.profiles, mine.profiles) or united_domains((before, mine)) != mine.domains
+
+
+def kept_shares(shares: Iterable[EnclaveShare]) -> list[str]:
+    """Of each share what could not be taken away yet, one sentence an enclave."""
+    kept = [(share.enclave, share.kept()) for share in shares]
+    return [
+        f"enclave {enclave} is in use by another running launch, or another run of this one: it keeps what this launch "
+        f"no longer asks for ({', '.join(rules[:3])}{' ...' if len(rules) > 3 else ''}) until it starts alone"
+        for enclave, rules in kept
+        if rules
+    ]
+
+
+def _words(profiles: Iterable[Profile]) -> set[str]:
+    """``publish /chatter``: what is allowed, by full names."""
+    return {
+        f"{operation.value} {full_name(expression, profile)}"
+        for profile in profiles
+        for operation, qualifier, expression in profile.rules
+        if qualifier is Qualifier.ALLOW
+    }
+
+
+class SharedEnclave(NamedTuple):
+    """``others``: launches that have shares of it too; ``added``: what their shares let it do beyond ours."""
+
+    enclave: str
+    others: tuple[str, ...]
+    added: tuple[str, ...]
+
+
+def shared_enclaves(
+    keystore: Path | str, owner: str, policies: Iterable[EnclavePolicy]
+) -> Iterator[SharedEnclave]:
+    """Which enclaves of a launch other launches use as well, and what that costs. Reads only."""
+    root = resolve_root(keystore)
+    for policy in policies:
+        others = [share for share in read_shares(root, policy.path) if share.owner != owner]
+        if others:
+            added = set().union(*(_words(share.profiles) for share in others)) - _words(policy.profiles)
+            if len({share.domains for share in others}) > 1:
+                added.add(f"do all of it in each of the domains {united_domains(others)}")
+            yield SharedEnclave(policy.path, tuple(share.owner for share in others), tuple(sorted(added)))
+
+
+class LaunchShares(NamedTuple):
+    """``running``: a process of this launch holds the keystore now."""
+
+    owner: str
+    running: bool
+    enclaves: tuple[str, ...]
+
+
+def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
+    """Every launch with shares, by owner. Raises NotAKeystore."""
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    found: dict[str, list[str]] = {}
+    for enclave in enclaves_with_shares(view.root):
+        for share in read_shares(view.root, enclave):
+            found.setdefault(share.owner, []).append(enclave)
+    return tuple(
+        LaunchShares(owner, is_running(view.root, owner), tuple(enclaves))
+        for owner, enclaves in sorted(found.items())
+    )
+
+
+def given_up(root: Path, owner: str) -> list[EnclaveShare]:
+    """The shares of ``owner``, to be dropped. Raises InvalidInput when it has none, or while somebody runs on them."""
+    mine = [
+        EnclaveShare(root, enclave, owner, None)
+        for enclave in enclaves_with_shares(root)
+        if any(share.owner == owner for share in read_shares(root, enclave))
+    ]
+    if not mine:
+        raise InvalidInput(
+            f"no launch {printable(owner)} has a share in {printable(root)}; secure-keystore shares lists all"
+        )
+    refuse_running(root, (one.enclave for one in mine))
+    return mine
+
+
+def refuse_running(root: Path, enclaves: Iterable[str]) -> None:
+    """Raises InvalidInput when a running launch has a share of one of them: it would lose what it is using."""
+    for enclave in enclaves:
+        for share in read_shares(root, enclave):
+            if is_running(root, share.owner):
+                raise InvalidInput(
+                    f"{printable(share.owner)} is running and uses enclave {enclave}; stop it first"
+                )

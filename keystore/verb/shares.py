@@ -1,0 +1,41 @@
+"""List which launches have shares of which enclaves, or drop the shares of one.
+
+Each launch on a keystore owns what it asks for; an enclave that several of them use gets all of it. A launch that is
+never started again keeps its share until it is dropped: with --drop OWNER, as it is listed. What no other launch asks
+for is then taken away for good.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("--drop", metavar="OWNER", help="drop the shares of this launch")
+    common.add_format(parser)
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.errors import printable
+    from keystore.steps.enclaves import drop_shares
+    from keystore.steps.options import ProvisionOptions
+    from keystore.steps.sharing import list_shares
+
+    if arguments.drop is not None:
+        options = ProvisionOptions(access=common.access(arguments), lock_timeout=arguments.lock_timeout)
+        common.print_report(drop_shares(arguments.keystore, arguments.drop, options=options))
+        return 0
+    found = list_shares(arguments.keystore)
+    if arguments.format == "json":
+        common.print_json({"version": 1, "launches": [one._asdict() for one in found]})
+    else:
+        common.print_lines(
+            f"{printable(one.owner)}{' (running)' if one.running else ''}: {' '.join(one.enclaves)}"
+            for one in found
+        )
+    return 0
