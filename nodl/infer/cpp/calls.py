@@ -599,6 +599,7 @@ def invoke(
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
     _write_back(run, function, inner, node, frame)
+    inner.finished = not inner.captured
     return inner.returned
 
 

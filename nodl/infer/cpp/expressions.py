@@ -639,6 +639,9 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         frame.file, frame.scope, frame.function, None, frame.bindings, frame, frame.path, run.conditions(node, frame),
         depth=frame.depth,
     )  # fmt: skip
+    outer: Frame | None = frame
+    while outer is not None:
+        outer.captured, outer = True, outer.outer
     captures = children(node.child_by_field_name("captures"))
     for child in captures:
         if child.type == "lambda_capture_initializer" and len(children(child)) >= 2:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.declarations import Class, FileIndex, Function
@@ -182,29 +182,38 @@ def _is_declaration(index: FileIndex, site: Site) -> bool:
 
 
 def reachable_functions(run: Machine) -> set[Function]:
-    """Every function that one of those that ran could call, by its name: more than are called, never fewer.
-
-    A method counts when its class, or one that derives from it, is spoken of in what is reached.
-    """
-    return _Reach(run).reached
+    """Every function that one of those that ran could call, by its name: more than are called, never fewer."""
+    return Reach(run).from_functions(run.called).reached
 
 
-class _Reach:
+class Reach:
+    """What can be called, by name. A method counts when its class, or one that derives from it, is made or spoken of."""
+
     def __init__(self, run: Machine):
         self.run = run
-        self.by_name: dict[str, list[Function]] = {}
-        for function in _all_functions(run):
-            self.by_name.setdefault(function.name, []).append(function)
+        self.by_name = run.names.functions_by_name
         self.mentioned: set[str] = set()
         self.used: set[str] = set()
         self.reached: set[Function] = set()
-        self.waiting = list(run.called)
+        self.waiting: list[Function] = []
         self.idle: dict[str, list[Function]] = {}  # class -> methods that wait for somebody to speak of it
-        for obj in run.made_objects():
-            if obj.cls is not None:
-                self._use(obj.cls.name)
+        self.used |= run.used_classes()
+
+    def from_functions(self, functions: Iterable[Function]) -> Reach:
+        for cls in sorted(self.used):
+            self._use_class(cls)
+        self.waiting += functions
+        return self._finish()
+
+    def from_words(self, words: Iterable[str]) -> Reach:
+        """From a function that mentions ``words``; what only the made objects' own hooks reach is left out."""
+        self._mention(words)
+        return self._finish()
+
+    def _finish(self) -> Reach:
         while self.waiting:
             self._visit(self.waiting.pop())
+        return self
 
     def _visit(self, function: Function) -> None:
         if function in self.reached:
@@ -228,9 +237,11 @@ class _Reach:
                 self._mention(_WORD.findall(target))
 
     def _use(self, name: str) -> None:
-        if name in self.used:
-            return
-        self.used.add(name)
+        if name not in self.used:
+            self.used.add(name)
+            self._use_class(name)
+
+    def _use_class(self, name: str) -> None:
         self.waiting += self.idle.pop(name, ())
         for cls in self.run.names.classes.get(name, ()):
             self._mention([name])
@@ -244,6 +255,16 @@ class _Reach:
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
-def _all_functions(run: Machine) -> Iterator[Function]:
-    for index in run.names.files.values():
-        yield from index.all_functions
+def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
+    """Whether a function with these words, or one that it may call, makes an interface, a node or a plugin."""
+    if any(CREATES.fullmatch(word) or word in MAKERS for word in words):
+        return True
+    reach = Reach(run).from_words(words)
+    return any(CREATES.fullmatch(w) or w in MAKERS for function in reach.reached for w in function.words)
+
+
+MAKERS = frozenset({
+    "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond", "ImageTransport", "Subscriber",
+    "SubscriberFilter", "BufferServer", "BufferClient", "AsyncParametersClient", "SyncParametersClient", "ParameterEventHandler",
+    "InteractiveMarkerServer", "SimpleActionServer", "SimpleActionClient", "ServiceClient", "CameraInfoManager",
+})  # fmt: skip

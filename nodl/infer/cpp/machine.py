@@ -7,13 +7,13 @@ libraries. A place that was run is noted; the ledger later asks about every othe
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.declarations import FileIndex, Function, Scope
 from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
-from nodl.infer.cpp.ledger import CREATES
+from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
 from nodl.infer.cpp.names import Names, Type, split_type
 from nodl.infer.cpp.store import Changes, Store
 from nodl.infer.cpp.syntax import line_of, text
@@ -97,6 +97,8 @@ class Frame:
     mark: int = 0
     loops: list[Loop] = field(default_factory=list)
     depth: int = 0
+    finished: bool = False  # nobody can see its variables any more
+    captured: bool = False  # a lambda can
 
     def owner_of(self, name: str) -> Frame | None:
         """The frame whose variable ``name`` is."""
@@ -135,7 +137,8 @@ class Machine:
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
         self.plugins_used: dict[str, None] = {}
-        self._relevant_names: frozenset[str] | None = None
+        self._used: tuple[int, set[str]] = (-1, set())
+        self._leading: dict[tuple[object, int], bool] = {}
 
     # --- running ------------------------------------------------------------------------------------------
 
@@ -256,19 +259,25 @@ class Machine:
 
     # --- who matters --------------------------------------------------------------------------------------
 
+    def used_classes(self) -> set[str]:
+        """The classes of all objects that were made, with their bases."""
+        if len(self.objects) != self._used[0]:
+            made = {obj.cls for obj in self.objects.values() if obj.cls is not None}
+            self._used = (len(self.objects), {each.name for cls in made for each in self.names.ancestry(cls)})
+        return self._used[1]
+
     def makes_interfaces(self, function: Function) -> bool:
-        """Whether ``function``, or anything whose name it mentions, may make an interface or a node."""
-        return bool(self._relevant() & (function.words | {function.name}))
+        """Whether ``function``, or anything that it may call, may make an interface or a node."""
+        return bool(CREATES.fullmatch(function.name)) or self._leads(function, function.words)
 
     def subtree_matters(self, node: Node) -> bool:
-        return bool(self._relevant() & frozenset(WORD.findall(text(node))))
+        return self._leads(node.id, frozenset(WORD.findall(text(node))))
 
-    def _relevant(self) -> frozenset[str]:
-        if self._relevant_names is None:
-            self._relevant_names = relevant_names(
-                f for i in self.names.files.values() for f in i.all_functions
-            )
-        return self._relevant_names
+    def _leads(self, key: object, words: frozenset[str]) -> bool:
+        known = (key, len(self.used_classes()))
+        if known not in self._leading:
+            self._leading[known] = leads_to_interfaces(self, words)
+        return self._leading[known]
 
     def new_node(self, node: Node, frame: Frame, key: object) -> NodeRecord:
         record = self.records.get(key)
@@ -279,28 +288,6 @@ class Machine:
 
 
 WORD = re.compile(r"[A-Za-z_]\w*")
-
-
-def relevant_names(functions: Iterable[Function]) -> frozenset[str]:
-    """Words that make an interface or a node, and the names of all functions that lead to them."""
-    listed = [(function, function.words) for function in functions]
-    relevant = set(LIBRARY_WORDS) | {w for _, words in listed for w in words if CREATES.fullmatch(w)}
-    while True:
-        more = {
-            f.name
-            for f, words in listed
-            if f.name not in relevant and f.name not in _COMMON_NAMES and words & relevant
-        }
-        if not more:
-            return frozenset(relevant)
-        relevant |= more
-
-
-# Methods of containers and of everything: following them by name alone would make every function relevant.
-_COMMON_NAMES = frozenset(
-    {"get", "push_back", "insert", "find", "at", "size", "begin", "end", "main", "reset", "str", "operator()"}
-)
-LIBRARY_WORDS = frozenset({"pluginlib"})
 
 
 def template_arguments(node: Node | None) -> list[Node]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple, TypeVar
 
 from nodl.infer.cpp.declarations import Class, FileIndex, Function, Global, Scope
@@ -98,6 +98,7 @@ class Names:
         self._visible: dict[str, frozenset[str]] = {}
         self._types: dict[tuple[str, Scope, str], Type] = {}
         self.classes: dict[str, list[Class]] = {}
+        self._found: dict[tuple[str, Scope, str], Class | None] = {}
         self.functions: dict[str, list[Function]] = {}
         self.declared: dict[str, list[Function]] = {}
         self.globals: dict[str, list[Global]] = {}
@@ -151,9 +152,23 @@ class Names:
             self._visible[file] = frozenset(found)
         return self._visible[file]
 
+    @cached_property
+    def functions_by_name(self) -> dict[str, list[Function]]:
+        found: dict[str, list[Function]] = {}
+        for index in self.files.values():
+            for function in index.all_functions:
+                found.setdefault(function.name, []).append(function)
+        return found
+
     # --- classes and functions --------------------------------------------------------------------------
 
     def find_class(self, name: str, scope: Scope, file: FileIndex) -> Class | None:
+        key = (name, scope, file.file)
+        if key not in self._found:
+            self._found[key] = self._find_class(name, scope, file)
+        return self._found[key]
+
+    def _find_class(self, name: str, scope: Scope, file: FileIndex) -> Class | None:
         last = name.rpartition("::")[2]
         listed = self.classes.get(last)
         if not listed:

@@ -260,6 +260,7 @@ def construct_class(
     if constructor is not None and constructor.body is not None:
         outcome = run.execute(constructor.body, inner)
         run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+    inner.finished = not inner.captured
     if constructor is not None:
         run.active.pop()
     elif arguments and cls.name in cls.declared:

@@ -30,7 +30,12 @@ class Store:
 
     def changes(self, mark: int) -> Changes:
         """What was written since ``mark``, as it is now."""
-        return {cell: self._cells[cell] for cell, _ in self._trail[mark:] if cell in self._cells}
+        cells = self._cells
+        return {
+            cell: cells[cell]
+            for cell, _ in self._trail[mark:]
+            if cell in cells and not getattr(cell[0], "finished", False)
+        }
 
     def before(self, cell: Cell, mark: int) -> Value:
         """The value that ``cell`` had at ``mark``."""

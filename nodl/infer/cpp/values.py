@@ -117,11 +117,18 @@ def join(*values: Value) -> Value:
     first = values[0] if values else BOTTOM
     if all(value is first or value == first for value in values[1:]):
         return first
-    found = tuple(dict.fromkeys(atom for value in values for atom in value))
+    found = _one_unknown(dict.fromkeys(atom for value in values for atom in value))
     if len(found) <= MAX_ALTERNATIVES:
         return found
     objects = tuple(atom for atom in found if isinstance(atom, Obj))[:MAX_ALTERNATIVES]
     return (*objects, Unknown("too many possible values"))
+
+
+def _one_unknown(atoms: Iterable[Atom]) -> Value:
+    """Of several things that are not known one is enough."""
+    found = tuple(atoms)
+    first = next((atom for atom in found if isinstance(atom, Unknown)), None)
+    return found if first is None else tuple(a for a in found if a is first or not isinstance(a, Unknown))
 
 
 def unknown(why: str) -> Value:
