@@ -20,6 +20,7 @@ from nodl.infer.cpp.libraries import (
     NODE_BASES,
     NODE_METHODS,
     Call,
+    is_harmless_class,
     is_harmless_function,
 )
 from nodl.infer.cpp.machine import (
@@ -32,7 +33,16 @@ from nodl.infer.cpp.machine import (
     template_arguments,
 )
 from nodl.infer.cpp.names import NO_TYPE, Type
-from nodl.infer.cpp.objects import bind_parameters, chosen, construct, copied, handed_over, made, nodes_in
+from nodl.infer.cpp.objects import (
+    bind_parameters,
+    chosen,
+    construct,
+    copied,
+    handed_over,
+    is_plain_type,
+    made,
+    nodes_in,
+)
 from nodl.infer.cpp.standard import CASTS, CONTAINER_METHODS, STANDARD, container_call, is_standard
 from nodl.infer.cpp.syntax import children, text, unwrapped
 from nodl.infer.cpp.values import (
@@ -218,7 +228,8 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
         if made_value is not None:
             return made_value
     kind = run.type_of(text(callee), frame)
-    if run.names.class_of(kind, frame.scope, frame.file) is not None or kind.name in LIBRARY_CLASSES:
+    known = kind.name in LIBRARY_CLASSES or is_plain_type(kind.name)
+    if known or run.names.class_of(kind, frame.scope, frame.file) is not None:
         return made(run, node, kind, given, frame)
     if head:
         found = _static_method(run, node, callee, head, last, given, frame)
@@ -581,7 +592,7 @@ def invoke(
     run.handle(node, frame)
     run.called.add(function)
     if run.active.count(function) > MAX_RECURSION or frame.depth > MAX_DEPTH:
-        if run.makes_interfaces(function):
+        if function.parameters and run.makes_interfaces(function):
             run.gap(node, frame, f"{function} calls itself, deeper than is followed")
         return unknown("a recursion")
     inner = Frame(
@@ -686,6 +697,8 @@ def unknown_call(
     """A function of a library that is not modelled."""
     last = name.rpartition("::")[2]
     harmless = is_harmless_function(name) or (receiver is not None and receiver.type.name in LIBRARY_CLASSES)
+    if receiver is not None and receiver.foreign_base and is_harmless_class(receiver.foreign_base):
+        harmless = True
     if CREATES.fullmatch(last) and not harmless:
         run.handle(node, frame)
         run.gap(

@@ -12,6 +12,7 @@ from nodl.infer.cpp.syntax import children, line_of, parse, text, walk
 if TYPE_CHECKING:
     from tree_sitter import Node, Tree
 
+_LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
 Scope = tuple[str, ...]  # namespaces and classes around a declaration
 
 
@@ -44,7 +45,7 @@ class Function:
     def words(self) -> frozenset[str]:
         """Every identifier in it: whoever it may call is among them."""
         if self._words is None:
-            self._words = frozenset(re.findall(r"[A-Za-z_]\w*", text(self.node)))
+            self._words = frozenset(re.findall(r"[A-Za-z_]\w*", _LITERAL.sub("", text(self.node))))
         return self._words
 
     @property
@@ -113,6 +114,7 @@ class FileIndex:
         default_factory=dict
     )  # qualified -> what it stands for, where
     using: list[str] = field(default_factory=list)  # using namespace
+    enums: set[str] = field(default_factory=set)
     enumerators: dict[str, str] = field(default_factory=dict)  # qualified and last name -> qualified
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
@@ -198,6 +200,7 @@ class _Collector:
         name = text(node.child_by_field_name("name"))
         body = node.child_by_field_name("body")
         prefix = "::".join((*scope, *([name] if name else [])))
+        self.index.enums.add(name)
         for child in children(body):
             if child.type == "enumerator":
                 constant = text(child.child_by_field_name("name"))
@@ -293,7 +296,7 @@ class _Collector:
         if node.type == "using_declaration":
             target = text(node.named_children[-1]) if node.named_children else ""
             if re.match(r"using\s+namespace\b", text(node)):
-                self.index.using.append(target)
+                self.index.using.append(target.lstrip(":"))
             else:
                 name = target.rpartition("::")[2]
                 if cls is not None and (

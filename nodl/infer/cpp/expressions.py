@@ -12,6 +12,8 @@ from nodl.infer.cpp.objects import as_map, construct, copied, default_value, mad
 from nodl.infer.cpp.syntax import children, text, unwrapped, walk
 from nodl.infer.cpp.values import (
     BOTTOM,
+    END,
+    NPOS,
     Bound,
     Const,
     Group,
@@ -151,6 +153,8 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
     found = constant(run, name, frame)
     if found is not None:
         return found
+    if name.endswith("string::npos"):
+        return (NPOS,)
     return unknown(f"the value of {name}")
 
 
@@ -272,6 +276,8 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if operator in ("&&", "||", "and", "or"):
         return _logical(run, operator in ("||", "or"), left, right_node, frame)
     right = run.evaluate(right_node, frame)
+    if operator == ">>" and _has_text(left):
+        return _extracted(run, left_node, left, right_node, frame)
     if operator == "<<":
         return _streamed(run, left_node, left, right, frame)
     if operator == "+" and (_has_text(left) or _has_text(right)):
@@ -325,6 +331,10 @@ def _same(left: object, right: object) -> bool | None:
         return first == second
     if isinstance(left, Const) and isinstance(right, Const):
         return left == right
+    if END in (left, right) and isinstance(left if right == END else right, Obj | Group | Text | Bound):
+        return False  # an element that was found
+    if NPOS in (left, right) and isinstance(left if right == NPOS else right, int):
+        return False
     return None
 
 
@@ -347,6 +357,20 @@ def _streamed(run: Machine, target: Node | None, left: Value, right: Value, fram
     if inner is not None and inner.type in ("identifier", "field_expression", "field_identifier"):
         assign(run, inner, found, frame)
     return found
+
+
+def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | None, frame: Frame) -> Value:
+    """``stream >> word``: the first word of a text that is known, and the rest stays."""
+    words = [run.text_of(atom) for atom in left]
+    if len(words) != 1 or words[0] is None or stream is None or right is None:
+        if right is not None:
+            assign(run, right, unknown("a word that is read from a stream"), frame)
+        return unknown("a stream")
+    found = words[0].split(None, 1)
+    assign(run, stream, literal(found[1] if len(found) > 1 else ""), frame)
+    if found:
+        assign(run, right, literal(found[0]), frame)
+    return (bool(found),)
 
 
 @expression("unary_expression")
@@ -496,6 +520,9 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     owners = run.evaluate(node.child_by_field_name("argument"), frame)
     name = text(node.child_by_field_name("field"))
     objects = [atom for atom in owners if isinstance(atom, Obj)]
+    if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
+        for atom in value:  # a library keeps it and may call it
+            run.later(atom, frame)
     for each in objects:
         strong = len(owners) == 1
         before = run.store.get((each, name)) or BOTTOM
@@ -571,6 +598,9 @@ def element(run: Machine, atom: object, key: Value) -> Value:
         return join(*items) if items else unknown("an element of a list")
     if isinstance(atom, Unknown):
         return (atom,)
+    written = run.settled_text(atom) if isinstance(atom, Text) else None
+    if written is not None and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(written):
+        return literal(written[key[0]])
     return unknown("an element of something that is not known")
 
 

@@ -37,7 +37,7 @@ class NodeRecord:
     endpoints: dict[FoundEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
     parameters: dict[str, Value] = field(default_factory=dict)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
-    arguments: list[tuple[Value, ...]] = field(default_factory=list)
+    arguments: list[tuple[str | None, ...]] = field(default_factory=list)
     use_global_arguments: bool = True
     overrides: dict[str, Value] = field(default_factory=dict)
     description: str = ""

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
-from nodl.infer.cpp.declarations import Class, FileIndex, Function
+from nodl.infer.cpp.declarations import Class, Field, FileIndex, Function
 from nodl.infer.cpp.syntax import text
 from nodl.source_ref import SourceRef
 
@@ -187,7 +187,7 @@ def reachable_functions(run: Machine) -> set[Function]:
 
 
 class Reach:
-    """What can be called, by name. A method counts when its class, or one that derives from it, is made or spoken of."""
+    """What can be called, by name. A method counts when its class, or one derived from it, is made or spoken of."""
 
     def __init__(self, run: Machine):
         self.run = run
@@ -244,14 +244,26 @@ class Reach:
     def _use_class(self, name: str) -> None:
         self.waiting += self.idle.pop(name, ())
         for cls in self.run.names.classes.get(name, ()):
-            self._mention([name])
-            for written in (*cls.bases, *(field.type for field in cls.fields.values())):
+            for written in cls.bases:
                 self._mention(_WORD.findall(written))
+            for field in cls.fields.values():
+                self._field(field)
             for method in (m for table in self.run.names.methods.get(cls, {}).values() for m in table):
                 if method.virtual:  # called through a base
                     self.waiting.append(method)
 
+    def _field(self, field: Field) -> None:
+        """A member object is made with its class; a pointer only points to what somebody else made."""
+        words = _WORD.findall(field.type)
+        if not field.pointer and not _POINTER.search(field.type):
+            self._mention(words)
+            return
+        for word in words:
+            if word in self.run.names.classes:
+                self._use(word)
 
+
+_POINTER = re.compile(r"_ptr\b|Ptr\b|\*|&|\bweak_|optional")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -264,7 +276,9 @@ def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
 
 
 MAKERS = frozenset({
-    "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond", "ImageTransport", "Subscriber",
-    "SubscriberFilter", "BufferServer", "BufferClient", "AsyncParametersClient", "SyncParametersClient", "ParameterEventHandler",
+    "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond",
+    "ImageTransport", "Subscriber",
+    "SubscriberFilter", "BufferServer", "BufferClient", "AsyncParametersClient", "SyncParametersClient",
+    "ParameterEventHandler",
     "InteractiveMarkerServer", "SimpleActionServer", "SimpleActionClient", "ServiceClient", "CameraInfoManager",
 })  # fmt: skip

@@ -42,11 +42,11 @@ NODE_METHODS: dict[str, FunctionModel] = {}
 
 # Classes that make no interface of their own, whoever they get. rclcpp: read in include/rclcpp of humble to rolling.
 _HARMLESS_CLASSES = re.compile(
-    r"(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|sensor_msgs::PointCloud2\w+|tinyxml2|urdf|KDL|angles|grid_map)::.*"
-    r"|rclcpp::(?:Rate|WallRate|GenericRate|Clock|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"
+    r"sensor_msgs::PointCloud2\w+|(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|tinyxml2|urdf|KDL|angles|grid_map)::.*"
+    r"|rclcpp::(?:Rate|WallRate|GenericRate|GenericTimer|WallTimer|\w*Handle|\w*Guard|Event|Clock|TimeSource|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"
     r"ParameterValue|NodeOptions|\w*Options|Context|TimerBase|CallbackGroup|MessageInfo|SerializedMessage|Serialization|"
     r"WaitSet|GuardCondition|PublisherEventCallbacks|SubscriptionEventCallbacks|NetworkFlow\w*|ParameterMap|ParameterType|"
-    r"executors::\w+|Executor|FutureReturnCode|exceptions::.*|QOS\w+|AnySubscriptionCallback|\w*SubscriptionOptions\w*|\w*PublisherOptions\w*)"
+    r"executors::\w+|strategies::.*|memory_strategies::.*|message_memory_strategy::.*|Executor|FutureReturnCode|exceptions::.*|QOS\w+|AnySubscriptionCallback|\w*SubscriptionOptions\w*|\w*PublisherOptions\w*)"
     r"|rclcpp_lifecycle::(?:State|Transition)|rclcpp_components::NodeInstanceWrapper"
     r"|rclcpp_action::(?:\w*GoalHandle|ResultCode|GoalUUID|.*Options)"
     r"|tf2::.*|tf2_ros::(?:CreateTimerROS|CreateTimerInterface|AsyncBufferInterface)"
@@ -57,7 +57,7 @@ _HARMLESS_CLASSES = re.compile(
 )
 _HARMLESS_FUNCTIONS = re.compile(
     r"(?:std|Eigen|cv|boost|tf2|fmt|angles|YAML|nlohmann|pcl|rcpputils|rcutils|ament_index_cpp|KDL|cv_bridge|__builtin)::.*"
-    r"|RCLCPP_\w+|RCUTILS_\w+|ROS_\w+|rc(?:l|utils|pputils)_\w+|rmw_\w+|assert|ASSERT|printf|fprintf|memcpy|memset|signal|sqrt\w*|"
+    r"|TRACEPOINT|TRACETOOLS_\w+|RCLCPP_\w+|RCUTILS_\w+|ROS_\w+|rc(?:l|utils|pputils)_\w+|rmw_\w+|assert|ASSERT|printf|fprintf|memcpy|memset|signal|sqrt\w*|"
     r"f?abs|(?:a?sin|a?cos|a?tan2?|exp|log\w*|pow|floor|ceil|round|hypot|fmod|isnan|isinf|strcmp|strlen|atoi|atof|rand|srand|"
     r"usleep|sleep|exit|min|max|setvbuf|perror|puts|malloc|free|getenv|clamp|swap|isfinite|emplace_back|static_assert|connect|"
     r"tolower|toupper|isspace|snprintf|sprintf|strtol|strtod|fabsf|doTransform|toMsg|fromMsg|get_logger|now)"

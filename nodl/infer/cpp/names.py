@@ -45,6 +45,13 @@ KNOWN_HEADERS = frozenset({
 })  # fmt: skip
 
 
+# Of these, the ones with nodes among their classes: each class that is made is in the table, or a gap.
+ROS_LIBRARIES = frozenset({
+    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "tf2_ros", "image_transport", "message_filters",
+    "diagnostic_updater", "nav2_util", "interactive_markers", "camera_info_manager", "realtime_tools", "bond",
+})  # fmt: skip
+
+
 class Type(NamedTuple):
     """``name`` qualified as far as known, without template arguments. ``pointer``: nothing is made by declaring one."""
 
@@ -104,6 +111,8 @@ class Names:
         self.globals: dict[str, list[Global]] = {}
         self.aliases: dict[str, list[tuple[FileIndex, str, str, Scope]]] = {}
         self.enumerators: dict[str, str] = {}
+        self.enums: set[str] = set()
+        self._bases: dict[str, tuple[str, ...]] = {}
         self.depends: frozenset[str] = frozenset()  # what the packages of the program depend on
         self.plugins: dict[str, str] = {}  # lookup name or class -> class
         for index in self.files.values():
@@ -119,6 +128,7 @@ class Names:
             last = qualified.rpartition("::")[2]
             self.aliases.setdefault(last, []).append((index, qualified, target, scope))
         self.enumerators.update(index.enumerators)
+        self.enums |= index.enums
 
     def _attach(self) -> None:
         """Methods defined outside of their class."""
@@ -186,11 +196,23 @@ class Names:
         name = name.lstrip(":")
         for length in range(len(scope), -1, -1):
             yield "::".join((*scope[:length], name))
+            for base in self._base_names("::".join(scope[:length])) if length else ():
+                yield f"{base}::{name}"
         for each in sorted(self.visible(file.file)):
             for used in self.files[each].using if each in self.files else ():
                 yield f"{used}::{name}"
                 for length in range(len(scope), 0, -1):
                     yield "::".join((*scope[:length], used, name))
+
+    def _base_names(self, qualified: str) -> tuple[str, ...]:
+        """The bases of a class by that name: what they declare is visible in it."""
+        if qualified not in self._bases:
+            self._bases[qualified] = ()  # while the bases themselves are looked up
+            found = [
+                c for c in self.classes.get(qualified.rpartition("::")[2], ()) if c.qualified == qualified
+            ]
+            self._bases[qualified] = tuple(b.qualified for c in found for b in self.ancestry(c)[1:])
+        return self._bases[qualified]
 
     def _nearest(self, matches: list[Class], file: FileIndex) -> Class:
         own = [each for each in matches if each.file.file == file.file]
@@ -338,8 +360,10 @@ class Names:
         if rest.startswith("::"):
             outer = self._resolve(f"{name}<{', '.join(given)}>", scope, file, bindings, depth + 1)
             return self._member(outer, rest[2:], pointer, scope, file)
-        if name in bindings and not given:
-            return bindings[name]._replace(pointer=pointer or bindings[name].pointer)
+        if name in bindings:
+            bound = bindings[name]
+            filled = tuple(self.resolve(each, scope, file, bindings, depth + 1) for each in given)
+            return bound._replace(pointer=pointer or bound.pointer, arguments=filled or bound.arguments)
         first, separator, tail = name.partition("::")
         if separator and first in bindings:
             return self._member(bindings[first], tail, pointer, scope, file)

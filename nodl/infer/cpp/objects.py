@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.declarations import Class, Function, Parameter
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
 from nodl.infer.cpp.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
-from nodl.infer.cpp.names import KNOWN_HEADERS, NO_TYPE, Type
+from nodl.infer.cpp.names import KNOWN_HEADERS, NO_TYPE, ROS_LIBRARIES, Type
 from nodl.infer.cpp.syntax import children, line_of, text
 from nodl.infer.cpp.values import (
     BOTTOM,
@@ -55,6 +55,11 @@ _SCALARS = frozenset({
     "uint8_t", "uint16_t", "uint32_t", "uint64_t", "int8_t", "int16_t", "int32_t", "int64_t", "unsigned int",
     "std::atomic_bool", "std::chrono::milliseconds", "std::chrono::seconds",
 })  # fmt: skip
+
+
+def is_plain_type(name: str) -> bool:
+    """A text, number or container."""
+    return name in _SEQUENCES or name in _MAPS or name in _TEXTS or name in _SCALARS
 
 
 def declared_value(
@@ -174,7 +179,7 @@ def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
         return (Seq(()),)
     if kind.name in _MAPS:
         return (Map(()),)
-    if kind.name in _SCALARS or not kind.name:
+    if kind.name in _SCALARS or not kind.name or kind.last in run.names.enums:
         return unknown("a value that is not set")
     if kind.name in ("std::function", "std::pair", "std::tuple", "std::mutex"):
         return BOTTOM
@@ -202,16 +207,27 @@ def construct(
         return (made_object,) if found is None else found
     if not is_harmless_class(kind.name):
         handed_over(run, f"the constructor of {kind.name}", arguments, node, frame)
-        _unmodelled(run, kind, node, frame)
+        _unmodelled(run, kind, node, frame, heap or bool(arguments))
     made_object.data["arguments"] = list(arguments)
     return (made_object,)
 
 
-def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame) -> None:
-    """A class of a ROS library that is neither in reach nor in the table may make a node of its own."""
-    if kind.name.partition("::")[0] in KNOWN_HEADERS:
+def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: bool) -> None:
+    """A class that is neither in reach nor in the table may be a node or make one.
+
+    ``deliberate``: it is made with arguments or with new, as structures of C are not.
+    """
+    first = kind.name.partition("::")[0]
+    if first in KNOWN_HEADERS and not (deliberate and first in ROS_LIBRARIES):
+        return
+    if first in ROS_LIBRARIES:
+        run.gap(
+            node, frame, f"the class {kind.name} is not in the table of {first}: it may be a node or make one"
+        )
         return
     header = run.names.foreign_header(kind.name, frame.file)
+    if not header and deliberate and "::" not in kind.name:
+        header = "no header in reach defines it"
     if header:
         run.gap(
             node, frame, f"the class {kind.name} is not in reach ({header}): it may be a node or make one"
@@ -541,19 +557,11 @@ def items_of(run: Machine, atom: object) -> tuple[list[Value], bool]:
 
 def parameter_items(run: Machine, atom: Param) -> tuple[list[Value], bool]:
     """The elements of a list that a parameter gives: those of the launch file, else of its default."""
-    given = run.settings.parameters
-    if given is not None and isinstance(given.get(atom.name), list | tuple):
-        listed = given[atom.name]
-        run.consulted[atom.name] = listed
-        values = listed if isinstance(listed, list | tuple) else []
-        return [
-            (Param(atom.record, atom.name, index, literal(str(each))),) for index, each in enumerate(values)
-        ], True
+    given = run.given(atom.record, atom.name)
+    if isinstance(given, list | tuple):
+        return [(Param(atom.record, atom.name, i, literal(str(each))),) for i, each in enumerate(given)], True
     default = tuple(each for each in atom.default if isinstance(each, Seq) and not each.open)
     if default and len(default) == len(atom.default):
-        if given is None:
-            run.from_default[atom.name] = None
-        run.consulted.setdefault(atom.name, None)
         longest = max(default, key=lambda each: len(each.items))
         if len(default) == 1:
             return [

@@ -28,7 +28,7 @@ _EXPORT = re.compile(
     r"\b[A-Z][A-Z0-9_]*_(?:PUBLIC|EXPORT|API|LOCAL|DLL|IMPORT|PUBLIC_TYPE|VISIBILITY|DECL|SYMBOL)\b(?!\s*\()"
 )
 _BEFORE_CLASS_NAME = re.compile(
-    r"\b(class|struct)(\s+)([A-Za-z_]\w*)(\s*\([^()]*\))?(?=\s+[A-Za-z_]\w*(?:\s*::\s*\w+)*\s*(?:final\s*)?[:{<])"
+    r"\b(class|struct)(\s+)([A-Za-z_]\w*)(\s*\([^()]*\))?(?=\s+(?!final\b)[A-Za-z_]\w*(?:\s*::\s*\w+)*\s*(?:final\s*)?[:{<])"
 )
 _DISAMBIGUATOR = re.compile(
     r"(?<=->)\s*template\b|(?<=\.)\s*template\b|(?<=::)\s*template\b|\btypename\b(?=\s+[\w:]+::)"

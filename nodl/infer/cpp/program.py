@@ -15,7 +15,7 @@ from nodl.infer.cpp.declarations import Class, FileIndex, Function, index_file
 from nodl.infer.cpp.findings import NodeRecord
 from nodl.infer.cpp.ledger import CREATES, Answer, account
 from nodl.infer.cpp.machine import BudgetExceeded, Frame, Machine, Settings
-from nodl.infer.cpp.names import Names, Type
+from nodl.infer.cpp.names import KNOWN_HEADERS, Names, Type
 from nodl.infer.cpp.objects import construct
 from nodl.infer.cpp.preprocess import Preprocessed, preprocess
 from nodl.infer.cpp.project import SourcePackage, Workspace, sources_of
@@ -62,14 +62,21 @@ class Sources:
 
                 def include(name: str, quoted: bool) -> Preprocessed | None:
                     found = self.workspace.header(name, file, quoted)
-                    return (
-                        self.preprocessed(found, symbols, complete)
-                        if found and not _is_modelled(name)
-                        else None
-                    )
+                    if found is None or self._is_modelled(name, found, file):
+                        return None
+                    return self.preprocessed(found, symbols, complete)
 
                 self._preprocessed[key] = preprocess(file, source, symbols, complete, include)
         return self._preprocessed[key]
+
+    def _is_modelled(self, name: str, found: str, file: str) -> bool:
+        """rclcpp is known by its model alone; other libraries of the table too, but for their own packages."""
+        folder = name.partition("/")[0]
+        if folder in _CORE:
+            return True
+        return folder in KNOWN_HEADERS and self.workspace.package_of(found) is not self.workspace.package_of(
+            file
+        )
 
     def _read(self, file: str) -> str | None:
         try:
@@ -113,18 +120,9 @@ class Sources:
         return list(found.values())
 
 
-def _is_modelled(name: str) -> bool:
-    """Headers of rclcpp and kin are known by their models, also where they are installed."""
-    return name.partition("/")[0] in _MODELLED or name.endswith((".h.inc",))
-
-
-_MODELLED = frozenset({
-    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcutils", "rmw", "rcpputils",
-    "pluginlib",
-    "class_loader", "message_filters", "tf2_ros", "tf2", "image_transport", "diagnostic_updater", "bondcpp", "bond",
-    "rosidl_runtime_cpp", "rosidl_typesupport_cpp", "cv_bridge", "ament_index_cpp", "realtime_tools",
-    "laser_geometry",
-    "interactive_markers", "camera_info_manager",
+_CORE = frozenset({
+    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcutils", "rmw", "rcpputils", "pluginlib",
+    "class_loader", "rosidl_runtime_cpp", "rosidl_typesupport_cpp", "tracetools",
 })  # fmt: skip
 
 

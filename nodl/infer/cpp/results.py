@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from itertools import pairwise
 
 from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.program import Findings
 from nodl.infer.cpp.values import NodePart, Text, Value, concatenated, plain
-from nodl.infer.results import certainty_of, remapped
+from nodl.infer.results import certainty_of
 from nodl.name_template import NameTemplate, Part, UnknownPart
-from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
-from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+from nodl.node_interface import RANDOM_ENDING, Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
+from nodl.remap import InvalidRemapRuleError, parse_rule
 
 
 def interfaces_of(
@@ -41,7 +42,9 @@ def _of_node(
     endpoints = tuple(dict.fromkeys(e for found, when in record.endpoints.items() if _is_certain(found, when, record)
                                     for e in _endpoint(found, record)))  # fmt: skip
     names: list[str | None] = [*_texts(record.names, record)]
-    if not names or len(names) < len(record.names):
+    if not names and record.description == "tf2_ros::TransformListener":
+        names = [f"transform_listener_impl{RANDOM_ENDING}"]
+    elif not names or len(names) < len(record.names):
         gaps.append(Gap(record.source, "the name of this node is made at run time"))
         names = names or [None]
     namespaces: list[str | None] = ["/" + text.lstrip("/") for text in _texts(record.namespaces, record)]
@@ -54,8 +57,9 @@ def _of_node(
                 package=package, executable=executable, plugin=plugin, name=name, namespace=namespace,
                 endpoints=endpoints, source=record.source, library=ClientLibrary.RCLCPP, lifecycle=record.lifecycle,
                 parameters=tuple(sorted(record.parameters)), gaps=tuple(dict.fromkeys(gaps)),
+                own_rules=rules,
             )  # fmt: skip
-            interfaces.append(remapped(interface, rules) if rules.local else interface)
+            interfaces.append(interface)
     return interfaces
 
 
@@ -152,19 +156,17 @@ def _conditional_gaps(record: NodeRecord) -> list[Gap]:
 # --- remap rules in code ----------------------------------------------------------------------------------------
 
 
-def _rules(record: NodeRecord, gaps: list[Gap]) -> RemapRules:
-    rules: list[ParsedRule] = []
+def _rules(record: NodeRecord, gaps: list[Gap]) -> tuple[str, ...]:
+    """The remap rules in the options of the node; what cannot be read as one is a gap."""
+    rules: dict[str, None] = {}
     for words in record.arguments:
-        known = [_texts(word, record) for word in words]
-        for index, word in enumerate(known[:-1]):
-            if word in (["-r"], ["--remap"]):
-                if len(known[index + 1]) != 1:
-                    gaps.append(Gap(record.source, "a remap rule given in code is not known"))
-                    continue
+        for before, word in pairwise(words):
+            if before in ("-r", "--remap") and word is not None:
                 try:
-                    rules.append(parse_rule(known[index + 1][0]))
+                    parse_rule(word)
+                    rules.setdefault(word)
                 except InvalidRemapRuleError as error:
                     gaps.append(Gap(record.source, str(error)))
-        if any(len(each) != 1 for each in known) and not any(each in (["-r"], ["--remap"]) for each in known):
-            gaps.append(Gap(record.source, "arguments given in code are not known"))
-    return RemapRules(tuple(rules), ())
+        if any(word is None and before not in ("-p", "--param") for before, word in pairwise(("", *words))):
+            gaps.append(Gap(record.source, "an argument that the program gives to the node is not known"))
+    return tuple(rules)

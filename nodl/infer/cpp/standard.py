@@ -13,6 +13,8 @@ from nodl.infer.cpp.objects import construct, copied, declared_value, items_of
 from nodl.infer.cpp.syntax import children, text, unwrapped
 from nodl.infer.cpp.values import (
     BOTTOM,
+    END,
+    NPOS,
     Bound,
     Const,
     Group,
@@ -28,6 +30,7 @@ from nodl.infer.cpp.values import (
     join,
     literal,
     plain,
+    truth,
     unknown,
 )
 
@@ -118,7 +121,6 @@ def _is_placeholder(value: Value) -> bool:
     "std::sort",
     "std::any_of",
     "std::all_of",
-    "std::find_if",
     "std::make_heap",
     "std::generate",
     "std::invoke",
@@ -132,6 +134,28 @@ def _calls_back(
         for atom in value:
             run.later(atom, frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
+
+
+@_standard("std::find_if", "std::find")
+def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
+    """The element of a list that is exactly known, or its end."""
+    from nodl.infer.cpp.calls import call_values
+
+    items, exact = items_of(run, values[0][0]) if values and len(values[0]) == 1 else ([], False)
+    for item in items if exact and len(values) > 2 else ():
+        called = any(isinstance(atom, Lambda | Bound) for atom in values[2])
+        answer = truth(call_values(run, values[2], [item], node, frame)) if called else same(item, values[2])
+        if answer is None:
+            return unknown("an element that is looked for")
+        if answer:
+            return item
+    return (END,) if exact else unknown("an element that is looked for")
+
+
+def same(left: Value, right: Value) -> bool | None:
+    first = plain(left[0]) if len(left) == 1 else None
+    second = plain(right[0]) if len(right) == 1 else None
+    return None if first is None or second is None else first == second
 
 
 @_standard("std::function", "std::optional", "std::make_optional", "std::shared_ptr", "std::unique_ptr", "std::begin",
@@ -190,7 +214,8 @@ def container_call(
         return _map_call(run, atom, name, receiver, values, node, given, frame)
     if isinstance(atom, Param) and name in _PARAMETER_VIEWS:
         return (atom,)
-    if isinstance(atom, Param) and name in ("size", "empty", "at", "front", "back"):
+    is_list = isinstance(atom, Param) and any(isinstance(each, Seq) for each in atom.default)
+    if isinstance(atom, Param) and is_list and name in ("size", "empty", "at", "front", "back"):
         items, exact = items_of(run, atom)
         if len(items) != 1 or not isinstance(items[0][0], Unknown):
             return _sequence_call(run, Seq(tuple(items), not exact), name, None, values, frame)
@@ -275,17 +300,25 @@ def _map_call(
         assign(run, receiver, (atom if pairs else atom._replace(open=True),), frame)
     elif name == "clear" and receiver is not None:
         assign(run, receiver, (Map(()),), frame)
-    elif name in ("at", "find") and values:
-        return (
-            element(run, atom, values[0])
-            if name == "at"
-            else (Group((values[0], element(run, atom, values[0]))),)
-        )
-    elif name in ("begin", "cbegin", "end"):
+    elif name == "at" and values:
+        return element(run, atom, values[0])
+    elif name == "find" and values:
+        missing = not atom.open and _is_missing(atom, values[0])
+        return (END,) if missing else (Group((values[0], element(run, atom, values[0]))),)
+    elif name in ("end", "cend"):
+        return (END,)
+    elif name in ("begin", "cbegin"):
         return (atom,)
     elif name == "size" and not atom.open:
         return (len(atom.entries),)
     return unknown(f"the result of {name}()")
+
+
+def _is_missing(atom: Map, key: Value) -> bool:
+    """Whether a map certainly has no such key."""
+    if len(key) != 1 or plain(key[0]) is None:
+        return False
+    return all(len(known) == 1 and plain(known[0]) is not None and known != key for known, _ in atom.entries)
 
 
 def _sequence_call(
@@ -296,7 +329,9 @@ def _sequence_call(
         if exact and atom.items and name != "at":
             return atom.items[0 if name == "front" else -1]
         return element(run, atom, values[0] if values else BOTTOM)
-    if name in ("begin", "end", "cbegin", "cend", "rbegin", "data", "value_or"):
+    if name in ("end", "cend", "rend"):
+        return (END,)
+    if name in ("begin", "cbegin", "rbegin", "data", "value_or"):
         return (atom,)
     if name == "size":
         return (len(atom.items),) if exact else unknown("a size")
@@ -377,7 +412,7 @@ def _text_call(
 def _computed_text(
     run: Machine, atom: Text | Param, name: str, receiver: Node | None, values: list[Value], frame: Frame
 ) -> Value:
-    known = plain(atom)
+    known = run.settled_text(atom)
     numbers = [value[0] for value in values if len(value) == 1 and isinstance(value[0], int)]
     texts = [plain(value[0]) for value in values if len(value) == 1]
     if known is None:
@@ -386,6 +421,9 @@ def _computed_text(
         return unknown(f"the result of {name}()")
     if name == "empty":
         return (not known,)
+    if name in ("find", "rfind") and texts and texts[0] is not None:
+        found = known.find(texts[0]) if name == "find" else known.rfind(texts[0])
+        return (found,) if found >= 0 else (NPOS,)
     if name in ("size", "length"):
         return (len(known),)
     if name in ("front", "back") and known:

@@ -494,8 +494,8 @@ def _local_alias(run: Machine, node: Node, frame: Frame) -> None:
     if node.type == "using_declaration":
         target = text(inner[-1]) if inner else ""
         if "namespace" in text(node).split():
-            if target not in frame.file.using:
-                frame.file.using.append(target)
+            if target.lstrip(":") not in frame.file.using:
+                frame.file.using.append(target.lstrip(":"))
             return
         bound = {target.rpartition("::")[2]: run.type_of(target, frame)}
     elif node.type == "type_definition":

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.names import Type
 
 MAX_ALTERNATIVES = 32
+MAX_SEQUENCES = 6
 Atom = Any  # one of the classes below, or bool, int, float
 Value = tuple[Atom, ...]
 BOTTOM: Value = ()
@@ -43,6 +44,10 @@ class Const(NamedTuple):
     """An enumerator, by its qualified name."""
 
     name: str
+
+
+END = Const("the end of a container")
+NPOS = Const("std::string::npos")
 
 
 class Param(NamedTuple):
@@ -118,10 +123,18 @@ def join(*values: Value) -> Value:
     if all(value is first or value == first for value in values[1:]):
         return first
     found = _one_unknown(dict.fromkeys(atom for value in values for atom in value))
+    if len(found) > MAX_SEQUENCES and sum(isinstance(atom, Seq) for atom in found) > MAX_SEQUENCES:
+        found = _one_sequence(found)
     if len(found) <= MAX_ALTERNATIVES:
         return found
     objects = tuple(atom for atom in found if isinstance(atom, Obj))[:MAX_ALTERNATIVES]
     return (*objects, Unknown("too many possible values"))
+
+
+def _one_sequence(atoms: Value) -> Value:
+    """Many possible lists become one whose items come any number of times."""
+    items = dict.fromkeys(item for atom in atoms if isinstance(atom, Seq) for item in atom.items)
+    return (*(atom for atom in atoms if not isinstance(atom, Seq)), Seq(tuple(items), open=True))
 
 
 def _one_unknown(atoms: Iterable[Atom]) -> Value:

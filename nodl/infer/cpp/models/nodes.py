@@ -78,8 +78,9 @@ def _is_options(value: Value) -> bool:
 def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, frame: Frame) -> None:
     for atom in run.store.get((options, "arguments")) or BOTTOM:
         if isinstance(atom, Seq) and not atom.open:
-            if atom.items not in record.arguments:
-                record.arguments.append(atom.items)
+            words = tuple(_word(run, item) for item in atom.items)
+            if words not in record.arguments:
+                record.arguments.append(words)
         else:
             record.gap(
                 run.place(node, frame), "remap rules given in code (NodeOptions.arguments) are not known"
@@ -95,6 +96,11 @@ def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, fr
         if isinstance(atom, Seq):
             for item in atom.items:
                 _override(record, item)
+
+
+def _word(run: Machine, item: Value) -> str | None:
+    """An argument as text; names of other nodes are those of this start."""
+    return run.text_of(item[0]) if len(item) == 1 else None
 
 
 def _override(record: NodeRecord, item: Value) -> None:
@@ -231,7 +237,8 @@ def _setter(run: Machine, call: Call) -> Value:
     if call.receiver is None:
         return BOTTOM
     if not call.values:
-        return run.store.get((call.receiver, name)) or unknown(f"the {name} of node options")
+        known = run.store.get((call.receiver, name))
+        return known or ((Seq(()),) if name == "arguments" else unknown(f"the {name} of node options"))
     if name == "append_parameter_override":
         pair = (Seq((call.value(0), call.value(1))),)
         before = run.store.get((call.receiver, "overrides")) or BOTTOM

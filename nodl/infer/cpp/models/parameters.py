@@ -25,7 +25,6 @@ from nodl.infer.cpp.values import (
     concatenated,
     join,
     literal,
-    plain,
     unknown,
 )
 from nodl.infer.models.signatures import PARAMETER_SERVICES
@@ -41,48 +40,7 @@ _TYPES = frozenset({"ParameterType", "PARAMETER_STRING", "PARAMETER_STRING_ARRAY
 
 def parameter_names(run: Machine, value: Value) -> list[str | None]:
     """The texts that name a parameter; those made of parameters by what the launch file, else the default, gives."""
-    return [_filled(run, atom) for atom in value]
-
-
-def _filled(run: Machine, atom: object) -> str | None:
-    if isinstance(atom, Param):
-        return _value_of(run, atom)
-    if not isinstance(atom, Text):
-        return None
-    pieces = [_piece(run, part) for part in atom.parts]
-    return None if None in pieces else "".join(piece for piece in pieces if piece is not None)
-
-
-def _piece(run: Machine, part: object) -> str | None:
-    from nodl.name_template import ParameterPart
-
-    if isinstance(part, str):
-        return part
-    if isinstance(part, ParameterPart):
-        run.consulted.setdefault(part.name, None)
-        texts = part.texts(run.settings.parameters or {})
-        if run.settings.parameters is None:
-            run.from_default[part.name] = None
-        return texts[0] if len(texts) == 1 else None
-    if isinstance(part, NodePart) and part.what == "name":
-        names = [plain(each) for each in part.record.names]
-        return names[0] if len(names) == 1 else None
-    return None
-
-
-def _value_of(run: Machine, param: Param) -> str | None:
-    """What the launch file sets, else the only default."""
-    given = run.settings.parameters
-    run.consulted.setdefault(param.name, None)
-    if given is None:
-        run.from_default[param.name] = None
-    elif param.name in given:
-        value = given[param.name]
-        if param.item is not None and isinstance(value, list | tuple):
-            return str(value[param.item]) if param.item < len(value) else None
-        return str(value)
-    texts = [plain(each) for each in param.default]
-    return texts[0] if len(texts) == 1 else None
+    return [run.text_of(atom) for atom in value]
 
 
 def read(run: Machine, record: NodeRecord, name: Value, default: Value = BOTTOM) -> Value:
