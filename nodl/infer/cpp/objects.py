@@ -123,7 +123,7 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
         return (Seq(tuple(items)),)
     if cls is None and kind.name in _MAPS:
         return as_map([run.evaluate(each, frame) for each in given])
-    if cls is None and (kind.name in _TEXTS or kind.name in _SCALARS):
+    if cls is None and (kind.name in _TEXTS or kind.name in _SCALARS or kind.last in run.names.enums):
         return run.evaluate(given[0], frame) if given else default_value(run, node, kind, frame)
     if cls is not None and is_aggregate(run, cls) and given:
         return _aggregate(run, node, kind, cls, given, frame)

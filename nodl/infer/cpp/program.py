@@ -121,8 +121,8 @@ class Sources:
 
 
 _CORE = frozenset({
-    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcutils", "rmw", "rcpputils", "pluginlib",
-    "class_loader", "rosidl_runtime_cpp", "rosidl_typesupport_cpp", "tracetools",
+    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcutils", "rmw", "rcpputils",
+    "pluginlib", "class_loader", "rosidl_runtime_cpp", "rosidl_typesupport_cpp", "tracetools",
 })  # fmt: skip
 
 
