@@ -5,9 +5,9 @@
     status = run(launch)                                every process starts with its enclave
     with start(launch) as running: ...                  the same beside the caller's own work
 
-``run`` also takes a bare plan, or what ``evaluate_launch`` gives, and then starts it unsecured, as ``secure-launch``
-without ``--secure`` does; inside a running event loop await ``run_async``. Errors are ``EnclaveLaunchError``;
-``str(error)`` is for a person.
+``run`` also takes a bare plan, what ``evaluate_launch`` gives, or only a ``launch_source``, and then starts it
+unsecured, as ``secure-launch`` without ``--secure`` does; inside a running event loop await ``run_async``. Errors are
+``EnclaveLaunchError``; ``str(error)`` is for a person.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.process import Evaluation
+    from enclave_launch.running import Launch
     from enclave_launch.runtime.running_launch import RunningLaunch
     from enclave_launch.secured import ProvisionedLaunch
 
@@ -61,24 +62,36 @@ def evaluate_launch(
     Raises ``LaunchFileError`` as ``resolve``.
     """
     from enclave_launch.evaluation.evaluate import evaluate
+    from enclave_launch.host.outcomes import Outcomes
     from enclave_launch.host.plan_host import PlanHost
 
-    chosen = options or ResolveOptions()
-    source = LaunchSource(
-        os.path.abspath(launch_file),
-        tuple(arguments),
-        tuple(map(os.path.abspath, chosen.prefixes)),
-        {**chosen.launch_configurations},
-        {**chosen.host_options(), "anonymous_seed": int.from_bytes(os.urandom(8), "big")},
-    )
+    source = launch_source(launch_file, arguments, options=options)._replace(outcomes=Outcomes())
     with ament_prefixes(source.prefixes):
         evaluation = evaluate(
             source.launch_file,
             source.arguments,
-            host=PlanHost(**source.host_options),
+            host=PlanHost(source.host_options, outcomes=source.outcomes),
             launch_configurations=source.launch_configurations,
         )
     return EvaluatedLaunch(source, evaluation)
+
+
+def launch_source(
+    launch_file: str | os.PathLike[str],
+    arguments: Sequence[tuple[str, str]] = (),
+    *,
+    options: ResolveOptions | None = None,
+) -> LaunchSource:
+    """What is to be launched, not looked at yet: ``run`` evaluates it once, unsecured, as launch does."""
+    chosen = options or ResolveOptions()
+    seed = int.from_bytes(os.urandom(8), "big")
+    return LaunchSource(
+        os.path.abspath(launch_file),
+        tuple(arguments),
+        tuple(map(os.path.abspath, chosen.prefixes)),
+        {**chosen.launch_configurations},
+        chosen.host_options()._replace(anonymous_seed=seed),
+    )
 
 
 def _missing_programs(evaluation: Evaluation) -> list[Diagnostic]:
@@ -120,9 +133,7 @@ def provision(
     return ProvisionedLaunch(plan, settings, report, wanted, asked)
 
 
-def run(
-    launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None
-) -> int:
+def run(launch: Launch, *, options: RunSettings | None = None) -> int:
     """Start what was planned and stay until all has ended; handles SIGINT and SIGTERM. Gives the exit status.
 
     Before anything is started raises ``RuntimeFailure`` when something it needs is not there, and, for a provisioned
@@ -140,9 +151,7 @@ def run(
         return run_launched(launch, settings, warden)
 
 
-def start(
-    launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None
-) -> RunningLaunch:
+def start(launch: Launch, *, options: RunSettings | None = None) -> RunningLaunch:
     """Start what was planned and return at once: a handle to look at it, wait for it and stop it.
 
     Signals stay the caller's. Raises as ``run``.
@@ -152,9 +161,7 @@ def start(
     return start_launched(launch, options or RunSettings())
 
 
-async def run_async(
-    launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch, *, options: RunSettings | None = None
-) -> int:
+async def run_async(launch: Launch, *, options: RunSettings | None = None) -> int:
     """The same inside a running event loop; signals stay the caller's, cancelling ends every process first."""
     from enclave_launch.running import run_launched_async
 

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError
+from enclave_launch.host.protocol import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 
@@ -53,13 +54,9 @@ class ResolveOptions:
             object.__setattr__(self, "policy", Path(self.policy))
         object.__setattr__(self, "enclave_scope", EnclaveScope(self.enclave_scope))
 
-    def host_options(self) -> dict[str, object]:
+    def host_options(self) -> HostOptions:
         """What the evaluation's host is told, in a dry run and live alike."""
-        return {
-            "distro": self.distro,
-            "allow_missing_packages": self.allow_missing_packages,
-            "no_python": self.no_python,
-        }
+        return HostOptions(self.distro, self.allow_missing_packages, self.no_python)
 
     def plan_options(self) -> PlanOptions:
         """Raises ``UsageError`` for a policy file that cannot be used."""

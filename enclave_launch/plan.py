@@ -31,6 +31,8 @@ from enclave_launch.diagnostics import (
     parameters_unknown,
 )
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope, assign_enclave
+from enclave_launch.host.outcomes import Outcomes
+from enclave_launch.host.protocol import HostOptions
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
 from enclave_launch.policy.launcher import launcher_node
 from enclave_launch.policy.running_node import Role, node_of_component, node_of_process
@@ -210,14 +212,15 @@ class LaunchSource(NamedTuple):
     """What was asked for: enough to evaluate it once more, live, with the same results.
 
     ``launch_file`` and ``prefixes`` are absolute; ``launch_configurations`` are set before the file is included;
-    ``host_options`` are those of the evaluation's host (distribution, seed of anonymous names).
+    ``host_options`` are those of the evaluation's host; ``outcomes`` what the user's code gave when it was evaluated.
     """
 
     launch_file: str
     arguments: tuple[tuple[str, str], ...] = ()
     prefixes: tuple[str, ...] = ()
     launch_configurations: Mapping[str, str] = MappingProxyType({})
-    host_options: Mapping[str, object] = MappingProxyType({})
+    host_options: HostOptions = HostOptions()
+    outcomes: Outcomes | None = None
 
 
 class EvaluatedLaunch(NamedTuple):

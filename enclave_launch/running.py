@@ -1,7 +1,7 @@
 """The last step: a planned or provisioned launch becomes processes. Joins the plan with the runtime.
 
-The file is evaluated once more, by a host that starts processes; behind the gate each of them is held against the
-plan. Starts processes; nothing comes after.
+The file is visited by a host that starts processes; what the user's code gave for the plan is taken from there
+(``host.outcomes``). Behind the gate each process is held against the plan. Starts processes; nothing comes after.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Union
 
 from enclave_launch.boundary.terminal import printable_lines
 from enclave_launch.evaluation.programs import check_programs
-from enclave_launch.plan import EvaluatedLaunch, LaunchPlan
+from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
 from enclave_launch.runtime.run_events import Observer
@@ -25,13 +25,14 @@ if TYPE_CHECKING:
     from enclave_launch.secured import ProvisionedLaunch
 
 
-Launch = Union[EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
+Launch = Union[LaunchSource, EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
+_UNSECURED = (LaunchSource, EvaluatedLaunch, LaunchPlan)
 
 
 def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -> int:
     """Block until all is over. Before anything was started raises ``RuntimeFailure``, and, for a provisioned launch,
     ``LaunchFileError`` for a program that is not there."""
-    source = _evaluated(launch).source
+    source = _source(launch)
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
         _check_programs(launch)
@@ -40,7 +41,7 @@ def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -
 
 async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     """The same inside a running event loop."""
-    source = _evaluated(launch).source
+    source = _source(launch)
     gate, options = _gate(launch, settings), _options(launch, settings)
     with ament_prefixes(source.prefixes):
         _check_programs(launch)
@@ -51,7 +52,7 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     """In a thread of its own. Raises as ``run_launched``, before anything was started."""
     from enclave_launch.runtime.running_launch import RunningLaunch
 
-    source = _evaluated(launch).source
+    source = _source(launch)
     gate, options = _gate(launch, settings), _options(launch, settings)
     _check_programs(launch)
 
@@ -68,19 +69,29 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
 
 def _check_programs(launch: Launch) -> None:
     """Secured, all starts or nothing; unsecured, what can be executed is started, as launch does."""
-    if not isinstance(launch, (EvaluatedLaunch, LaunchPlan)):
+    if not isinstance(launch, _UNSECURED):
         check_programs(launch.plan.evaluation.processes)
 
 
-def _evaluated(launch: Launch) -> EvaluatedLaunch:
-    if isinstance(launch, EvaluatedLaunch):
+def _source(launch: Launch) -> LaunchSource:
+    if isinstance(launch, LaunchSource):
         return launch
-    return launch.evaluated if isinstance(launch, LaunchPlan) else launch.plan.evaluated
+    if isinstance(launch, EvaluatedLaunch):
+        return launch.source
+    return (launch if isinstance(launch, LaunchPlan) else launch.plan).planner.source
+
+
+def _needs_ros_services(launch: Launch) -> bool | None:
+    """``None``: nobody knows before it is visited."""
+    if isinstance(launch, LaunchSource):
+        return None
+    evaluated = launch if isinstance(launch, (EvaluatedLaunch, LaunchPlan)) else launch.plan
+    return bool(evaluated.evaluation.launcher_calls)
 
 
 def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
     """What stands before each process; ``None`` for a launch that was asked to run unsecured."""
-    if isinstance(launch, (EvaluatedLaunch, LaunchPlan)):
+    if isinstance(launch, _UNSECURED):
         return None
     from enclave_launch.secured import PlanProvider  # brings the keystore: not for a launch without it
 
@@ -95,15 +106,16 @@ def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
 
 
 def _options(launch: Launch, settings: RunSettings) -> RunOptions:
-    evaluated = _evaluated(launch)
-    own = frozenset[str]() if isinstance(launch, (EvaluatedLaunch, LaunchPlan)) else launch.secret_variables
+    source = _source(launch)
+    own = frozenset[str]() if isinstance(launch, _UNSECURED) else launch.secret_variables
     return RunOptions(
         noninteractive=settings.noninteractive,
         debug=settings.debug,
         secrets=settings.secrets | own,
         log_limit=settings.log_limit,
-        needs_ros_services=bool(evaluated.evaluation.launcher_calls),
-        launch_configurations=evaluated.source.launch_configurations,
-        host_options=dict(evaluated.source.host_options),
+        needs_ros_services=_needs_ros_services(launch),
+        launch_configurations=source.launch_configurations,
+        host_options=source.host_options,
+        outcomes=source.outcomes,
         companion=settings.companion,
     )

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.entity import LaunchDescriptionEntity, creation_location
+from enclave_launch.host.outcomes import is_users, once
 
 if TYPE_CHECKING:
     from enclave_launch.description.conditions import Condition
@@ -19,6 +20,13 @@ class Action(LaunchDescriptionEntity):
 
     With a false condition nothing happens at all: no substitution is performed.
     """
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Classes of the user's: ``execute`` is not called again by the start that follows a plan."""
+        super().__init_subclass__(**kwargs)
+        execute = vars(cls).get("execute")
+        if execute is not None and is_users(execute):
+            cls.execute = once(execute)  # type: ignore[method-assign]
 
     def __init__(self, *, condition: Condition | None = None) -> None:
         self.__condition = condition

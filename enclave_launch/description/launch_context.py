@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Iterable, MutableMapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from enclave_launch.description.events.dispatch import EventQueue, HandlerTable
+from enclave_launch.description.events.dispatch import Buckets, EventQueue, HandlerTable, QueuedEvent
 from enclave_launch.host.current import current_host
 from enclave_launch.host.environment import Environment
 from enclave_launch.host.protocol import Host
@@ -16,6 +17,20 @@ if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event
     from enclave_launch.description.events.handlers import BaseEventHandler
     from enclave_launch.description.substitution import Substitution
+
+
+class ContextState(NamedTuple):
+    """What ``LaunchContext.save`` keeps. Nothing in it is shared with the context but the values themselves."""
+
+    configurations: dict[str, Any]
+    configurations_stack: list[dict[str, Any]]
+    locals: dict[str, Any]
+    locals_stack: list[dict[str, Any]]
+    environment: dict[str, str]
+    handlers: Buckets
+    queue: deque[QueuedEvent]
+    is_shutdown: bool
+    on_event: str | None
 
 
 class Locals:
@@ -202,30 +217,32 @@ class LaunchContext:
 
     # Hypothetical events: what a dry run tries out leaves no trace
 
-    def save(self) -> dict[str, Any]:
+    def save(self) -> ContextState:
         """Everything that an event could change, for ``restore``."""
-        return {
-            "configurations": {
-                k: list(v) if isinstance(v, list) else v for k, v in self.__configurations.items()
-            },
-            "configurations_stack": list(self.__configurations_stack),
-            "locals": dict(self.__locals),
-            "locals_stack": list(self.__locals_stack),
-            "environment": self.process_environment.snapshot(),
-            "handlers": self._event_handlers.save(),
-            "queue": self._event_queue.save(),
-            "shutdown": self.__is_shutdown,
-            "on_event": self.on_event,
+        configurations = {
+            name: list(value) if isinstance(value, list) else value
+            for name, value in self.__configurations.items()
         }
+        return ContextState(
+            configurations=configurations,
+            configurations_stack=list(self.__configurations_stack),
+            locals=dict(self.__locals),
+            locals_stack=list(self.__locals_stack),
+            environment=self.process_environment.snapshot(),
+            handlers=self._event_handlers.save(),
+            queue=self._event_queue.save(),
+            is_shutdown=self.__is_shutdown,
+            on_event=self.on_event,
+        )
 
-    def restore(self, saved: dict[str, Any]) -> None:
-        self.__configurations = saved["configurations"]
-        self.__configurations_stack = saved["configurations_stack"]
-        self.__locals = saved["locals"]
-        self.__locals_stack = saved["locals_stack"]
+    def restore(self, saved: ContextState) -> None:
+        self.__configurations = saved.configurations
+        self.__configurations_stack = saved.configurations_stack
+        self.__locals = saved.locals
+        self.__locals_stack = saved.locals_stack
         self.__combined = None
-        self.process_environment.assign(saved["environment"])
-        self._event_handlers.restore(saved["handlers"])
-        self._event_queue.restore(saved["queue"])
-        self.__is_shutdown = saved["shutdown"]
-        self.on_event = saved["on_event"]
+        self.process_environment.assign(saved.environment)
+        self._event_handlers.restore(saved.handlers)
+        self._event_queue.restore(saved.queue)
+        self.__is_shutdown = saved.is_shutdown
+        self.on_event = saved.on_event

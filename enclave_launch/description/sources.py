@@ -113,6 +113,14 @@ def get_launch_description_from_python_launch_file(python_launch_file_path: str)
     Raises ``InvalidPythonLaunchFileError`` without that function, ``PythonRefused`` under ``--no-python``,
     and whatever the file raises, with the place in the file noted on it (``error_location``).
     """
+    outcomes = current_host().outcomes
+    if outcomes is None:
+        return _run_python_launch_file(python_launch_file_path)
+    key = ("python file", os.path.abspath(python_launch_file_path))
+    return outcomes.call(key, lambda: _run_python_launch_file(python_launch_file_path))
+
+
+def _run_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
     try:
         module = load_python_launch_file_as_module(python_launch_file_path)
         if not hasattr(module, "generate_launch_description"):

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import MEBIBYTE
 from enclave_launch.host.current import current_release
+from enclave_launch.host.outcomes import is_users, once
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
@@ -18,6 +19,13 @@ if TYPE_CHECKING:
 
 class Substitution:
     """Performed against a context, gives text. Third parties subclass it; only ``perform`` is required."""
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Classes of the user's: ``perform`` is not asked again by the start that follows a plan."""
+        super().__init_subclass__(**kwargs)
+        perform = vars(cls).get("perform")
+        if perform is not None and is_users(perform):
+            cls.perform = once(perform)  # type: ignore[method-assign]
 
     def describe(self) -> str:
         return repr(self)

@@ -29,6 +29,7 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
     before = context.unfolded
     stack: list[tuple[Iterator[LaunchDescriptionEntity], Surroundings]] = [(iter((entity,)), outside)]
     current: LaunchDescriptionEntity | None = entity
+    outcomes = context.host.outcomes
     try:
         while stack:
             siblings, (context.includes, context.open_files) = stack[-1]
@@ -37,6 +38,8 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
                 stack.pop()
                 continue
             context.count_unfolded(1)
+            if outcomes is not None and not current.built_by_front_end:
+                outcomes.remember_state(current)
             sub_entities = current.visit(context)
             future = current.get_asyncio_future()
             if future is not None:

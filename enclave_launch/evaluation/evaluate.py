@@ -69,7 +69,7 @@ def evaluate(
         except EnclaveLaunchError:
             raise
         except Exception as error:  # launch files run code of their own: any exception is theirs
-            raise _as_launch_file_error(error, path, host) from error
+            raise _evaluation_error(error, path, host) from error
     return _evaluation(host)
 
 
@@ -102,7 +102,7 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
         except EnclaveLaunchError:
             raise
         except Exception as error:  # Python launch files run code of their own: any exception is theirs
-            raise _as_launch_file_error(error, path, host) from error
+            raise _evaluation_error(error, path, host) from error
 
 
 @contextmanager
@@ -175,15 +175,20 @@ def _evaluation(host: PlanHost) -> Evaluation:
     )
 
 
-def _as_launch_file_error(error: Exception, path: str, host: PlanHost) -> EvaluationError:
+def _evaluation_error(error: Exception, path: str, host: PlanHost) -> EvaluationError:
+    wrapped = launch_file_error(error, path)
+    wrapped.partial = _evaluation(host)
+    return wrapped
+
+
+def launch_file_error(error: Exception, path: str) -> EvaluationError:
+    """What the visit of the launch file at ``path`` raised, with its place, its include chain and what to do next."""
     from enclave_launch.evaluation.error_text import error_text
     from enclave_launch.frontend import error_location
 
     location, helper = _location(error, path)
     where = f" (in {helper.file}:{helper.line})" if helper else ""
-    wrapped = EvaluationError(error_text(error_location.likeliest(error)) + where, location, error)
-    wrapped.partial = _evaluation(host)
-    return wrapped
+    return EvaluationError(error_text(error_location.likeliest(error)) + where, location, error)
 
 
 def _location(error: Exception, path: str) -> tuple[SourceLocation, SourceLocation | None]:

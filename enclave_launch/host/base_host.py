@@ -13,32 +13,29 @@ from enclave_launch.diagnostics import (
     package_not_installed,
     program_not_installed,
 )
-from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult
+from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult, HostOptions
 from enclave_launch.ros_rules.distro import choose_release
 from nodl import ament_index
 
 if TYPE_CHECKING:
     from enclave_launch.host.loading import LoadCache
+    from enclave_launch.host.outcomes import Outcomes
 
 
 class BaseHost:
     """What a dry run and a live run have in common: reading the ament index, running commands, warnings."""
 
-    def __init__(
-        self,
-        *,
-        distro: str | None = None,
-        allow_missing_packages: bool = False,
-        no_python: bool = False,
-        anonymous_seed: int | None = None,
-    ) -> None:
-        self.release = choose_release(distro, os.environ.get("ROS_DISTRO"), ament_index.search_prefixes())
-        self.allow_missing_packages = allow_missing_packages
-        self.no_python = no_python
+    def __init__(self, options: HostOptions, outcomes: Outcomes | None = None) -> None:
+        self.release = choose_release(
+            options.distro, os.environ.get("ROS_DISTRO"), ament_index.search_prefixes()
+        )
+        self.allow_missing_packages = options.allow_missing_packages
+        self.no_python = options.no_python
+        self.outcomes = outcomes
         self.warnings: list[Diagnostic] = []
         self._warned: set[Diagnostic] = set()
         self._process_count = 0
-        self._anonymous_seed = anonymous_seed
+        self._anonymous_seed = options.anonymous_seed
         self._anonymous_random: Any = None
         self._loads: LoadCache | None = None
         self._prefix_cache: dict[tuple[str, str], str] = {}
@@ -115,6 +112,12 @@ class BaseHost:
         return self._run_command(command, merge_stderr)
 
     def _run_command(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
+        if self.outcomes is None:
+            return self._run_now(command, merge_stderr)
+        key = ("command", tuple(command), merge_stderr)
+        return self.outcomes.call(key, lambda: self._run_now(command, merge_stderr))
+
+    def _run_now(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
         import subprocess
 
         result = subprocess.run(
@@ -138,6 +141,11 @@ class BaseHost:
     def anonymous_name(self, name: str) -> str:
         """``name_host_pid_random``. Two hosts with the same seed give the same names in the same order, so
         that a live run has the names of the plan it follows."""
+        if self.outcomes is None:
+            return self._new_anonymous_name(name)
+        return self.outcomes.call(("anonymous name", name), lambda: self._new_anonymous_name(name))
+
+    def _new_anonymous_name(self, name: str) -> str:
         import random
         import socket
 

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.host.base_host import BaseHost
+from enclave_launch.host.protocol import HostOptions
 from enclave_launch.host.virtual_loop import VirtualLoop
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.lifecycle import LifecycleNode
     from enclave_launch.description.actions.processes import ExecuteLocal
     from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.host.outcomes import Outcomes
     from enclave_launch.host.protocol import Completion
     from enclave_launch.process import (
         LauncherCall,
@@ -24,8 +26,11 @@ if TYPE_CHECKING:
 class PlanHost(BaseHost):
     """The dry run's world: everything is recorded, nothing is started or written."""
 
-    def __init__(self, **options: Any) -> None:
-        super().__init__(**options)
+    def __init__(
+        self, options: HostOptions | None = None, *, outcomes: Outcomes | None = None, **given: Any
+    ) -> None:
+        """``given``: fields of ``HostOptions``, for callers that have only some."""
+        super().__init__(options or HostOptions(**given), outcomes)
         self.processes: list[ResolvedProcess] = []
         self.started: list[ExecuteLocal] = []  # action of each process, same order
         self.components: list[ResolvedComponent] = []
@@ -37,6 +42,9 @@ class PlanHost(BaseHost):
     @property
     def loop(self) -> VirtualLoop:
         return self._loop
+
+    def started_so_far(self) -> int:
+        return len(self.processes) + len(self.components) + len(self.calls) + self._loop.used
 
     def write_parameter_file(self, text: str) -> str:
         path = f"<params:{len(self.parameter_files) + 1}>"

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.diagnostics import Diagnostic
     from enclave_launch.host.loading import LoadCache
+    from enclave_launch.host.outcomes import Outcomes
     from enclave_launch.process import (
         LauncherCall,
         ResolvedComponent,
@@ -27,6 +28,19 @@ if TYPE_CHECKING:
 MISSING_PREFIX = "/missing"
 """``--allow-missing-packages``: package ``p`` is taken to be installed in ``/missing/p``, a program in
 ``/missing/bin``."""
+
+
+class HostOptions(NamedTuple):
+    """What an evaluation is told of the world, in a dry run and live alike.
+
+    ``distro``: whose rules to follow, ``None`` for that of the environment. ``anonymous_seed``: two hosts with the same
+    seed give the same names at random, in the same order.
+    """
+
+    distro: str | None = None
+    allow_missing_packages: bool = False
+    no_python: bool = False
+    anonymous_seed: int | None = None
 
 
 class CommandResult(NamedTuple):
@@ -48,6 +62,7 @@ class Host(Protocol):
     release: Release
     no_python: bool
     allow_missing_packages: bool
+    outcomes: Outcomes | None
 
     @property
     def loop(self) -> Any:
@@ -81,6 +96,9 @@ class Host(Protocol):
 
     def parameter_file(self, path: str) -> str | None:
         """The text of a file written by ``write_parameter_file``, ``None`` for any other path."""
+
+    def started_so_far(self) -> int:
+        """A number that grows with everything that is started or scheduled."""
 
     def next_process_index(self) -> int:
         """N of the process name NAME-N, from 1."""

@@ -81,14 +81,17 @@ class VirtualLoop:
         self._now = 0.0
         self._timers: list[tuple[float, int, VirtualTimer]] = []
         self._count = 0
+        self.used = 0  # how often anything was asked of it: what a live loop would have done
 
     def time(self) -> float:
         return self._now
 
     def create_future(self) -> VirtualFuture:
+        self.used += 1
         return VirtualFuture()
 
     def create_task(self, coroutine: Coroutine[Any, Any, Any], **_: Any) -> VirtualFuture:
+        self.used += 1
         coroutine.close()
         return VirtualFuture()
 
@@ -98,12 +101,14 @@ class VirtualLoop:
     call_soon_threadsafe = call_soon
 
     def call_later(self, delay: float, callback: Callable[..., object], *args: Any, **_: Any) -> VirtualTimer:
+        self.used += 1
         timer = VirtualTimer(self._now + max(delay, 0.0), callback, args)
         self._count += 1
         heapq.heappush(self._timers, (timer.when, self._count, timer))
         return timer
 
     def run_in_executor(self, executor: object, function: Callable[..., object], *args: Any) -> VirtualFuture:
+        self.used += 1
         return VirtualFuture()
 
     def run_until_complete(self, future: object) -> NoReturn:

@@ -14,6 +14,7 @@ from typing import NamedTuple, Protocol
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+from enclave_launch.runtime.difference import compared, compared_component
 
 
 class Grant(NamedTuple):
@@ -59,7 +60,7 @@ class Provider(Protocol):
 
 
 class LateProcess(RuntimeFailure):
-    """An action that only exists at run time wants permissions that nobody signed."""
+    """What is about to start is not what was planned: it wants permissions that nobody signed."""
 
 
 def identity(process: ResolvedProcess) -> tuple[object, ...]:
@@ -101,8 +102,10 @@ class PlannedGate:
         allow_late: bool,
         say_late: Callable[[str], None],
     ) -> None:
-        self._processes = {identity(process) for process in processes}
-        self._components = {component_identity(component) for component in components}
+        self._planned = tuple(processes)
+        self._planned_components = tuple(components)
+        self._processes = {identity(process) for process in self._planned}
+        self._components = {component_identity(component) for component in self._planned_components}
         self._provider = provider
         self._allow_late = allow_late
         self._say_late = say_late
@@ -116,7 +119,13 @@ class PlannedGate:
         if process.kind == "executable" and process.enclave.attribute is process.enclave.argument is None:
             return self._provider.ensure_late(process)  # no ROS process by the launch file: nothing to sign
         if not self._allow_late:
-            raise LateProcess(_refusal(f"{_named(process)} at {process.location}"))
+            raise LateProcess(
+                _refusal(
+                    f"{_named(process)} at {process.location}",
+                    compared(process, self._planned),
+                    "--allow-late provisions it when it appears",
+                )
+            )
         self._say_late(
             f"{_named(process)} at {process.location} was not foreseen: provisioned now (--allow-late)"
         )
@@ -132,7 +141,11 @@ class PlannedGate:
         for component in late:
             what = f"component {component.package}/{component.plugin} for {component.container}"
             raise LateProcess(
-                _refusal(f"{what} at {component.location}", "its container has read its permissions already")
+                _refusal(
+                    f"{what} at {component.location}",
+                    compared_component(component, self._planned_components),
+                    "its container has read its permissions already",
+                )
             )
 
     def launcher(self) -> Grant | None:
@@ -144,7 +157,5 @@ def _named(process: ResolvedProcess) -> str:
     return f"{what} ({process.fqn})" if process.fqn else what
 
 
-def _refusal(what: str, remedy: str = "--allow-late provisions it when it appears") -> str:
-    return (
-        f"refused: {what} only exists at run time and goes beyond the permissions that were signed; {remedy}"
-    )
+def _refusal(what: str, difference: str, remedy: str) -> str:
+    return f"refused: {what} goes beyond the permissions that were signed: {difference}; {remedy}"

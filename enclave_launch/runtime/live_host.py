@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.host.base_host import BaseHost
+from enclave_launch.host.outcomes import Outcomes
+from enclave_launch.host.protocol import HostOptions
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.gate import EnclaveGate, Grant
@@ -32,6 +34,9 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
 
 
+_DEFAULTS = HostOptions()
+
+
 class LiveHost(BaseHost):
     """``secrets``: variables that no child may see. ``fail`` is told why the launch cannot go on."""
 
@@ -44,11 +49,13 @@ class LiveHost(BaseHost):
         secrets: frozenset[str],
         fail: Callable[[EnclaveLaunchError], None],
         services: RosServices | None = None,
+        late_services: Callable[[], RosServices] | None = None,
         observe: Observer = unobserved,
         companion: LaunchCompanion | None = None,
-        **options: Any,
+        options: HostOptions = _DEFAULTS,
+        outcomes: Outcomes | None = None,
     ) -> None:
-        super().__init__(**options)
+        super().__init__(options, outcomes)
         self._observe = observe
         self._loop = asyncio.get_running_loop()
         self._tree = tree
@@ -60,6 +67,7 @@ class LiveHost(BaseHost):
         self._fail = fail
         self._services = services
         self._companion = companion
+        self._late_services = late_services
         self._parameter_directory: Path | None = None
         self._parameter_files: dict[str, str] = {}
         self._tasks: set[asyncio.Task[None]] = set()
@@ -69,6 +77,9 @@ class LiveHost(BaseHost):
     @property
     def loop(self) -> asyncio.AbstractEventLoop:
         return self._loop
+
+    def started_so_far(self) -> int:
+        return len(self._tasks)
 
     def write_parameter_file(self, text: str) -> str:
         """Readable by us alone, and kept until the launch ends: a respawned node reads it again."""
@@ -111,27 +122,36 @@ class LiveHost(BaseHost):
             self._gate.ensure_components(components)
         if self._companion is not None:
             self._companion.loading(components)
-        assert (
-            self._services is not None
-        )  # the service refuses to start without, where the plan has components
-        context.add_completion_future(self._services.load(components))
+        services = self._ros_services()
+        assert services is not None  # the service refuses to start without, where the plan has components
+        context.add_completion_future(services.load(components))
 
     def launcher_call(self, call: LauncherCall) -> None:
         """Noted in the plan; made by ``ros_services``."""
 
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
-        if self._services is None:
+        services = self._ros_services()
+        if services is None:
             self._log.log("ERROR", "launch", f"no state change of '{node.node_name}': {ALTERNATIVE}")
             return
-        context.add_completion_future(self._services.change_state(node.node_name, transition_id))
+        context.add_completion_future(services.change_state(node.node_name, transition_id))
+
+    def _ros_services(self) -> RosServices | None:
+        """Raises ``RuntimeFailure`` where a launch that was not looked at before needs rclpy, and there is none."""
+        if self._services is None and self._late_services is not None:
+            self._services = self._late_services()
+        return self._services
 
     def _watch_state(self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext) -> None:
-        if process.kind != "lifecycle_node" or self._services is None or process.fqn is None:
+        if process.kind != "lifecycle_node" or process.fqn is None:
+            return
+        services = self._ros_services()
+        if services is None:
             return
         from enclave_launch.description.events.lifecycle import StateTransition
 
         node: Any = action
-        self._services.watch_state(
+        services.watch_state(
             process.fqn, lambda message: context.emit_event_sync(StateTransition(action=node, msg=message))
         )
 

@@ -27,9 +27,15 @@ from enclave_launch.description.events.dispatch import handle_next
 from enclave_launch.description.events.event import Event, IncludeLaunchDescription, Shutdown
 from enclave_launch.description.events.handlers import OnIncludeLaunchDescription, OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
-from enclave_launch.description.location import place_of
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
-from enclave_launch.evaluation.evaluate import Arguments, evaluation_surroundings, top_description
+from enclave_launch.evaluation.evaluate import (
+    Arguments,
+    evaluation_surroundings,
+    launch_file_error,
+    top_description,
+)
+from enclave_launch.host.outcomes import Outcomes
+from enclave_launch.host.protocol import HostOptions
 from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.gate import EnclaveGate
@@ -65,10 +71,11 @@ class RunOptions(NamedTuple):
     screen: TextIO | None = None
     secrets: frozenset[str] = frozenset()
     notices: tuple[str, ...] = ()
-    needs_ros_services: bool = False
+    needs_ros_services: bool | None = False
     log_limit: int | None = None
-    host_options: Mapping[str, Any] = MappingProxyType({})
     companion: LaunchCompanion | None = None
+    host_options: HostOptions = HostOptions()
+    outcomes: Outcomes | None = None
 
 
 def run_launch(
@@ -156,8 +163,7 @@ class LaunchService:
             await stack.enter_async_context(tree)
             stack.enter_context(_many_descriptors())
             self._services = self._ros_services()
-            if self._services is not None:
-                stack.callback(self._services.close)
+            stack.callback(self._close_services)
             self._log = self._open_log(tree)
             stack.callback(self._log.close)
             stack.enter_context(captured_logging(self._log))
@@ -172,9 +178,11 @@ class LaunchService:
                 secrets=self._options.secrets,
                 fail=self._on_failure,
                 services=self._services,
+                late_services=self._new_services if self._options.needs_ros_services is None else None,
                 observe=self._observe,
                 companion=companion,
-                **self._options.host_options,
+                options=self._options.host_options,
+                outcomes=self._outcomes(),
             )
             stack.push_async_callback(self._host.close)
             stack.enter_context(evaluation_surroundings(self._host))
@@ -297,9 +305,8 @@ class LaunchService:
     def _on_error(self, error: Exception) -> None:
         """As launch does, with the place in the launch file where evaluation knows it."""
         self._failed = True
-        place = place_of(error)
-        where = f"{place}: " if place is not None and not isinstance(error, EnclaveLaunchError) else ""
-        message = f"Caught exception in launch (see debug for traceback): {where}{error}"
+        told = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, self._launch_file)
+        message = f"Caught exception in launch (see debug for traceback): {told}"
         if self._options.debug:
             import traceback
 
@@ -323,10 +330,24 @@ class LaunchService:
             self._say("ERROR", f"ended badly on their own: {', '.join(self._host.failed)}")
         return 1 if self._failed or self._host.failed else 0
 
+    def _outcomes(self) -> Outcomes | None:
+        """What the dry run noted, for the first run that follows it."""
+        outcomes = self._options.outcomes
+        return outcomes if outcomes is not None and outcomes.rewind() else None
+
     def _ros_services(self) -> RosServices | None:
-        if not self._options.needs_ros_services:
-            return None
-        return RosServices(self._gate.launcher() if self._gate is not None else None, self._late_say)
+        """Those of a launch that is known to need them: what is missing for it is said before anything starts."""
+        return self._new_services() if self._options.needs_ros_services else None
+
+    def _new_services(self) -> RosServices:
+        self._services = RosServices(
+            self._gate.launcher() if self._gate is not None else None, self._late_say
+        )
+        return self._services
+
+    def _close_services(self) -> None:
+        if self._services is not None:
+            self._services.close()
 
     def _late_say(self, level: Level, message: str) -> None:
         self._say(level, message)

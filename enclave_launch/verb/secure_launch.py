@@ -164,7 +164,7 @@ def _show_file(target: Target, options: argparse.Namespace) -> int:
     from enclave_launch.report.launch_file import arguments_text, description_text
 
     text = arguments_text if options.show_args else description_text
-    host = PlanHost(**resolve_options(options).host_options())
+    host = PlanHost(resolve_options(options).host_options())
     with read_description(target.launch_file, host) as description:
         sys.stdout.write(text(description))
     return 0
@@ -235,9 +235,9 @@ def _launch_plainly(
     target: Target, options: argparse.Namespace, companion: LaunchCompanion | None = None
 ) -> int:
     """Without enclaves nobody has to know what the nodes say to each other."""
-    from enclave_launch.flow import evaluate_launch, run
+    from enclave_launch.flow import launch_source, run
 
-    launch = evaluate_launch(target.launch_file, target.arguments, options=resolve_options(options))
+    launch = launch_source(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
     return run(launch, options=_run_settings(options, companion))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,7 @@ from enclave_launch.host.plan_host import PlanHost
 XML = "<launch>\n{}\n</launch>\n"
 
 
-def message(tmp_path: Path, name: str, text: str | bytes, **options: object) -> str:
+def message(tmp_path: Path, name: str, text: str | bytes, **options: Any) -> str:
     file = tmp_path / name
     file.write_bytes(text.encode() if isinstance(text, str) else text)
     with pytest.raises(LaunchFileError) as caught:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -32,7 +33,7 @@ def launched(tmp_path: Path, prefix: Path, monkeypatch: pytest.MonkeyPatch) -> E
     """``launched(text, name:=value..., syntax="xml", **host options)``; XML text is the content of ``<launch>``."""
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(prefix))
 
-    def run(text: str, *arguments: str, syntax: str = "xml", **options: object) -> Evaluation:
+    def run(text: str, *arguments: str, syntax: str = "xml", **options: Any) -> Evaluation:
         file = tmp_path / f"main.launch.{syntax}"
         file.write_text(f"<launch>\n{text}\n</launch>" if syntax == "xml" else text)
         pairs = [(name, value) for name, _, value in (argument.partition(":=") for argument in arguments)]

@@ -140,3 +140,32 @@ def test_the_place_is_told_as_written(tmp_path: Path) -> None:
     guard, _, _ = gate()
     with pytest.raises(LateProcess, match=str(tmp_path)):
         guard.ensure(TALKER._replace(fqn="/x", location=SourceLocation(str(tmp_path / "a.launch.py"))))
+
+
+def test_a_refusal_says_what_was_planned_what_came_and_why() -> None:
+    guard, _, _ = gate()
+    with pytest.raises(LateProcess) as refusal:
+        guard.ensure(BEYOND["another remap rule"])
+    assert "planned remap rules chatter:=news, came chatter:=secret" in str(refusal.value)
+    assert "a time, a random value, a file or a program's answer that changed since" in str(refusal.value)
+
+
+def test_of_what_an_event_starts_the_event_is_the_reason() -> None:
+    planned = TALKER._replace(on_event="OnProcessExit a-1")
+    guard = PlannedGate([planned], [], Keystore(), allow_late=False, say_late=print)
+    with pytest.raises(
+        LateProcess, match=r"planned node /robot/talker, came /robot/other .*OnProcessExit a-1"
+    ):
+        guard.ensure(TALKER._replace(fqn="/robot/other"))
+
+
+def test_what_the_plan_has_nothing_like_is_said_to_be_that() -> None:
+    guard, _, _ = gate()
+    with pytest.raises(LateProcess, match="the plan has nothing like it"):
+        guard.ensure(TALKER._replace(executable="other", fqn="/x"))
+
+
+def test_of_a_component_the_difference_is_told_as_well() -> None:
+    guard, _, _ = gate()
+    with pytest.raises(LateProcess, match=r"planned remap rules none, came image:=other"):
+        guard.ensure_components([CAMERA._replace(remaps=(RemapRule("image", "other"),))])

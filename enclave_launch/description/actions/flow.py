@@ -24,6 +24,7 @@ from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.substitutions.variables import local_name
 from enclave_launch.frontend import yaml_scalar
+from enclave_launch.host.outcomes import called_once
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
@@ -55,7 +56,10 @@ class OpaqueFunction(Action):
         self.__kwargs: dict[str, Any] = {} if kwargs is None else kwargs
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
-        return self.__function(context, *self.__args, **self.__kwargs)
+        def call() -> list[LaunchDescriptionEntity] | None:
+            return self.__function(context, *self.__args, **self.__kwargs)
+
+        return called_once(self, self.__function, call, context)
 
 
 class OpaqueCoroutine(Action):
@@ -200,8 +204,13 @@ class ForEach(Action):
             values = yaml_scalar.load(item.strip())
             if values is not None:
                 context.count_unfolded(_size_of(self._function))
-                entities.extend(self._function(**values) or ())
+                entities.extend(self._round(context, values) or ())
         return entities
+
+    def _round(
+        self, context: LaunchContext, values: Mapping[str, Any]
+    ) -> list[LaunchDescriptionEntity] | None:
+        return called_once(self, self._function, lambda: self._function(**values), context)
 
 
 @expose_action("for", feature=Feature.FOR_LOOP)
@@ -244,8 +253,11 @@ class ForLoop(Action):
         entities: list[LaunchDescriptionEntity] = []
         for index in range(int(perform_substitutions(context, self._length))):
             context.count_unfolded(_size_of(self._function))
-            entities.extend(self._function(i=index) or ())
+            entities.extend(self._round(context, index) or ())
         return entities
+
+    def _round(self, context: LaunchContext, index: int) -> list[LaunchDescriptionEntity] | None:
+        return called_once(self, self._function, lambda: self._function(i=index), context)
 
 
 class _ParsedBody:

@@ -54,6 +54,7 @@ def instantiate_action(entity: Entity, parser: Parser) -> Action:
         error_location.mark(error, entity)
         raise
     action.source_location = entity.source_location
+    action.built_by_front_end = True
     return action
 
 

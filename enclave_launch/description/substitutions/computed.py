@@ -123,7 +123,11 @@ class PythonExpression(Substitution):
         else:
             names = dict(math.__dict__)
         # A launch file may compute anything here: that is the substitution's purpose.
-        return str(eval(perform_substitutions(context, self.__expression), {}, names))
+        expression = perform_substitutions(context, self.__expression)
+        outcomes = context.host.outcomes
+        if outcomes is None:
+            return str(eval(expression, {}, names))
+        return outcomes.call(("eval", expression), lambda: str(eval(expression, {}, names)))
 
 
 def _literal_names(modules: Any) -> list[str]:

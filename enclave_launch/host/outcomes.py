@@ -1,0 +1,326 @@
+"""What the user's code gave in a dry run, so that the live run that follows need not run it again.
+
+A secured launch evaluates its file twice: first to know what will start, then to start it. Files with side effects
+break by that: a folder made twice, a port taken twice, a prompt asked twice, another random name. So the first
+evaluation notes what each piece of user code gave and changed, in order, and the second takes it from there:
+
+- a Python launch file is run once; its description is put back as it was before the first visit, and visited again;
+- a function of the visit (``OpaqueFunction``, an action or a substitution of the user's own class) is called once;
+  what it changed of the context and the environment is done again;
+- ``$(command)``, ``$(eval)`` and names at random are asked once.
+
+What only an event or a timer calls runs again when that happens: it asks about that moment. A function that itself
+started something runs again as well, for that is what it is for. Used once: a further run evaluates anew.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections import deque
+from collections.abc import Callable, Hashable, Iterator
+from functools import wraps
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+
+from enclave_launch.host.environment import changed, environment_snapshot
+
+if TYPE_CHECKING:
+    from enclave_launch.description.launch_context import ContextState, LaunchContext
+
+T = TypeVar("T")
+_OURS = "enclave_launch."
+
+
+class Outcome(NamedTuple):
+    """One call: what it gave or raised, and what it changed. ``again``: it cannot stand for another call."""
+
+    result: Any = None
+    error: Exception | None = None
+    effects: Effects | None = None
+    again: bool = False
+
+
+class Outcomes:
+    """Notes at first; after ``rewind`` gives what was noted."""
+
+    def __init__(self) -> None:
+        self._noted: dict[Hashable, deque[Outcome]] = {}
+        self._kept: list[object] = []  # keeps the ids in keys unique
+        self._states: dict[int, _ObjectState] = {}
+        self._replaying = False
+        self._inside = False
+
+    def rewind(self) -> bool:
+        """From now on give what was noted, to objects that are as they were before their first visit.
+
+        Returns whether it did: only the first run can have it.
+        """
+        if self._replaying:
+            return False
+        for state in self._states.values():
+            state.put_back()
+        self._states.clear()
+        self._replaying = True
+        return True
+
+    def call(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None = None) -> T:
+        """What ``function`` gives, or gave when it was called with this key before. ``context``: what it may change."""
+        if self._inside:
+            return function()
+        return self._replay(key, function, context) if self._replaying else self._note(key, function, context)
+
+    def keep(self, *objects: object) -> tuple[int, ...]:
+        """Their ids, as part of a key."""
+        self._kept.extend(objects)
+        return tuple(map(id, objects))
+
+    def remember_state(self, entity: object) -> None:
+        """Note the state of an object that is about to be visited, and of what it holds; only the first time counts."""
+        if not self._replaying:
+            _note_states(entity, self._states)
+
+    def _note(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None) -> T:
+        before = _Before(context)
+        self._inside = True
+        try:
+            result = function()
+        except Exception as error:  # whatever user code raises: it raises it again
+            self._add(key, Outcome(error=error, effects=before.effects()))
+            raise
+        finally:
+            self._inside = False
+        again = before.something_started()
+        self._add(key, Outcome(again=True) if again else Outcome(_reusable(result), effects=before.effects()))
+        return _fresh(self._noted[key][-1].result) if not again else result
+
+    def _add(self, key: Hashable, outcome: Outcome) -> None:
+        self._noted.setdefault(key, deque()).append(outcome)
+
+    def _replay(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None) -> T:
+        noted = self._noted.get(key)
+        outcome = noted.popleft() if noted else None
+        if outcome is None or outcome.again:
+            return function()
+        if outcome.effects is not None:
+            outcome.effects.apply(context)
+        if outcome.error is not None:
+            raise outcome.error
+        result: T = _fresh(outcome.result)
+        return result
+
+
+def is_users(function: object) -> bool:
+    """Is it code of the launch file or of a package it imports, and not ours?"""
+    inner = function
+    while hasattr(inner, "func"):  # functools.partial
+        inner = inner.func
+    return not str(getattr(inner, "__module__", "")).startswith(_OURS)
+
+
+def called_once(
+    owner: object, function: object, call: Callable[[], T], context: LaunchContext, *more: Hashable
+) -> T:
+    """``call()``, which calls ``function`` of ``owner``: the user's is called once for plan and start together.
+
+    What an event or a timer calls asks about that moment, and is called then.
+    """
+    outcomes = context.host.outcomes
+    if outcomes is None or context.on_event is not None or not is_users(function):
+        return call()
+    return outcomes.call((getattr(function, "__qualname__", ""), *outcomes.keep(owner), *more), call, context)
+
+
+def once(method: Callable[..., T]) -> Callable[..., T]:
+    """A method ``(self, context)`` of a class that is not ours, called once for plan and start together."""
+
+    @wraps(method)
+    def remembering(self: Any, context: LaunchContext) -> T:
+        if getattr(context, "host", None) is None:  # upstream allows ``perform(None)``
+            return method(self, context)
+        return called_once(self, method, lambda: method(self, context), context)
+
+    return remembering
+
+
+class _Items(NamedTuple):
+    """What an iterator gave: the second taker needs it as well."""
+
+    items: list[Any]
+
+
+def _reusable(result: Any) -> Any:
+    return _Items(list(result)) if isinstance(result, Iterator) else result
+
+
+def _fresh(result: Any) -> Any:
+    if isinstance(result, _Items):
+        return iter(list(result.items))
+    return list(result) if type(result) is list else result
+
+
+class Effects(NamedTuple):
+    """What a call changed. Values that were only added to in a list are added again."""
+
+    environment: dict[str, str]
+    environment_removed: frozenset[str]
+    path: tuple[str, ...]  # folders added to ``sys.path``
+    configurations: dict[str, tuple[Any, Any]]  # before and after
+    configurations_removed: frozenset[str]
+    locals: dict[str, Any]
+    registered: tuple[Any, ...]
+    unregistered: tuple[Any, ...]
+    emitted: tuple[tuple[Any, str | None], ...]
+
+    def apply(self, context: LaunchContext | None) -> None:
+        os.environ.update(self.environment)
+        for name in self.environment_removed:
+            os.environ.pop(name, None)
+        sys.path.extend(folder for folder in self.path if folder not in sys.path)
+        if context is not None:
+            self._apply_to(context)
+
+    def _apply_to(self, context: LaunchContext) -> None:
+        configurations = context.launch_configurations
+        for name, (before, after) in self.configurations.items():
+            _set(configurations, name, before, after)
+        for name in self.configurations_removed:
+            configurations.pop(name, None)
+        context.extend_locals(self.locals)
+        for handler in self.unregistered:
+            context.unregister_event_handler(handler)
+        for handler in self.registered:
+            context.register_event_handler(handler)
+        for event, _ in self.emitted:
+            context.emit_event_sync(event)
+
+
+def _set(configurations: dict[str, Any], name: str, before: Any, after: Any) -> None:
+    """Lists of remaps and parameters are shared between scopes: what was added goes into the very list."""
+    present = configurations.get(name)
+    if isinstance(present, list) and isinstance(before, list) and after[: len(before)] == before:
+        present.extend(after[len(before) :])
+    else:
+        configurations[name] = list(after) if isinstance(after, list) else after
+
+
+class _Before:
+    """The state before a call, to tell what the call changed."""
+
+    def __init__(self, context: LaunchContext | None) -> None:
+        self._context = context
+        self._environment = environment_snapshot()
+        self._path = tuple(sys.path)
+        self._state: ContextState | None = None if context is None else context.save()
+        self._registered = () if context is None else tuple(context._event_handlers.all())
+        self._started = self._count()
+
+    def _count(self) -> tuple[int, ...]:
+        if self._context is None:
+            return ()
+        return self._context.host.started_so_far(), len(self._context._completion_futures)
+
+    def something_started(self) -> bool:
+        return self._count() != self._started
+
+    def effects(self) -> Effects:
+        now = environment_snapshot()
+        configurations, gone = self._changed_configurations()
+        return Effects(
+            environment=changed(self._environment, now),
+            environment_removed=frozenset(self._environment.keys() - now.keys()),
+            path=tuple(folder for folder in sys.path if folder not in self._path),
+            configurations=configurations,
+            configurations_removed=gone,
+            locals=self._changed_locals(),
+            registered=self._handlers(added=True),
+            unregistered=self._handlers(added=False),
+            emitted=self._emitted(),
+        )
+
+    def _changed_configurations(self) -> tuple[dict[str, tuple[Any, Any]], frozenset[str]]:
+        if self._context is None or self._state is None:
+            return {}, frozenset()
+        before, after = self._state.configurations, self._context.save().configurations
+        different = {
+            name: (before.get(name), value)
+            for name, value in after.items()
+            if name not in before or before[name] != value
+        }
+        return different, frozenset(before.keys() - after.keys())
+
+    def _changed_locals(self) -> dict[str, Any]:
+        if self._context is None or self._state is None:
+            return {}
+        before, after = self._state.locals, self._context.save().locals
+        return {
+            name: value for name, value in after.items() if name not in before or before[name] is not value
+        }
+
+    def _handlers(self, *, added: bool) -> tuple[Any, ...]:
+        if self._context is None or self._state is None:
+            return ()
+        before = self._registered
+        after = tuple(self._context._event_handlers.all())
+        more, fewer = (after, before) if added else (before, after)
+        known = {id(handler) for handler in fewer}
+        return tuple(handler for handler in more if id(handler) not in known)
+
+    def _emitted(self) -> tuple[tuple[Any, str | None], ...]:
+        if self._context is None or self._state is None:
+            return ()
+        return tuple(self._context.save().queue)[len(self._state.queue) :]
+
+
+class _ObjectState(NamedTuple):
+    """The attributes of one object; of the lists and dictionaries among them also the content."""
+
+    subject: object
+    attributes: dict[str, Any]
+    contents: tuple[tuple[Any, Any], ...]
+
+    def put_back(self) -> None:
+        for container, content in self.contents:
+            container.clear()
+            container.extend(content) if isinstance(container, list) else container.update(content)
+        vars(self.subject).clear()
+        vars(self.subject).update(
+            {
+                name: _fresh(value) if isinstance(value, _Items) else value
+                for name, value in self.attributes.items()
+            }
+        )
+
+
+def _note_states(subject: object, known: dict[int, _ObjectState]) -> None:
+    """``subject`` and the objects of ours that it holds: what a visit changes. Other entities have their own turn."""
+    if id(subject) in known:
+        return
+    attributes: dict[str, Any] = {}
+    contents: list[tuple[Any, Any]] = []
+    for name, value in list(vars(subject).items()):
+        attributes[name] = value
+        if isinstance(value, (list, dict, set)):
+            contents.append((value, value.copy()))
+        elif isinstance(value, Iterator):
+            attributes[name] = _Items(list(value))
+            vars(subject)[name] = _fresh(attributes[name])
+    known[id(subject)] = _ObjectState(subject, attributes, tuple(contents))
+    for value in attributes.values():
+        for item in _held(value, 0):
+            _note_states(item, known)
+
+
+_DEPTH = 4  # list of components -> tuple of parameters -> mapping -> value
+
+
+def _held(value: Any, depth: int) -> Iterator[object]:
+    from enclave_launch.description.entity import LaunchDescriptionEntity
+    from enclave_launch.description.substitution import Substitution
+
+    if isinstance(value, (LaunchDescriptionEntity, Substitution, str)) or depth > _DEPTH:
+        return
+    if isinstance(value, (list, tuple, set, dict)):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from _held(item, depth + 1)
+    elif type(value).__module__.startswith(f"{_OURS}description.") and hasattr(value, "__dict__"):
+        yield value
