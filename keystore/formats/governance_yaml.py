@@ -32,7 +32,7 @@ from pydantic import BaseModel, Field, StrictBool, StrictInt, StrictStr, Validat
 from enclave_launch.boundary.files import read_bytes
 from keystore.errors import InvalidInput, printable
 from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule
+from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, parse_governance
 
 _MAX_BYTES = 200_000
 
@@ -74,6 +74,16 @@ def load_governance_yaml(path: Path) -> Governance:
     except OSError as error:
         raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
     return parse_governance_yaml(text, str(path))
+
+
+def governance_of(path: Path) -> Governance:
+    """A governance as a person keeps it: our YAML, or the XML that is signed. Raises InvalidInput."""
+    if path.suffix == ".xml":
+        try:
+            return parse_governance(read_bytes(path, _MAX_BYTES), str(path))
+        except OSError as error:
+            raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
+    return load_governance_yaml(path)
 
 
 def parse_governance_yaml(text: bytes, where: str) -> Governance:

@@ -12,7 +12,7 @@ import io
 import os
 import shutil
 import tarfile
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
@@ -23,7 +23,7 @@ from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystore, InvalidInput, StorageError, printable
 from keystore.formats.validity import utc_now
-from keystore.verification.finding import Finding, Severity
+from keystore.verification import Finding, Severity, verify
 
 _LINKED = ("identity_ca.cert.pem", "permissions_ca.cert.pem", layout.ENCLAVE_GOVERNANCE, layout.ENCLAVE_CRL)
 
@@ -32,7 +32,7 @@ class PublicFiles(str, Enum):
     """How an enclave gets CA certificates, governance and CRL."""
 
     LINK = "link"  # as in the keystore: public/ and governance once, relative links to them
-    COPY = "copy"  # every enclave directory stands alone, public/ is not needed
+    COPY = "copy"  # every enclave directory stands alone; public/ is there for ``verify`` and a launch
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +52,19 @@ def export(
     *,
     public: PublicFiles = PublicFiles.LINK,
     now: datetime | None = None,
+    accept_exposures: bool = False,
 ) -> tuple[str, ...]:
     """Write the bundle of all enclaves that match one of ``patterns`` (``/robot1/*``); returns their names.
 
     ``output`` ending in ``.tar`` or ``.tar.gz`` becomes an archive with the same bytes for the same keystore,
     otherwise a new directory. Raises InvalidInput when nothing matches or ``output`` exists, DamagedKeystore
-    for an enclave that could not start (incomplete, expired, revoked).
+    for whatever ``verify`` calls an error of these enclaves or of the keystore, and for exposures unless they are
+    accepted.
     """
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     names = _matching(view.enclaves(), list(patterns))
-    _refuse_unfit(view, names, now or utc_now())
+    _refuse_unfit(view, names, now or utc_now(), accept_exposures)
     files = list(_files(view, names, public))
     target = Path(output)
     if target.exists() or target.is_symlink():
@@ -83,14 +85,8 @@ def _matching(names: list[str], patterns: list[str]) -> list[str]:
     return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
-def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime) -> None:
-    """What ``verify`` calls an error of these enclaves or of the CAs would only fail on the host."""
-    from keystore.disk.crl_file import revoked_serials
-    from keystore.verification.authorities import check_deployed
-    from keystore.verification.enclaves import check_enclave
-
-    _refuse("the keystore", check_deployed(view, now))
-    revoked = revoked_serials(view)
+def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_exposures: bool) -> None:
+    """What ``verify`` finds wrong with these enclaves or with the keystore itself would travel with the bundle."""
     for name in names:
         directory = layout.enclave_directory(name)
         for file in layout.RUNTIME_FILES:
@@ -98,26 +94,39 @@ def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime) -> None:
                 raise DamagedKeystore(
                     f"enclave {name} is incomplete ({file}); secure-keystore renew completes it"
                 )
-        _refuse(f"enclave {name}", check_enclave(view, name, frozenset(revoked), now))
+    owners = {layout.enclave_directory(name): f"enclave {name}" for name in names}
+    told = [(_concerned(finding.place, owners), finding) for finding in verify(view.root, now=now).findings]
+    for what, finding in sorted(told, key=lambda one: one[0] != _KEYSTORE):
+        if what is not None:
+            _refuse(what, finding, accept_exposures)
 
 
-def _refuse(what: str, findings: Iterable[Finding]) -> None:
-    for finding in findings:
-        # Fast DDS alone cannot carry large permissions: the user's choice of DDS.
-        if finding.severity is Severity.ERROR and finding.code != "too-large":
-            raise DamagedKeystore(
-                f"{what} is not fit for a host: {finding.place}: {finding.message} [{finding.code}]; "
-                f"repair: {finding.repair}"
-            )
+_KEYSTORE = "the keystore"
+
+
+def _concerned(place: str, owners: Mapping[str, str]) -> str | None:
+    """What a finding is about: the keystore as a whole, an exported enclave, or (None) another one."""
+    if not place.startswith(layout.ENCLAVES + "/") or place in (layout.GOVERNANCE, layout.GOVERNANCE_XML):
+        return _KEYSTORE
+    return owners.get(place) or owners.get(place.rpartition("/")[0])
+
+
+def _refuse(what: str, finding: Finding, accept_exposures: bool) -> None:
+    """Raises DamagedKeystore."""
+    found = f"{finding.place}: {finding.message} [{finding.code}]; repair: {finding.repair}"
+    # Fast DDS alone cannot carry large permissions: the user's choice of DDS.
+    if finding.severity is Severity.ERROR and finding.code != "too-large":
+        raise DamagedKeystore(f"{what} is not fit for a host: {found}")
+    if finding.severity is Severity.EXPOSURE and not accept_exposures:
+        raise DamagedKeystore(f"{what} is exposed: {found}; or export with --accept-exposures")
 
 
 def _files(view: KeystoreView, names: list[str], public: PublicFiles) -> Iterator[ExportedFile]:
-    if public is PublicFiles.LINK:
-        for name in (
-            *(layout.link_source(link) for link in _LINKED[:3]),
-            *([layout.CRL] if view.has_crl else []),
-        ):
-            yield ExportedFile(name, store.PUBLIC_MODE, safe_files.read(view.root, name))
+    for name in (
+        *(layout.link_source(link) for link in _LINKED[:3]),
+        *([layout.CRL] if view.has_crl else []),
+    ):
+        yield ExportedFile(name, store.PUBLIC_MODE, safe_files.read(view.root, name))
     for enclave in names:
         yield from _enclave_files(view, enclave, public)
 
@@ -131,8 +140,6 @@ def _enclave_files(view: KeystoreView, enclave: str, public: PublicFiles) -> Ite
     key = safe_files.read_private(view.root, f"{directory}/{layout.KEY}")
     yield ExportedFile(f"{directory}/{layout.KEY}", store.PRIVATE_MODE, key)
     links = layout.enclave_links(enclave, crl=view.has_crl)
-    if public is PublicFiles.COPY and enclave == "/":
-        links[layout.ENCLAVE_GOVERNANCE] = ""
     for name, target in links.items():
         if public is PublicFiles.LINK:
             yield ExportedFile(f"{directory}/{name}", 0o777, link=target)

@@ -23,13 +23,18 @@ def describe(parser: argparse.ArgumentParser) -> None:
         "--public", choices=("link", "copy"), default="link",
         help="link: public/ once and links to it (default); copy: each enclave directory stands alone",
     )  # fmt: skip
+    parser.add_argument(
+        "--accept-exposures", action="store_true",
+        help="export although verify finds exposures (errors are never exported)",
+    )  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:
     from keystore.steps.bundle import PublicFiles, export
 
     names = export(
-        arguments.keystore, arguments.output, arguments.enclave, public=PublicFiles(arguments.public)
-    )
+        arguments.keystore, arguments.output, arguments.enclave,
+        public=PublicFiles(arguments.public), accept_exposures=arguments.accept_exposures,
+    )  # fmt: skip
     common.print_lines(names)
     return 0

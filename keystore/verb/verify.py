@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from keystore.verb import common
@@ -19,12 +20,25 @@ def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     common.add_format(parser)
     common.add_signing(parser)
+    parser.add_argument(
+        "--require-governance", metavar="FILE", type=Path,
+        help="the governance that must be in force, as YAML or XML; it may be weaker than the default",
+    )  # fmt: skip
+    parser.add_argument(
+        "--require-ca", metavar="SHA256", action="append", default=[],
+        help="fingerprint of a CA certificate that may be trusted, no other may; repeatable",
+    )  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.verification import verify
+    from keystore.formats.governance_yaml import governance_of
+    from keystore.verification import Requirements, verify
 
-    report = verify(arguments.keystore, access=common.access(arguments))
+    required = Requirements(
+        governance_of(arguments.require_governance) if arguments.require_governance else None,
+        tuple(arguments.require_ca),
+    )
+    report = verify(arguments.keystore, access=common.access(arguments), required=required)
     if arguments.format == "json":
         common.print_json({
             "version": 1,

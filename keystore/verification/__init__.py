@@ -9,11 +9,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import NamedTuple
 
 from keystore.disk import layout
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, StorageError
+from keystore.formats.governance import Governance
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
 from keystore.verification import repair
@@ -22,6 +24,8 @@ from keystore.verification.enclaves import check_enclaves
 from keystore.verification.files import check_files
 from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
+from keystore.verification.issued import check_anchors, check_published, load_register
+from keystore.verification.surroundings import check_parents
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,27 +42,45 @@ class VerifyReport:
         return not any(finding.severity.fails for finding in self.findings)
 
 
+class Requirements(NamedTuple):
+    """What somebody decided a keystore must be. ``authorities``: SHA-256 fingerprints of all CAs to trust."""
+
+    governance: Governance | None = None
+    authorities: tuple[str, ...] = ()
+
+
 def verify(
-    keystore: Path | str, *, access: CaAccess | None = None, now: datetime | None = None
+    keystore: Path | str,
+    *,
+    access: CaAccess | None = None,
+    now: datetime | None = None,
+    required: Requirements | None = None,
 ) -> VerifyReport:
     """Check everything; raises NotAKeystore only when there is nothing to check."""
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     order = list(Severity)
     try:
-        found = list(_findings(view, access or CaAccess(), now or utc_now()))
+        found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))
     except OSError as error:
         raise StorageError.of(error, "checking the keystore") from None
     found.sort(key=lambda finding: (order.index(finding.severity), finding.place, finding.code))
     return VerifyReport(view.root, len(view.enclaves()), tuple(found))
 
 
-def _findings(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[Finding]:
+def _findings(
+    view: KeystoreView, access: CaAccess, now: datetime, required: Requirements
+) -> Iterator[Finding]:
     from keystore.disk.crl_file import revoked_serials
 
+    yield from check_parents(view.root)
     yield from check_files(view.root)
+    register, problems = load_register(view)
+    yield from problems
     try:
-        yield from check_authorities(view, access, now)
+        yield from check_anchors(view, register, required.authorities)
+        yield from check_authorities(view, register, access, now, required.governance)
+        yield from check_published(view, register, now)
     except KeystoreError as error:
         yield Finding(Severity.ERROR, "unreadable", layout.PUBLIC, str(error), repair.BACKUP)
         return
@@ -67,7 +89,7 @@ def _findings(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[F
         revoked = frozenset(revoked_serials(view))
     except KeystoreError:
         revoked = frozenset()  # the CRL itself was reported above
-    yield from check_enclaves(view, revoked, now)
+    yield from check_enclaves(view, register, revoked, now)
 
 
 def _check_settings(view: KeystoreView) -> Iterator[Finding]:

@@ -7,11 +7,13 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from keystore.disk import layout, safe_files
+from keystore.disk.authorities import describe
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, SigningUnavailable, UnsafeKeystore
 from keystore.formats.certificate import CertificateFacts
-from keystore.formats.governance import parse_governance
+from keystore.formats.governance import Governance, parse_governance
+from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import iso
 from keystore.signing import smime
@@ -19,16 +21,25 @@ from keystore.signing.authority import check_can_serve
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import issued_by, key_kind
 from keystore.verification import repair
+from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
+from keystore.verification.governance import check_strength
+from keystore.verification.issued import check_governance_issued
 
 CYCLONE_KINDS = ("P-256", "RSA-2048")
 
 
-def check_authorities(view: KeystoreView, access: CaAccess, now: datetime) -> Iterator[Finding]:
-    yield from check_deployed(view, now)
+def check_authorities(
+    view: KeystoreView,
+    register: Register | None,
+    access: CaAccess,
+    now: datetime,
+    required: Governance | None = None,
+) -> Iterator[Finding]:
+    yield from check_deployed(view, register, now, required)
     for role in Role:
         yield from _check_key(view, role, access)
-        if len(view.ca_bundle(role)) > 1:
+        if register is not None and len(view.ca_bundle(role)) > 1:
             yield Finding(
                 Severity.NOTE, "roll-over", layout.ca_cert(role),
                 "a CA roll-over is under way (two CAs in the file)",
@@ -43,12 +54,14 @@ def check_authorities(view: KeystoreView, access: CaAccess, now: datetime) -> It
         )  # fmt: skip
 
 
-def check_deployed(view: KeystoreView, now: datetime) -> Iterator[Finding]:
+def check_deployed(
+    view: KeystoreView, register: Register | None, now: datetime, required: Governance | None = None
+) -> Iterator[Finding]:
     """What every host needs of the CAs: their certificates, the governance, the CRL."""
     for role in Role:
         for facts in view.ca_bundle(role):
             yield from _check_certificate(view, role, facts, now)
-    yield from check_governance(view)
+    yield from check_governance(view, register, required)
     if view.has_crl:
         yield from _check_crl(view, now)
 
@@ -79,7 +92,10 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
     name = view.key_file(role)
     if name is None:
         yield Finding(
-            Severity.NOTE, "no-ca-key", layout.ca_key(role), "not here: nothing can be signed on this machine"
+            Severity.NOTE,
+            "no-ca-key",
+            layout.ca_key(role),
+            f"not here: nothing can be signed on this machine; trusted is {describe(view.ca(role))}",
         )
         return
     try:
@@ -101,16 +117,27 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
         yield Finding(Severity.ERROR, "ca-key", name, str(error), repair.BACKUP)
 
 
-def check_governance(view: KeystoreView) -> Iterator[Finding]:
+def check_governance(
+    view: KeystoreView, register: Register | None = None, required: Governance | None = None
+) -> Iterator[Finding]:
     place = layout.GOVERNANCE
     again = repair.sign_governance(view.root)
     try:
         signed = smime.read(safe_files.read(view.root, place), place)
         smime.check(signed, view.ca_bundle(Role.PERMISSIONS), place)
-        parse_governance(signed.document, place)
+        governance = parse_governance(signed.document, place)
     except KeystoreError as error:
         yield Finding(Severity.ERROR, "governance", place, str(error), again)
         return
+    if problem := mime_problem(safe_files.read(view.root, place)):
+        yield Finding(Severity.ERROR, "governance", place, problem, again)
+    if not signed.embeds(view.ca(Role.PERMISSIONS).der):
+        yield Finding(
+            Severity.ERROR, "embedded-differs", place,
+            "carries another certificate than that of the permissions CA: older DDS versions refuse it", again,
+        )  # fmt: skip
+    yield from check_strength(view.root, governance, required)
+    yield from check_governance_issued(view, register, signed.document)
     twin = safe_files.read_if_there(view.root, layout.GOVERNANCE_XML)
     if twin is not None and twin.replace(b"\r\n", b"\n") != signed.document:
         yield Finding(

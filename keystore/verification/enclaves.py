@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from collections.abc import Iterator
 from datetime import datetime
 
 from keystore.disk import layout, safe_files
+from keystore.disk.governance_file import signed_governance
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput, KeystoreError, SigningUnavailable, UnsafeKeystore
+from keystore.errors import InvalidInput, KeystoreError, SigningUnavailable, UnsafeKeystore, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
+from keystore.formats.domains import Domains
+from keystore.formats.governance import parse_governance
 from keystore.formats.permissions_read import Grant, parse_permissions
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
+from keystore.formats.policy import Qualifier
+from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import (
     SubjectScheme,
@@ -25,25 +31,36 @@ from keystore.formats.subject import (
 )
 from keystore.formats.validity import LATEST, Validity, iso, parse_moment
 from keystore.signing import smime
-from keystore.signing.identity import public_half
+from keystore.signing.authority import spki
 from keystore.signing.key_pair import key_matches
-from keystore.signing.public_key import issued_by, key_kind
-from keystore.signing.signer import load_private_key
+from keystore.signing.public_key import issued_by, key_kind, signature_is_valid
+from keystore.signing.signer import FileSigner, load_private_key
 from keystore.verification import repair
 from keystore.verification.authorities import CYCLONE_KINDS
+from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
+from keystore.verification.governance import check_domains
+from keystore.verification.issued import check_certificate_issued, check_permissions_issued
+from keystore.verification.profile import check_leaf, check_shared_keys
 
 _WILDCARD = re.compile(r"[*?\[]")
 
 
-def check_enclaves(view: KeystoreView, revoked: frozenset[int], now: datetime) -> Iterator[Finding]:
+def check_enclaves(
+    view: KeystoreView, register: Register | None, revoked: frozenset[int], now: datetime
+) -> Iterator[Finding]:
     names: dict[str, str] = {}
     serials: dict[int, str] = {}
+    holders: dict[str, CertificateFacts] = {}
+    granted: dict[str, Domains] = {}
     for enclave in view.enclaves():
-        check = _EnclaveCheck(view, enclave, revoked, now)
+        check = _EnclaveCheck(view, register, enclave, revoked, now)
         yield from check.findings()
+        if check.domains is not None:
+            granted[enclave] = check.domains
         if check.facts is None:
             continue
+        holders[enclave] = check.facts
         names[enclave] = check.facts.common_name or ""
         other = serials.setdefault(check.facts.serial, enclave)
         if other != enclave:
@@ -51,13 +68,10 @@ def check_enclaves(view: KeystoreView, revoked: frozenset[int], now: datetime) -
                 "serial-reused", layout.CERT, f"same serial number as {other}; one CRL entry hits both"
             )
     yield from _check_subjects(view, names)
-
-
-def check_enclave(
-    view: KeystoreView, enclave: str, revoked: frozenset[int], now: datetime
-) -> Iterator[Finding]:
-    """One enclave by itself."""
-    return _EnclaveCheck(view, enclave, revoked, now).findings()
+    yield from check_shared_keys(view, holders)
+    with contextlib.suppress(KeystoreError):  # of the governance, which is reported where it is checked
+        governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
+        yield from check_domains(view.root, governance, granted)
 
 
 def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Finding]:
@@ -80,13 +94,22 @@ def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Findi
 
 
 class _EnclaveCheck:
-    def __init__(self, view: KeystoreView, enclave: str, revoked: frozenset[int], now: datetime):
+    def __init__(
+        self,
+        view: KeystoreView,
+        register: Register | None,
+        enclave: str,
+        revoked: frozenset[int],
+        now: datetime,
+    ):
         self._view = view
+        self._register = register
         self._enclave = enclave
         self._directory = layout.enclave_directory(enclave)
         self._revoked = revoked
         self._now = now
         self.facts: CertificateFacts | None = None
+        self.domains: Domains | None = None
 
     def error(self, code: str, file: str, message: str) -> Finding:
         return self._finding(Severity.ERROR, code, file, message, self._renew())
@@ -131,6 +154,9 @@ class _EnclaveCheck:
             return
         yield from self._chain(self.facts)
         yield from self._subject(self.facts)
+        yield from check_leaf(self._view, self._enclave, self.facts)
+        if self.facts.serial not in self._revoked:
+            yield from check_certificate_issued(self._view, self._register, self._enclave, self.facts)
         key = self._read(layout.KEY)
         if key is not None and not (key_matches(key, self.facts) and _loads(key)):
             yield self._wrong_key(key)
@@ -141,9 +167,7 @@ class _EnclaveCheck:
             )
 
     def _wrong_key(self, key: bytes) -> Finding:
-        try:
-            public_half(key, layout.KEY)
-        except SigningUnavailable:
+        if not _loads(key):
             fix = repair.run(self._view.root, "renew", self._enclave, "--new-keys")
             return self._finding(Severity.ERROR, "key", layout.KEY, "not a usable private key", fix)
         return self.error(
@@ -206,6 +230,14 @@ class _EnclaveCheck:
         except KeystoreError as error:
             yield self._distrusted("permissions", str(error))
             return
+        if problem := mime_problem(p7s):
+            yield self._distrusted("permissions", problem)
+        if not signed.embeds(self._view.ca(Role.PERMISSIONS).der):
+            yield self.error(
+                "embedded-differs", layout.PERMISSIONS,
+                "carries another certificate than that of the permissions CA: older DDS versions refuse it",
+            )  # fmt: skip
+        yield from check_permissions_issued(self._view, self._register, self._enclave, signed.document)
         twin = self._read(layout.PERMISSIONS_XML)
         if twin is not None and twin.replace(b"\r\n", b"\n") != signed.document:
             yield self.error(
@@ -232,6 +264,7 @@ class _EnclaveCheck:
             yield self._distrusted("wrong-grant", f"no grant for {subject}, the subject of cert.pem")
             return
         yield from self._validity(mine, self.facts)
+        yield from self._reach(grants, mine)
         wide = sorted(
             {
                 topic
@@ -243,6 +276,29 @@ class _EnclaveCheck:
         if wide:
             shown = ", ".join(wide[:4]) + (" ..." if len(wide) > 4 else "")
             yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, f"grants by wildcard: {shown}")
+
+    def _reach(self, grants: tuple[Grant, ...], mine: Grant) -> Iterator[Finding]:
+        """What the document permits beyond the names it lists, and to whom else."""
+        if mine.default is Qualifier.ALLOW:
+            yield self._distrusted(
+                "default-allow", "permits on Cyclone DDS whatever no rule names (its default is ALLOW)"
+            )
+        if others := sorted({grant.subject_name for grant in grants} - {mine.subject_name}):
+            yield self._finding(
+                Severity.EXPOSURE, "foreign-grant", layout.PERMISSIONS,
+                f"also grants to {', '.join(map(printable, others[:4]))}, whoever holds that subject",
+                self._renew(),
+            )  # fmt: skip
+        everything = [
+            topic for rule in mine.rules for topic in (*rule.publish, *rule.subscribe) if topic == "*"
+        ]
+        if everything:
+            yield self._finding(
+                Severity.EXPOSURE, "everything", layout.PERMISSIONS, "grants every topic (*)", self._renew()
+            )
+        ranges = [(low, low if high is None else high) for rule in mine.rules for low, high in rule.domains]
+        with contextlib.suppress(InvalidInput):
+            self.domains = Domains(tuple(ranges)) if ranges else None
 
     def _validity(self, grant: Grant, facts: CertificateFacts) -> Iterator[Finding]:
         try:
@@ -262,9 +318,10 @@ class _EnclaveCheck:
 
 
 def _loads(key_pem: bytes) -> bool:
-    """``key_matches`` looks at the public half in the file; OpenSSL, when it loads a key, holds the private to it."""
+    """``key_matches`` looks at the public half in the file; only a signature shows that the private half fits it."""
+    probe = b"do both halves fit"
     try:
-        load_private_key(key_pem, None, layout.KEY)
-    except SigningUnavailable:
+        signer = FileSigner(load_private_key(key_pem, None, layout.KEY))
+        return signature_is_valid(spki(signer.public_key()), signer.sign(probe), probe)
+    except (SigningUnavailable, ValueError):
         return False
-    return True

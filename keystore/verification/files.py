@@ -7,12 +7,15 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
+from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, safe_files
 from keystore.errors import InvalidEnclaveName, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.role import Role
 from keystore.verification import repair
+from keystore.verification.contents import check_content, holds_private_key
 from keystore.verification.finding import Finding, Severity
+from keystore.verification.surroundings import check_hard_links, check_owner
 
 _TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES})
 _KNOWN = frozenset({
@@ -42,8 +45,15 @@ def check_files(root: Path) -> Iterator[Finding]:
     except InvalidEnclaveName as error:
         yield Finding(
             Severity.ERROR, "case-collision", error.name, str(error),
-            repair.run_on(root, "rm -r", layout.enclave_directory(error.name), "or the other one"),
+            repair.run_on(root, "rm -r", _less_of_an_enclave(root, error.name, names), "or the other one"),
         )  # fmt: skip
+
+
+def _less_of_an_enclave(root: Path, name: str, names: list[str]) -> str:
+    """Of the directories that only case tells apart, one without key and certificate, if there is one."""
+    alike = [layout.enclave_directory(other) for other in names if other.lower() == name.lower()]
+    empty = [one for one in alike if not {layout.KEY, layout.CERT} & set(os.listdir(root / one))]
+    return (empty or alike)[0]
 
 
 def _walk(root: Path, relative: str) -> Iterator[tuple[str, os.stat_result]]:
@@ -119,6 +129,10 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
     directory, _, name = relative.rpartition("/")
     secret = directory == layout.PRIVATE or name == layout.KEY
     yield from _check_owner(root, relative, info, private=secret)
+    if secret:
+        yield from check_hard_links(root, relative, info)
+    if relative in _KNOWN or name in layout.ENCLAVE_FILES:
+        yield from check_content(root, relative)
     if relative in _KNOWN or (directory == layout.RETIRED and name.endswith(".cert.pem")):
         return
     if directory == layout.SHARES and name.endswith((".json", ".lock")):
@@ -139,7 +153,9 @@ def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bo
         yield Finding(
             Severity.ERROR, "unsafe-owner", relative, problem, safe_files.private_repair(path, info)
         )
-    elif info.st_mode & 0o022:
+    elif not private:
+        yield from check_owner(root, relative, info)
+    if info.st_mode & 0o022 and not (private and safe_files.private_problem(path, info)):
         yield Finding(
             Severity.ERROR, "writable-by-others", relative,
             f"others can write it (mode {safe_files.mode_text(info)})", safe_files.close_to_others(root),
@@ -165,11 +181,11 @@ def _stray(root: Path, relative: str, why: str) -> Finding:
 
 
 def _holds_key(path: Path) -> bool:
-    """A stray may be anything: only the beginning is read, and one that cannot be read is no key of ours."""
-    if not path.is_file():
-        return False
+    """A stray may be anything; one that cannot be read, or is huge, is not taken for a key."""
     try:
-        with path.open("rb") as stream:
-            return b"PRIVATE KEY" in stream.read(4096)
+        return holds_private_key(read_bytes(path, _MAX_STRAY))
     except OSError:
         return False
+
+
+_MAX_STRAY = 64_000_000  # bytes

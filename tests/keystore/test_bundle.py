@@ -65,7 +65,8 @@ def test_a_bundle_is_a_good_keystore(root: Path, tmp_path: Path) -> None:
 def test_copies_stand_alone(root: Path, tmp_path: Path, enclave: str) -> None:
     export(root, tmp_path / "out", [enclave], public=PublicFiles.COPY)
     assert not any(path.is_symlink() for path in (tmp_path / "out").rglob("*"))
-    assert set(contents(tmp_path / "out")) == files(enclave.rstrip("/"))
+    assert set(contents(tmp_path / "out")) == files(enclave.rstrip("/")) | PUBLIC
+    assert verify(tmp_path / "out").is_good
     directory = tmp_path / "out/enclaves" / enclave.lstrip("/")
     openssl("verify", "-CAfile", directory / "identity_ca.cert.pem", directory / "cert.pem")
 

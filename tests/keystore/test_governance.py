@@ -21,7 +21,7 @@ from keystore.formats.governance import (
 from keystore.formats.governance_yaml import parse_governance_yaml
 from keystore.steps.governance_setting import GovernanceOptions, set_governance
 from keystore.steps.provisioning import provision
-from keystore.verification import verify
+from keystore.verification import Requirements, verify
 from tests.dds.sros2_style import GOVERNANCE
 from tests.keystore.kit import contents, filled, options, policy, snapshot
 
@@ -171,7 +171,11 @@ def test_setting_governance_signs_once(tmp_path: Path) -> None:
     assert not set_governance(root, governance, options=QUICK)
     assert snapshot(root) == before
     assert (root / "enclaves/governance.xml").read_text() == CAMERA_XML
-    assert verify(root).findings == ()
+    assert {finding.code for finding in verify(root).findings if finding.severity.fails} == {
+        "governance-weak"
+    }
+    assert verify(root, required=Requirements(governance)).is_good
+    assert not verify(root, required=Requirements(Governance())).is_good
 
 
 def test_an_edited_twin_is_found_and_written_back(tmp_path: Path) -> None:

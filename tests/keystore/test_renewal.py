@@ -64,7 +64,7 @@ def test_an_sros2_keystore_is_reported_as_exposed(sros2: Path) -> None:
     assert list_enclaves(sros2) == sorted(ARTICLE)
     found = verify(sros2).findings
     exposed = {finding.code for finding in found if finding.severity is Severity.EXPOSURE}
-    assert exposed == {"shared-ca", "leaf-can-sign", "borrowed-permissions"}
+    assert exposed == {"shared-ca", "leaf-can-sign", "borrowed-permissions", "no-register"}
     assert all(finding.repair for finding in found if finding.severity.fails)
 
 

@@ -1,0 +1,101 @@
+"""The signed governance as a reviewer reads it: is it as strong as SROS2's default, is it for the right domains?"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from keystore.disk import layout
+from keystore.formats.domains import Domains
+from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule
+from keystore.verification import repair
+from keystore.verification.finding import Finding, Severity
+
+_STRENGTH = {
+    Protection.NONE: 0,
+    Protection.SIGN: 1,
+    Protection.SIGN_WITH_ORIGIN_AUTHENTICATION: 1,
+    Protection.ENCRYPT: 2,
+    Protection.ENCRYPT_WITH_ORIGIN_AUTHENTICATION: 2,
+}
+_PERMISSIVE = "allow_unauthenticated_participants"  # the one flag whose ``true`` is the weaker value
+_OF_DOMAIN = (
+    _PERMISSIVE, "enable_join_access_control", "discovery_protection_kind", "liveliness_protection_kind",
+    "rtps_protection_kind",
+)  # fmt: skip
+_OF_TOPIC = (
+    "enable_discovery_protection", "enable_liveliness_protection", "enable_read_access_control",
+    "enable_write_access_control", "metadata_protection_kind", "data_protection_kind",
+)  # fmt: skip
+
+
+def weaknesses(governance: Governance) -> Iterator[str]:
+    """Each attribute of each rule that is weaker than the default, as ``rtps_protection_kind NONE (default SIGN)``."""
+    for rule in governance.domain_rules:
+        yield from _weaker(rule, DomainRule(), _OF_DOMAIN, f"domains {rule.domains}")
+        for topic in rule.topic_rules:
+            yield from _weaker(topic, TopicRule(), _OF_TOPIC, f"topics {topic.topic_expression}")
+
+
+def _weaker(
+    rule: DomainRule | TopicRule, default: DomainRule | TopicRule, names: tuple[str, ...], where: str
+) -> Iterator[str]:
+    for name in names:
+        value, usual = getattr(rule, name), getattr(default, name)
+        if _level(name, value) < _level(name, usual):
+            yield f"{name} {_shown(value)} for {where} (default {_shown(usual)})"
+
+
+def _level(name: str, value: bool | Protection) -> int:
+    if isinstance(value, Protection):
+        return _STRENGTH[value]
+    return int(value != (name == _PERMISSIVE))
+
+
+def _shown(value: bool | Protection) -> str:
+    return value.value if isinstance(value, Protection) else str(value).lower()
+
+
+def check_strength(root: Path, governance: Governance, required: Governance | None) -> Iterator[Finding]:
+    """``required``: what somebody decided it should be; it may then be weaker, and must be nothing else."""
+    again = repair.run(root, "governance", "FILE.yaml", note="must reach all participants together")
+    if required is not None:
+        if governance != required:
+            yield Finding(
+                Severity.ERROR, "governance-not-required", layout.GOVERNANCE,
+                "is not the governance that --require-governance names", again,
+            )  # fmt: skip
+        return
+    for weakness in weaknesses(governance):
+        yield Finding(
+            Severity.EXPOSURE, "governance-weak", layout.GOVERNANCE, f"weaker than the default: {weakness}",
+            f"{again}; where it is meant so: verify --require-governance FILE",
+        )  # fmt: skip
+
+
+def check_domains(root: Path, governance: Governance, granted: dict[str, Domains]) -> Iterator[Finding]:
+    """``granted``: the domains that the permissions of each enclave name."""
+    for enclave, domains in granted.items():
+        if missing := _without(domains, governance.domains()):
+            yield Finding(
+                Severity.ERROR, "domain-not-governed", f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}",
+                f"permissions for domains {missing}, which the governance does not list: Cyclone DDS refuses the "
+                "participant there, Fast DDS each endpoint",
+                repair.run(root, "renew", enclave, note="or add the domains to the governance"),
+            )  # fmt: skip
+    used = {identifier for domains in granted.values() for identifier in _identifiers(domains)}
+    idle = sorted(_identifiers(governance.domains()) - used)
+    if used and idle:
+        yield Finding(
+            Severity.NOTE, "domain-unused", layout.GOVERNANCE,
+            f"also for domains {Domains(tuple((one, one) for one in idle))}, which no permissions name",
+        )  # fmt: skip
+
+
+def _without(domains: Domains, others: Domains) -> Domains | None:
+    left = sorted(_identifiers(domains) - _identifiers(others))
+    return Domains(tuple((one, one) for one in left)) if left else None
+
+
+def _identifiers(domains: Domains) -> set[int]:
+    return {identifier for first, last in domains.ranges for identifier in range(first, last + 1)}

@@ -1,0 +1,136 @@
+"""What stands in the keystore held against what the register says was issued last.
+
+A backup restored, an older CRL copied back, a document of the past: each was signed here once and proves nothing about
+today. Where there is no register (a bundle, a host) only fingerprints can be shown and required.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator
+from datetime import datetime
+
+from keystore.disk import layout
+from keystore.disk.authorities import describe, foreign_authorities
+from keystore.disk.crl_file import crl_problem
+from keystore.disk.register_file import needs_register, read_register
+from keystore.disk.view import KeystoreView
+from keystore.errors import KeystoreError
+from keystore.formats.certificate import CertificateFacts
+from keystore.formats.register import Register
+from keystore.formats.role import Role
+from keystore.formats.validity import iso
+from keystore.signing.public_key import fingerprint
+from keystore.verification import repair
+from keystore.verification.finding import Finding, Severity
+
+
+def load_register(view: KeystoreView) -> tuple[Register | None, list[Finding]]:
+    """The register, or why there is none where one belongs."""
+    try:
+        register = read_register(view.root)
+    except KeystoreError as error:
+        return None, [Finding(Severity.ERROR, "register", layout.REGISTER, str(error), repair.BACKUP)]
+    if register is None and needs_register(view):
+        fix = repair.run(view.root, "renew", note="takes over what can still be known")
+        why = "there is no register: what was revoked or taken away and then put back cannot be told"
+        return None, [Finding(Severity.EXPOSURE, "no-register", layout.REGISTER, why, fix)]
+    return register, []
+
+
+def check_anchors(
+    view: KeystoreView, register: Register | None, required: Collection[str]
+) -> Iterator[Finding]:
+    """``required``: SHA-256 fingerprints of the CA certificates to trust, any CA when empty."""
+    for role, ca in foreign_authorities(view, register):
+        yield Finding(
+            Severity.ERROR, "foreign-ca", layout.ca_cert(role),
+            f"holds a CA that this keystore did not make: {describe(ca)}; whoever has its key can make enclaves "
+            "that Fast DDS lets in", repair.run(view.root, "renew", note="once it is known who put it there"),
+        )  # fmt: skip
+    wanted = {one.replace(":", "").lower() for one in required}
+    for role in Role:
+        bundle = view.ca_bundle(role)
+        for ca in bundle:
+            if wanted and fingerprint(ca.der) not in wanted:
+                yield Finding(
+                    Severity.ERROR, "ca-not-required", layout.ca_cert(role),
+                    f"trusts a CA that --require-ca does not name: {describe(ca)}", repair.BACKUP,
+                )  # fmt: skip
+        if register is None and len(bundle) > 1 and not wanted:
+            yield Finding(
+                Severity.EXPOSURE, "several-cas", layout.ca_cert(role),
+                f"trusts {len(bundle)} CAs: {'; '.join(map(describe, bundle))}; without a register nobody can say "
+                "whether a roll-over is under way", "verify --require-ca SHA256 for each CA that is meant",
+            )  # fmt: skip
+
+
+def check_published(view: KeystoreView, register: Register | None, now: datetime) -> Iterator[Finding]:
+    """CRL and governance: are they the ones published last? And is everybody still there?"""
+    if register is None:
+        return
+    problem = crl_problem(view, register, now)
+    if problem is not None and problem != "the CRL has ended":  # which is told by its dates
+        yield Finding(
+            Severity.ERROR, "crl-not-last", layout.CRL,
+            f"{problem}: enclaves that were revoked since may talk again",
+            repair.run(view.root, "renew", note="publishes it again; then deploy"),
+        )  # fmt: skip
+    present = set(view.enclaves())
+    for enclave in sorted({one.enclave for one in register.certificates.values()} - present - {""}):
+        if (held := register.in_force(enclave)) is not None and held.not_after > now:
+            yield Finding(
+                Severity.WARNING, "enclave-gone", layout.enclave_directory(enclave),
+                f"is not here, but its certificate is valid until {iso(held.not_after)} and not revoked",
+                repair.run(
+                    view.root, "create-enclave", enclave,
+                    note="makes it anew; or restore it from a backup. To end it: then secure-keystore remove",
+                ),
+            )  # fmt: skip
+
+
+def check_governance_issued(
+    view: KeystoreView, register: Register | None, document: bytes
+) -> Iterator[Finding]:
+    if register is not None and register.governance and document != register.governance:
+        yield Finding(
+            Severity.ERROR, "governance-not-last", layout.GOVERNANCE,
+            "signed here, but not the governance that was signed last",
+            repair.run(view.root, "renew", note="signs the last one again"),
+        )  # fmt: skip
+
+
+def check_certificate_issued(
+    view: KeystoreView, register: Register | None, enclave: str, facts: CertificateFacts
+) -> Iterator[Finding]:
+    if register is None:
+        return
+    place = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
+    again = repair.run(view.root, "renew", enclave, "--new-keys", "--revoke-old")
+    known, held = register.certificates.get(facts.serial), register.in_force(enclave)
+    if known is None or known.enclave != enclave or known.key != fingerprint(facts.public_key):
+        why = "was not issued here: no certificate with this serial and key is in the register"
+        yield Finding(Severity.ERROR, "not-issued-here", place, why, again)
+    elif known.revoked is not None:
+        why = f"was revoked on {iso(known.revoked)} and has been put back"
+        yield Finding(Severity.ERROR, "revoked", place, why, again)
+    elif held is None or held.serial != facts.serial:
+        why = "is an earlier one that has been put back: another was issued in its place"
+        yield Finding(Severity.ERROR, "certificate-not-last", place, why, again)
+
+
+def check_permissions_issued(
+    view: KeystoreView, register: Register | None, enclave: str, document: bytes
+) -> Iterator[Finding]:
+    if register is None:
+        return
+    last = register.permissions(enclave)
+    if last is not None and last.document == fingerprint(document):
+        return
+    earlier = any(one.document == fingerprint(document) for one in register.documents)
+    what = (
+        "an earlier document that has been put back" if earlier else "a document that is not in the register"
+    )
+    yield Finding(
+        Severity.ERROR, "permissions-not-last", f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}",
+        f"{what}: it may permit what was taken away since", repair.grant_again(view.root, enclave),
+    )  # fmt: skip
