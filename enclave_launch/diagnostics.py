@@ -45,6 +45,7 @@ class Code(str, Enum):
     NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"
     NO_MANIFEST = "no-manifest", "Nothing says what a node or component does"
     NODE_NAME_IMPOSSIBLE = "node-name-impossible", "No node can run under the name it is given"
+    NODE_NAME_UNKNOWN = "node-name-unknown", "A node names itself in a way that nobody can foresee"
     PATTERN_ACCEPTED = "pattern-accepted", "A partly known name became a wildcard"
     PERMISSIONS_LARGE = "permissions-large", "The permissions of an enclave come near what DDS can carry"
     POLICY_ANSWERS = "policy-answers", "The policy file says what the manifest leaves open"
@@ -62,6 +63,8 @@ class Code(str, Enum):
         "Another launch on the keystore uses the enclave too",
     )
     ENCLAVE_SHARED_WITH_LAUNCHER = "enclave-shared-with-launcher", "A process has the launcher's enclave"
+    ENCLAVE_TOO_DEEP = "enclave-too-deep", "No certificate can be made for an enclave"
+    ENCLAVE_UNGRANTED = "enclave-ungranted", "An enclave of an executable may do nothing"
     EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
     # of what could take an enclave away
     CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, on which nothing here was tried"
@@ -209,6 +212,12 @@ def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
     return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, IN_MANIFEST)
 
 
+def node_name_unknown(subject: str, why: str, place: SourceLocation) -> Diagnostic:
+    return Diagnostic(
+        Code.NODE_NAME_UNKNOWN, subject, f"{subject}: {why}", place, "give it a name: set name="
+    )
+
+
 def node_name_impossible(node: str, why: str, place: SourceLocation) -> Diagnostic:
     return Diagnostic(Code.NODE_NAME_IMPOSSIBLE, node, f"node {node}: {why}", place, _OTHER_NAME)
 
@@ -275,6 +284,20 @@ def enclave_of_several_launches(enclave: str, others: Sequence[str], added: Sequ
 def enclave_shared_with_launcher(enclave: str) -> Diagnostic:
     return Diagnostic(
         Code.ENCLAVE_SHARED_WITH_LAUNCHER, enclave, f"enclave {enclave} is shared with the launcher itself"
+    )
+
+
+def enclave_too_deep(process: str, why: str, place: SourceLocation) -> Diagnostic:
+    return Diagnostic(Code.ENCLAVE_TOO_DEEP, process, f"{process}: {why}", place, "give it a shorter one")
+
+
+def enclave_ungranted(enclave: str, processes: tuple[str, ...], place: SourceLocation) -> Diagnostic:
+    text = (
+        f"{enclave}, the enclave of {', '.join(processes)}, has no permissions: nothing is known of what an executable "
+        "says in ROS, and a node in it could not start"
+    )
+    return Diagnostic(
+        Code.ENCLAVE_UNGRANTED, enclave, text, place, "grant what it needs in a policy file (--policy)"
     )
 
 

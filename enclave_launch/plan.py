@@ -24,9 +24,12 @@ from enclave_launch.diagnostics import (
     domains_shared,
     enclave_attribute_unused,
     enclave_shared_with_launcher,
+    enclave_too_deep,
+    enclave_ungranted,
     executable_without_enclave,
     library_version,
     no_manifest,
+    node_name_unknown,
     not_foreseeable,
     parameters_unknown,
 )
@@ -35,7 +38,7 @@ from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
 from enclave_launch.policy.launcher import launcher_node
-from enclave_launch.policy.running_node import Role, node_of_component, node_of_process
+from enclave_launch.policy.running_node import Role, UnknownNodeName, node_of_component, node_of_process
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
     Evaluation,
@@ -69,10 +72,11 @@ class Found(NamedTuple):
 
 
 class Missing(NamedTuple):
-    """Nothing is known of an executable or component, and why: what was searched, what to do next."""
+    """Nothing is known of an executable or component, and why: what was searched. ``unnamed``: but its name."""
 
     subject: str
     why: str
+    unnamed: bool = False
 
 
 InterfaceLookup = Callable[
@@ -267,6 +271,7 @@ class Planner(NamedTuple):
                 *_notes(processes, components, launcher),
                 *(note for item in processes for note in remarks(item.process, evaluation.distro)),
                 *_domains_shared(processes),
+                *_ungranted(processes, derived),
                 *derived.warnings,
             ),
         )
@@ -304,6 +309,18 @@ def _domains_shared(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]
             yield domains_shared(enclave, ", ".join(map(str, sorted(by_domain))), tuple(who))
 
 
+def _ungranted(processes: Iterable[PlannedProcess], derived: DerivedPolicy) -> Iterator[Diagnostic]:
+    """Enclaves of executables for which no policy file speaks: signed, they permit nothing at all."""
+    empty = {enclave.path for enclave in derived.policy.enclaves if not enclave.profiles}
+    members: dict[str, list[PlannedProcess]] = {}
+    for item in processes:
+        if item.enclave and item.enclave.path in empty and item.process.kind == "executable":
+            members.setdefault(item.enclave.path, []).append(item)
+    for path, items in members.items():
+        names = tuple(item.process.process_name for item in items)
+        yield enclave_ungranted(path, names, items[0].location)
+
+
 def _nodes(
     processes: Iterable[PlannedProcess], components: Iterable[PlannedComponent], launcher: RunningNode | None
 ) -> tuple[RunningNode, ...]:
@@ -324,10 +341,14 @@ def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: Encl
     enclave = assign_enclave(process, scope, name and name.removesuffix(RANDOM_ENDING))
     path = enclave.path if enclave else "/"
     role = _role(process)
-    nodes = tuple(
-        node_of_process(process, interface, path, "node" if interface.own_rules else role)
-        for interface in found.interfaces
-    )
+    try:
+        nodes = tuple(
+            node_of_process(process, interface, path, "node" if interface.own_rules else role)
+            for interface in found.interfaces
+        )
+    except UnknownNodeName as error:
+        missing = Missing(process.process_name, error.message, unnamed=True)
+        return PlannedProcess(process, enclave, (), missing)
     return PlannedProcess(process, enclave, nodes, origin=found.origin, doubt=found.doubt)
 
 
@@ -346,10 +367,15 @@ def _plan_component(
         return PlannedComponent(component, container, (), found)
     if container is None or container.enclave is None:
         return PlannedComponent(component, container, (), origin=found.origin, doubt=found.doubt)
-    nodes = tuple(
-        node_of_component(component, container.process, interface, container.enclave.path)
-        for interface in found.interfaces
-    )
+    try:
+        nodes = tuple(
+            node_of_component(component, container.process, interface, container.enclave.path)
+            for interface in found.interfaces
+        )
+    except UnknownNodeName as error:
+        return PlannedComponent(
+            component, container, (), Missing(component.plugin, error.message, unnamed=True)
+        )
     return PlannedComponent(component, container, nodes, origin=found.origin, doubt=found.doubt)
 
 
@@ -375,13 +401,22 @@ def _problems(
 ) -> Iterator[Diagnostic]:
     for process in processes:
         if process.missing:
-            yield no_manifest(*process.missing, process.process.location)
+            yield _missing(process.missing, process.process.location)
         yield from process.refusals
+        if process.enclave and process.enclave.too_deep:
+            yield enclave_too_deep(
+                process.process.process_name, process.enclave.too_deep, process.process.location
+            )
         for path, why in process.process.unread_parameter_files:
             yield parameters_unknown(process.process.process_name, path, why, process.process.location)
     for component in components:
         if component.missing:
-            yield no_manifest(*component.missing, component.component.location)
+            yield _missing(component.missing, component.component.location)
+
+
+def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
+    told = node_name_unknown if missing.unnamed else no_manifest
+    return told(missing.subject, missing.why, place)
 
 
 def _notes(

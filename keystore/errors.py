@@ -38,6 +38,10 @@ class InvalidEnclaveName(KeystoreError, ValueError):
         super().__init__(f"{printable(name)} is not an enclave name: {reason}")
 
 
+class EnclaveTooDeep(InvalidEnclaveName):
+    """A name that rcl accepts and Cyclone DDS cannot carry in a certificate."""
+
+
 class InvalidInput(KeystoreError, ValueError):
     exit_status = 2
 

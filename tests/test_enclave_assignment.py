@@ -76,9 +76,7 @@ def test_an_executable_gets_an_enclave_only_when_the_launch_file_gives_one() -> 
     assert given is not None and given.path == "/foo/bar"
 
 
-@pytest.mark.parametrize(
-    "bad", ["..", "../up", "a//b", "a/", "", "a b", "a-b", "1a", "a\n", "é", "/a" * 20, "x" * 300]
-)
+@pytest.mark.parametrize("bad", ["..", "../up", "a//b", "a/", "", "a b", "a-b", "1a", "a\n", "é", "x" * 300])
 def test_a_path_that_rcl_refuses_is_an_error_naming_the_element(bad: str) -> None:
     with pytest.raises(LaunchFileError, match=r"/w/a\.launch\.xml:3: <node> enclave "):
         assign_enclave(process(EnclaveRequest(bad, "/foo")), EnclaveScope.NAMESPACE)

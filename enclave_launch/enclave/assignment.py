@@ -26,7 +26,7 @@ from enclave_launch.process import (
     EnclaveRequest,
     ResolvedProcess,
 )
-from keystore.errors import InvalidEnclaveName
+from keystore.errors import EnclaveTooDeep, InvalidEnclaveName
 from keystore.formats.enclave_name import validate_enclave_name
 
 
@@ -53,11 +53,13 @@ class Reason(str, Enum):
 
 
 class EnclaveAssignment(NamedTuple):
-    """``path`` is absolute and valid for rcl; ``scope`` is what a relative attribute was resolved against."""
+    """``path`` is absolute and valid for rcl; ``scope`` is what a relative attribute was resolved against;
+    ``too_deep`` says why no certificate can be made for it."""
 
     path: str
     reason: Reason
     scope: str = "/"
+    too_deep: str = ""
 
 
 def join_enclave(scope: str, relative: str) -> str:
@@ -80,6 +82,8 @@ def assign_enclave(
         return None
     try:
         validate_enclave_name(assignment.path)
+    except EnclaveTooDeep as error:
+        return assignment._replace(too_deep=str(error))
     except InvalidEnclaveName as error:
         raise LaunchFileError(
             f"enclave {assignment.path!r} ({assignment.reason.value}): {error}",

@@ -3,17 +3,21 @@
 Parsed by expat, as upstream does through ElementTree: same dialect, same messages, right line numbers in long
 files, and less time than lxml takes to build a tree and give it to Python. Unlike ElementTree we keep the
 line of each element and refuse what only an attacker writes: nothing outside the file is ever loaded, and an
-entity that the file declares must be short plain text, so that no file grows by more than
+entity that the file declares must be short, the entities in it included, so that no file grows by more than
 ``MAX_ENTITY_LENGTH`` times.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import partial
 from xml.parsers import expat
 
 MAX_ENTITY_LENGTH = 256  # characters of one declared entity
+_REFERENCE = re.compile("&([^;&#]+);")
+_PREDEFINED = dict.fromkeys(("lt", "gt", "amp", "apos", "quot"), " ")
+_UNKNOWN = " " * (MAX_ENTITY_LENGTH + 1)
 MAX_NESTING = 250  # elements in elements; upstream ends in a RecursionError before
 
 
@@ -49,7 +53,7 @@ def parse_xml(text: str) -> XmlElement:
     Raises ``xml.etree.ElementTree.ParseError`` with ElementTree's message and position, or ``RefusedXml``.
     """
     parser = expat.ParserCreate(namespace_separator="}")
-    parser.EntityDeclHandler = partial(_check_entity, parser)
+    parser.EntityDeclHandler = partial(_check_entity, parser, dict(_PREDEFINED))
     parser.SkippedEntityHandler = partial(_refuse_skipped_entity, parser)
     document = _collect_elements(parser, namespaces="xmlns" in text)
     try:
@@ -90,15 +94,28 @@ def _clark(name: str) -> str:
 
 
 def _check_entity(
-    parser: expat.XMLParserType, name: str, is_parameter: bool, value: str | None, *_external: str | None
+    parser: expat.XMLParserType,
+    declared: dict[str, str],
+    name: str,
+    is_parameter: bool,
+    value: str | None,
+    *_external: str | None,
 ) -> None:
+    """``declared``: the entities so far with their whole text; of two of one name the first counts."""
     line = parser.CurrentLineNumber
     if value is None:
         raise RefusedXml(f"entity '{name}' is external: nothing outside the file is read", line)
-    if is_parameter or "&" in value or "%" in value:
+    if is_parameter or "%" in value:
         raise RefusedXml(f"entity '{name}' is more than plain text", line)
-    if len(value) > MAX_ENTITY_LENGTH:
+    if len(value) > MAX_ENTITY_LENGTH or _longer(name, value, declared):
         raise RefusedXml(f"entity '{name}' has more than {MAX_ENTITY_LENGTH} characters", line)
+
+
+def _longer(name: str, value: str, declared: dict[str, str]) -> bool:
+    """Whether ``value`` is too long with the entities in it; one that is not declared yet is not known to be plain."""
+    text = _REFERENCE.sub(lambda match: declared.get(match[1], _UNKNOWN), value)
+    declared.setdefault(name, text)
+    return len(text) > MAX_ENTITY_LENGTH
 
 
 def _refuse_skipped_entity(parser: expat.XMLParserType, name: str, is_parameter: bool) -> None:

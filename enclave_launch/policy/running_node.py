@@ -26,6 +26,10 @@ from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
 Role = Literal["node", "lifecycle_node", "container", "component", "launcher"]
 
 
+class UnknownNodeName(LaunchFileError):
+    """A program that names its node at random, or as nobody knows: what it serves below its name cannot be signed."""
+
+
 class RunningNode(NamedTuple):
     """``name`` and ``namespace`` are final; ``original_name`` is what the program calls itself."""
 
@@ -105,9 +109,9 @@ def _named(
     original = interface.name or ""
     name = rules.node_name(original).name
     if not name:
-        raise LaunchFileError(
+        raise UnknownNodeName(
             f"the name of node {interface.package}/{interface.executable or interface.plugin} is not known: neither "
-            f"launch nor {interface.source} gives one; set name=",
+            f"launch nor {interface.source} gives one",
             location,
         )
     namespace = rules.namespace(interface.namespace or "/", name).name
@@ -119,9 +123,10 @@ def _named(
 def _parse(
     texts: Iterable[str], written: Iterable[RemapRule], location: SourceLocation
 ) -> tuple[ParsedRule, ...]:
-    places = {
-        f"{rule.source}:={rule.target}": str(rule.location) for rule in written if rule.location is not None
-    }
+    places: dict[str, str] = {}
+    for rule in written:
+        if rule.location is not None:  # of equal rules rcl applies the first
+            places.setdefault(f"{rule.source}:={rule.target}", str(rule.location))
     try:
         return tuple(parse_rule(text, places.get(text, str(location))) for text in texts)
     except InvalidRemapRuleError as error:

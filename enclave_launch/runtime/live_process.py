@@ -28,7 +28,7 @@ from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime import run_events
 from enclave_launch.runtime.launch_log import LaunchLog, Level
 from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, Stream
-from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter, OutputSetting, output_routes
+from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter
 from enclave_launch.runtime.run_events import Observer
 from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
 
@@ -58,9 +58,7 @@ class LiveProcess:
         self._context = context
         self._log = log
         self._details: dict[str, Any] = action.process_details or {}
-        self._router = OutputRouter(
-            log, process.process_name, output_routes(_output_setting(action, context)), _line_renderer(action)
-        )
+        self._router = OutputRouter(log, process.process_name, action.final_routes, _line_renderer(action))
         emulate_tty = _emulate_tty(action, context)
         self._supervised = SupervisedProcess(
             process.process_name,
@@ -166,11 +164,6 @@ class Reaction(EventHandler):
     def handle(self, event: Any, context: LaunchContext) -> None:
         super().handle(event, context)
         self._react(event)
-
-
-def _output_setting(action: ExecuteLocal, context: LaunchContext) -> OutputSetting:
-    output: Any = action.output
-    return output if isinstance(output, dict) else perform_substitutions(context, output)
 
 
 def _emulate_tty(action: ExecuteLocal, context: LaunchContext) -> bool:

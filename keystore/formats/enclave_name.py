@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from keystore.errors import InvalidEnclaveName, printable
+from keystore.errors import EnclaveTooDeep, InvalidEnclaveName, printable
 
 # RMW_TOPIC_MAX_NAME_LENGTH (247) minus two, where SROS2's namespace check stops; rcl itself allows 255.
 MAX_LENGTH = 245
@@ -33,7 +33,7 @@ def validate_enclave_name(name: str) -> str:
         raise InvalidEnclaveName(name, _differences(name))
     if name.count("/") > MAX_SEGMENTS:
         count = name.count("/")
-        raise InvalidEnclaveName(name, f"it has {count} segments, Cyclone DDS carries at most {MAX_SEGMENTS}")
+        raise EnclaveTooDeep(name, f"it has {count} segments, Cyclone DDS carries at most {MAX_SEGMENTS}")
     return name
 
 

@@ -221,7 +221,9 @@ def alias_bomb(levels: int) -> str:
 
 
 HOSTILE = {
-    "billion laughs": b'<!DOCTYPE a [<!ENTITY a "x"><!ENTITY b "&a;&a;">]><launch>&b;</launch>',
+    "billion laughs": b'<!DOCTYPE a [<!ENTITY a "'
+    + b"x" * 200
+    + b'"><!ENTITY b "&a;&a;">]><launch>&b;</launch>',
     "external entity": b'<!DOCTYPE a [<!ENTITY a SYSTEM "file:///etc/passwd">]><launch>&a;</launch>',
     "deep XML": b"<launch>" + b"<group>" * 5000,
     "deep YAML": b"launch: " + b"[" * 5000,

@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from enclave_launch.ros_rules.output import OutputSetting, output_routes
 from enclave_launch.runtime.launch_log import LaunchLog, Writers
 from enclave_launch.runtime.routing import (
     LONGEST_LINE,
     LineBuffer,
     OutputRouter,
-    OutputSetting,
-    output_routes,
 )
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 

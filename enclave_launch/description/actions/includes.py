@@ -30,8 +30,8 @@ if TYPE_CHECKING:
 MAX_DEPTH = 200
 """Nested includes; upstream runs out of stack at about this depth."""
 
-OpenFile = tuple[str, dict[str, Any]]
-"""A file that is being visited, and the launch configurations with which it was entered."""
+OpenFile = tuple[str, dict[str, Any], dict[str, str]]
+"""A file that is being visited, with the launch configurations and the environment in which it was entered."""
 
 
 def left_out(include: IncludeLaunchDescription, context: LaunchContext) -> bool:
@@ -52,14 +52,12 @@ def prepare_include(include: IncludeLaunchDescription, context: LaunchContext) -
 
 
 def _check_cycle(location: str, context: LaunchContext) -> None:
-    """The same file entered again with the same configurations will be entered for ever."""
+    """The same file entered again in the same state will be entered for ever."""
     path = os.path.abspath(location)
-    repeated = any(
-        known == path and configurations == context.launch_configurations
-        for known, configurations in context.open_files
-    )
+    state = (path, context.launch_configurations, context.process_environment.snapshot())
+    repeated = state in context.open_files
     if repeated or len(context.open_files) >= MAX_DEPTH:
-        cycle = [known for known, _ in context.open_files]
+        cycle = [known for known, *_ in context.open_files]
         if path in cycle:
             cycle = cycle[len(cycle) - 1 - cycle[::-1].index(path) :]
         raise CyclicIncludeError(
@@ -70,7 +68,7 @@ def _check_cycle(location: str, context: LaunchContext) -> None:
 def opened(include: IncludeLaunchDescription, context: LaunchContext) -> tuple[OpenFile, ...]:
     """The files open below ``include``."""
     path = os.path.abspath(include.launch_description_source.location)
-    return (*context.open_files, (path, include.entered_with))
+    return (*context.open_files, (path, *include.entered_with))
 
 
 _FILE_LOCALS = ("current_launch_file_path", "current_launch_file_directory")
@@ -98,7 +96,7 @@ class IncludeLaunchDescription(Action):
             launch_description_source = AnyLaunchDescriptionSource(launch_description_source)
         self.__source: LaunchDescriptionSource = launch_description_source
         self.__launch_arguments = () if launch_arguments is None else tuple(launch_arguments)
-        self.entered_with: dict[str, Any] = {}  # the launch configurations when it was executed
+        self.entered_with: tuple[dict[str, Any], dict[str, str]] = ({}, {})  # the state when it was executed
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
@@ -149,7 +147,7 @@ class IncludeLaunchDescription(Action):
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
 
-        self.entered_with = dict(context.launch_configurations)
+        self.entered_with = dict(context.launch_configurations), context.process_environment.snapshot()
         if left_out(self, context):
             return []
         description = prepare_include(self, context)

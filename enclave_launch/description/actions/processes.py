@@ -29,6 +29,7 @@ from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import enclave_scope
+from enclave_launch.ros_rules.output import Routes, output_routes
 from enclave_launch.ros_rules.ros_arguments import RosArguments, parse_ros_arguments, words_after_program
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ class ExecuteLocal(Action):
         self.__respawn_max_retries = respawn_max_retries
         self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
         self.__executed = False
+        self.final_routes: Routes = {}
         self.__event_args: dict[str, Any] | None = None
         self.__completed: Any = None
         self.captured_output: tuple[list[str], list[str]] = ([], [])
@@ -200,10 +202,16 @@ class ExecuteLocal(Action):
         self.__executed = True
         if context.is_shutdown:
             return None
+        self.final_routes = self.__routes(context)
         if self.__on_exit is not None:
             self.__register_on_exit(context, self.__on_exit)
         self.__completed = context.host.start_process(self, self.resolve(context), context)
         return None
+
+    def __routes(self, context: LaunchContext) -> Routes:
+        """Where its output goes. Raises ``ValueError`` for what launch does not know."""
+        output: Any = self.__output
+        return output_routes(output if isinstance(output, dict) else perform_substitutions(context, output))
 
     def __register_on_exit(self, context: LaunchContext, on_exit: OnExit) -> None:
         from enclave_launch.description.events.process_handlers import OnProcessExit
