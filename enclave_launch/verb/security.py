@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from datetime import timedelta
 
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.options import SecurityOptions
@@ -33,11 +34,15 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
         from keystore.steps.creation import CreateOptions  # much to import, and rarely needed
 
         subjects, creation = SubjectScheme.COMPATIBLE, CreateOptions(subjects=SubjectScheme.COMPATIBLE)
+    now = utc_now()
+    until = parse_end(options.valid_for, now) if options.valid_for else None
     return ProvisionOptions(
         domains=domains(options),
         create=not options.no_create_keystore,
         creation=creation,
-        valid_until=parse_end(options.valid_for, utc_now()) if options.valid_for else None,
+        valid_until=until,
+        # With short lives each start renews in time: when two thirds are over.
+        renew_within=(until - now) / 3 if until is not None else timedelta(0),
         subjects=subjects,
         access=CaAccess(passphrase=_passphrase(options)),
     )

@@ -150,6 +150,7 @@ def _enclave_files(view: KeystoreView, enclave: str, public: PublicFiles) -> Ite
 
 def _write(target: Path, files: list[ExportedFile]) -> None:
     """Written beside the target and renamed: a bundle is complete or absent."""
+    target.parent.mkdir(parents=True, exist_ok=True)
     aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
     try:
         if target.name.endswith((".tar", ".tar.gz")):

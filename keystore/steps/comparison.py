@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
@@ -25,7 +25,7 @@ from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.shares import Share
-from keystore.formats.validity import Validity, later, utc_now
+from keystore.formats.validity import Validity, iso, later, utc_now
 from keystore.steps.enclave_state import OTHER_PERMISSIONS, EnclaveState, PermissionsSource, Reissue, inspect
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.report import EnclaveReport, ProvisionReport
@@ -39,6 +39,8 @@ class WantedEnclave(NamedTuple):
     reissue: Reissue = Reissue.NOTHING
     share: EnclaveShare | None = None
     """Where ``permissions`` are those of several launches."""
+    ends_by: datetime | None = None
+    """When a life was asked for: a certificate that ends later does not do."""
 
 
 def compare(
@@ -100,7 +102,8 @@ def differences(
     keystore that cannot be read at all.
     """
     root = resolve_root(keystore)
-    chosen = with_domains(root, options or ProvisionOptions())
+    # What ends soon is renewed by a start, and good until then.
+    chosen = with_domains(root, options or ProvisionOptions())._replace(renew_within=timedelta(0))
     view = KeystoreView(root)
     view.require_complete()
     register = read_register(root)
@@ -141,12 +144,20 @@ def permissions_source(policy: EnclavePolicy, options: ProvisionOptions) -> Perm
 
 def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions) -> WantedEnclave:
     """Exactly this policy; of a launch, its share beside those of others."""
+    ends_by = asked_end(options)
     if options.launch is None:
-        return WantedEnclave(permissions_source(policy, options))
+        return WantedEnclave(permissions_source(policy, options), ends_by=ends_by)
     owner, domains = options.launch.owner, domains_of(policy.path, options)
     mine = Share(owner, domains, policy.profiles)
     share = EnclaveShare(root, policy.path, owner, mine, options.rmw, options.launch)
-    return WantedEnclave(share.document, share=share)
+    return WantedEnclave(share.document, share=share, ends_by=ends_by)
+
+
+def asked_end(options: ProvisionOptions) -> datetime | None:
+    """When new certificates are to end, where the caller said so."""
+    if options.valid_until is not None or options.lifetime is None:
+        return options.valid_until
+    return later(options.now or utc_now(), options.lifetime)
 
 
 def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> EnclaveState:
@@ -159,6 +170,13 @@ def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: Want
     some = f"{', '.join(beyond[:4])}{' ...' if len(beyond) > 4 else ''}"
     said = f"enclave {state.enclave} may do more in this bundle than this launch asks for ({some})"
     return state._replace(permissions=False, reasons=(said,))
+
+
+def _outlives(state: EnclaveState, wanted: WantedEnclave) -> bool:
+    """Of a certificate that is good otherwise; seconds pass between two runs, so an hour more does not count."""
+    if wanted.ends_by is None or state.reissue is not Reissue.NOTHING or state.facts is None:
+        return False
+    return state.facts.validity.not_after > later(wanted.ends_by, timedelta(hours=1))
 
 
 def as_found(state: EnclaveState) -> EnclaveReport:
@@ -175,7 +193,16 @@ def inspect_wanted(
     now: datetime,
 ) -> EnclaveState:
     """The enclave's state against what is wanted; what is asked to be issued anew counts as a difference."""
-    state = inspect(view, register, enclave, wanted.permissions, now, later(now, options.renew_within))
+    # A certificate that ends with its CA cannot be renewed for longer.
+    due = min(later(now, options.renew_within), *(view.ca(role).validity.not_after for role in Role))
+    state = inspect(view, register, enclave, wanted.permissions, now, due)
+    if _outlives(state, wanted):
+        longer = (
+            f"valid until {iso(state.facts.validity.not_after) if state.facts else ''}, longer than asked for"
+        )
+        state = state._replace(
+            reissue=Reissue.CERTIFICATE, permissions=True, reasons=(*state.reasons, longer)
+        )
     if wanted.share is not None and register is None and state.reasons == (OTHER_PERMISSIONS,):
         state = _with_shares_of_others(view, state, wanted)
     if wanted.reissue is Reissue.NOTHING or state.reissue is Reissue.KEY_PAIR:

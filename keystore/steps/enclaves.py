@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from datetime import timedelta
 from pathlib import Path
 
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
-from keystore.formats.validity import Validity
-from keystore.steps.comparison import WantedEnclave, permissions_source, with_domains
+from keystore.formats.validity import Validity, utc_now
+from keystore.steps.comparison import WantedEnclave, asked_end, permissions_source, with_domains
 from keystore.steps.enclave_state import PermissionsSource
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import bring_about, provision
@@ -29,9 +30,12 @@ def create_enclaves(
     ``allow_all`` asks for every topic, service and action. The keystore must exist.
     """
     root = resolve_root(keystore)
-    chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
+    chosen = with_domains(root, _as_long_as_asked(options or ProvisionOptions()))
     ordered = sorted({validate_enclave_name(name) for name in names})
-    wanted = {name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep) for name in ordered}
+    wanted = {
+        name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep, ends_by=asked_end(chosen))
+        for name in ordered
+    }
     return bring_about(root, wanted, chosen)
 
 
@@ -57,8 +61,15 @@ def apply_policy(
 ) -> ProvisionReport:
     """Exactly the policy's permissions for the policy's enclaves, created where missing, in a keystore that
     exists."""
-    chosen = (options or ProvisionOptions())._replace(create=False)
+    chosen = _as_long_as_asked(options or ProvisionOptions())
     return provision(keystore, policy.enclaves, options=chosen)
+
+
+def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
+    """A life that is asked for is given to existing enclaves too: what ends an hour sooner or later is issued anew."""
+    end = asked_end(options)
+    within = options.renew_within if end is None else end - (options.now or utc_now()) - timedelta(hours=1)
+    return options._replace(create=False, renew_within=max(options.renew_within, within))
 
 
 def list_enclaves(keystore: Path | str) -> list[str]:

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 
 from keystore.disk import store
@@ -30,6 +30,8 @@ from keystore.steps.signing_here import refuse_without_keys
 
 # Bounds what an interrupted run loses, and how often the disk is waited for.
 _BATCH = 250
+_CRL_MARGIN = timedelta(days=30)
+"""A longer margin is meant for certificates: a CRL lives for a year only."""
 
 
 def reconcile(
@@ -103,7 +105,7 @@ def _complete_keystore(
     done = list(report.actions)
     if renew_governance(opened, domains, options.access, now):
         done.append(f"governance signed for domains {domains}")
-    done += restore_crl(opened, options.access, now, options.renew_within)
+    done += restore_crl(opened, options.access, now, min(options.renew_within, _CRL_MARGIN))
     return done, list(report.warnings)
 
 

@@ -11,17 +11,15 @@ from keystore.verb import common
 def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     parser.add_argument("policy", metavar="POLICY.xml", type=Path, help="SROS2 policy, version 0.2.0")
-    parser.add_argument(
-        "--domain-id", metavar="IDS", help="domains of the permissions (default: the governance's)"
-    )
+    common.add_domains(parser)
     common.add_validity(parser)
+    common.add_revocation(parser)
     common.add_subjects(parser)
     common.add_signing(parser)
     common.add_lock(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
-    from keystore.formats.domains import Domains
     from keystore.formats.policy_xml import read_policy
     from keystore.steps.enclaves import apply_policy
 
@@ -31,9 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
         f"enclave {enclave} is granted by wildcard: {', '.join(expressions)}"
         for enclave, expressions in document.policy.wildcards().items()
     )
-    domains = Domains.parse(arguments.domain_id) if arguments.domain_id else None
-    report = apply_policy(
-        arguments.keystore, document.policy, options=common.provision_options(arguments, domains=domains)
-    )
+    options = common.provision_options(arguments, domains=common.domains(arguments))
+    report = apply_policy(arguments.keystore, document.policy, options=options)
     common.print_report(report)
     return 0

@@ -17,6 +17,7 @@ from keystore.errors import InvalidInput
 from keystore.formats.validity import parse_duration, parse_end, utc_now
 
 if TYPE_CHECKING:
+    from keystore.formats.domains import Domains
     from keystore.signing.ca_access import CaAccess
     from keystore.steps.options import ProvisionOptions
     from keystore.steps.report import ProvisionReport
@@ -59,6 +60,27 @@ def _seconds(text: str) -> float:
     if not 0 <= seconds < math.inf:
         raise ValueError
     return seconds
+
+
+def add_domains(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--domain-id", metavar="IDS", help="domains of the permissions (default: the governance's)"
+    )
+
+
+def domains(arguments: argparse.Namespace) -> Domains | None:
+    """What ``add_domains`` was given. Raises InvalidInput."""
+    from keystore.formats.domains import Domains
+
+    return Domains.parse(arguments.domain_id) if arguments.domain_id else None
+
+
+def add_revocation(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument(
+        "--no-revoke", action="store_true",
+        help="where rights are taken away or a life is shortened: do not revoke the certificate of before; copies "
+        "of it can then be used until it ends",
+    )  # fmt: skip
 
 
 def add_validity(parser: argparse.ArgumentParser) -> None:
@@ -131,6 +153,7 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
         allow_subject_overlap=arguments.allow_subject_overlap,
         access=access(arguments),
         lock_timeout=arguments.lock_timeout,
+        revoke=not vars(arguments).get("no_revoke", False),
         progress=ProgressBar() if sys.stderr.isatty() else None,
         **more,
     )

@@ -14,7 +14,9 @@ def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+", help="absolute name, such as /front/camera")
     parser.add_argument("--allow-all", action="store_true", help="grant every topic, service and action")
+    common.add_domains(parser)
     common.add_validity(parser)
+    common.add_revocation(parser)
     common.add_subjects(parser)
     common.add_signing(parser)
     common.add_lock(parser)
@@ -23,7 +25,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from keystore.steps.enclaves import create_enclaves
 
-    options = common.provision_options(arguments)
+    options = common.provision_options(arguments, domains=common.domains(arguments))
     report = create_enclaves(
         arguments.keystore, arguments.enclaves, allow_all=arguments.allow_all, options=options
     )
