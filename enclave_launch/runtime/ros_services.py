@@ -43,7 +43,7 @@ def require_rclpy() -> None:
 
 
 class RosServices:
-    """:raises RuntimeFailure: no rclpy; said before anything starts."""
+    """:raises RuntimeFailure: no rclpy, or none that works; said before anything starts."""
 
     def __init__(self, grant: Grant | None, say: Callable[[Level, str], None]) -> None:
         require_rclpy()
@@ -56,11 +56,18 @@ class RosServices:
         self._closed = False
         grant = grant or Grant()
         with _environment(grant.environment):
-            self._ros = rclpy.Context()
-            rclpy.init(args=["--ros-args", *_without_marker(grant.arguments)], context=self._ros)
-            self._node = rclpy.create_node(
-                LAUNCHER_NODE, context=self._ros
-            )  # the name its permissions are for
+            try:
+                self._ros = rclpy.Context()
+                rclpy.init(args=["--ros-args", *_without_marker(grant.arguments)], context=self._ros)
+                self._node = rclpy.create_node(
+                    LAUNCHER_NODE, context=self._ros
+                )  # the name its permissions are for
+            except (
+                Exception
+            ) as error:  # a half installed ROS, a middleware that refuses: rclpy has no common class
+                raise RuntimeFailure(
+                    f"rclpy cannot make the launcher's own node, which this launch file needs: {error}"
+                ) from error
         self._executor = rclpy.executors.SingleThreadedExecutor(context=self._ros)
         self._executor.add_node(self._node)
         self._thread = threading.Thread(target=self._spin, name="ros-services", daemon=True)
