@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 class ResolveOptions:
     """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
     else the newest; ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their
-    sources be analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first."""
+    sources be analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first;
+    ``source_folders``: where sources of compiled nodes lie, besides the workspaces of the prefixes."""
 
     prefixes: tuple[Path, ...] = ()
     manifests: tuple[Path, ...] = ()
@@ -37,6 +38,7 @@ class ResolveOptions:
     infer: bool = True
     library: bool = True
     library_folders: tuple[Path, ...] = ()
+    source_folders: tuple[Path, ...] = ()
     accept_patterns: bool = False
     allow_missing_packages: bool = False
     accept_prefixes: tuple[str, ...] = ()
@@ -46,7 +48,7 @@ class ResolveOptions:
 
     def __post_init__(self) -> None:
         """One path or name may be given where several can be: text is not taken letter by letter."""
-        for name in ("prefixes", "manifests", "library_folders"):
+        for name in ("prefixes", "manifests", "library_folders", "source_folders"):
             object.__setattr__(self, name, tuple(map(Path, _several(getattr(self, name)))))
         for name in ("accept_prefixes", "accept_middlewares"):
             object.__setattr__(self, name, _several(getattr(self, name)))

@@ -6,11 +6,14 @@ ament index, manifests, sources and documents of the library; next is the plan.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.errors import ManifestError
 from enclave_launch.interfaces.library_access import LibraryAccess
+from enclave_launch.interfaces.started_program import StartedProgram
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
@@ -19,6 +22,13 @@ from nodl.lookup import Lookup, ManifestLookup
 from nodl.name_template import UnknownPart
 from nodl.node_interface import ClientLibrary, NodeInterface
 from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.infer.cpp.reach import SourcesInReach
+    from nodl.infer.executable import InferredExecutable
+
+SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
+"""Folders with sources of compiled nodes, separated as in ``PATH``; after those that ``--source`` names."""
 
 CONTAINER_PACKAGE = "rclcpp_components"
 """Its executables (``component_container``, ``_mt``, ``_isolated``) are containers and nothing else."""
@@ -62,9 +72,11 @@ class InterfaceFinder:
             subject = _Subject(started.package, executable=_executable_name(started))
         else:
             subject = _Subject(started.package, plugin=started.plugin)
-        if subject not in self._known:
-            self._known[subject] = self._find(subject)
-        found = self._known[subject]
+        found = self._known.get(subject)
+        if found is None:
+            found, of_this_start = self._find(subject, StartedProgram(started, container, self._distro))
+            if not of_this_start:
+                self._known[subject] = found
         if isinstance(found, Missing) or not any(each.depends for each in found.interfaces):
             return found
         try:
@@ -72,46 +84,62 @@ class InterfaceFinder:
         except NoDLError as error:
             raise ManifestError(str(error)) from error
 
-    def _find(self, subject: _Subject) -> Found | Missing:
+    def _find(self, subject: _Subject, started: StartedProgram) -> tuple[Found | Missing, bool]:
+        """The answer, and whether it holds for this start alone."""
         try:
             manifest = self._lookup.find(
                 subject.package or "", executable=subject.executable, plugin=subject.plugin
             )
             if manifest:
                 origin = InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
-                return Found(manifest.found, origin)
+                return Found(manifest.found, origin), False
             if subject.package == CONTAINER_PACKAGE and subject.executable:
-                return Found((_container(subject),))
-            return self._without_manifest(subject, manifest)
+                return Found((_container(subject),)), False
+            return self._without_manifest(subject, manifest, started)
         except NoDLError as error:
             raise ManifestError(str(error)) from error
 
-    def _without_manifest(self, subject: _Subject, manifest: Lookup) -> Found | Missing:
+    def _without_manifest(
+        self, subject: _Subject, manifest: Lookup, started: StartedProgram
+    ) -> tuple[Found | Missing, bool]:
         """The analysis where it leaves nothing open, else the library, else what the analysis has."""
         searched = ["looked at " + ", ".join(manifest.searched)]
-        inferred = self._inferred(subject, searched)
+        analysed = self._inferred(subject, started)
+        searched += [analysed.why] if analysed is not None and analysed.why else []
+        inferred = analysed.interfaces if analysed is not None else ()
+        of_this_start = analysed is not None and analysed.of_this_start
         if inferred and all(map(_complete, inferred)):
-            return Found(inferred, InterfaceOrigin.ANALYSIS)
+            return Found(inferred, InterfaceOrigin.ANALYSIS), of_this_start
         hit = self._library.find(subject.package, subject.executable or subject.plugin or "")
         if hit:
-            return Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt)
+            return Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt), of_this_start
         if inferred:
-            return Found(inferred, InterfaceOrigin.ANALYSIS)
+            return Found(inferred, InterfaceOrigin.ANALYSIS), of_this_start
         if self._options.library:
             searched.append("the library has no document of it")
-        return Missing(str(subject), "; ".join(searched))
+        return Missing(str(subject), "; ".join(searched)), of_this_start
 
-    def _inferred(self, subject: _Subject, searched: list[str]) -> tuple[NodeInterface, ...]:
+    def _inferred(self, subject: _Subject, started: StartedProgram) -> InferredExecutable | None:
         if not self._options.infer or subject.package is None:
-            return ()
+            return None
         from nodl.infer.executable import infer_executable
 
-        inferred = infer_executable(
-            subject.package, executable=subject.executable, plugin=subject.plugin, prefixes=self._prefixes
+        return infer_executable(
+            subject.package,
+            executable=subject.executable,
+            plugin=subject.plugin,
+            prefixes=self._prefixes,
+            sources=self._sources,
+            start_of=started,
         )
-        if not inferred.interfaces:
-            searched.append(inferred.why)
-        return inferred.interfaces
+
+    @cached_property
+    def _sources(self) -> SourcesInReach:
+        from nodl.infer.cpp.reach import SourcesInReach
+
+        named = [str(folder) for folder in self._options.source_folders]
+        named += [folder for folder in os.environ.get(SOURCE_VARIABLE, "").split(os.pathsep) if folder]
+        return SourcesInReach(self._prefixes, named)
 
 
 def _complete(interface: NodeInterface) -> bool:

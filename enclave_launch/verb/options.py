@@ -131,6 +131,14 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
         help="documents of your own that add to or correct the library (repeatable; docs/library.md)",
     )
     group.add_argument(
+        "--source",
+        metavar="DIR",
+        action="append",
+        type=Path,
+        default=[],
+        help="look for the sources of compiled nodes below this folder too (repeatable; docs/inference.md)",
+    )
+    group.add_argument(
         "--accept-patterns",
         action="store_true",
         help="accept names of which inference knows only a part, as wildcards; each is reported",

@@ -134,6 +134,7 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
         infer=options.missing_nodl in ("infer", "analysis"),
         library=options.missing_nodl in ("infer", "library"),
         library_folders=tuple(options.library),
+        source_folders=tuple(options.source),
         accept_patterns=options.accept_patterns,
         allow_missing_packages=options.allow_missing_packages,
         accept_prefixes=tuple(options.accept_prefix),

@@ -14,6 +14,7 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import check_regular, read_text
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executable_path
@@ -22,9 +23,13 @@ from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.program import Program
 from nodl.infer.results import Origin, interfaces_of
+from nodl.infer.start import Start
 from nodl.infer.system import without_collector
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.infer.cpp.reach import SourcesInReach
 
 _SITE_PATTERNS = (
     "lib/python3*/site-packages",
@@ -43,6 +48,7 @@ class InferredExecutable:
 
     interfaces: tuple[NodeInterface, ...]
     why: str = ""
+    of_this_start: bool = False  # another start may have other interfaces: parameters decide what is made
 
     def __bool__(self) -> bool:
         return bool(self.interfaces)
@@ -54,16 +60,21 @@ def infer_executable(
     plugin: str | None = None,
     *,
     prefixes: Sequence[str],
+    sources: SourcesInReach | None = None,
+    start_of: Start | None = None,
 ) -> InferredExecutable:
-    """The nodes that ``executable`` of an installed package creates; gaps are attached to them."""
+    """The nodes that ``executable`` of an installed package creates; gaps are attached to them.
+
+    Compiled programs and components are read from ``sources``, in the light of what launch gives them (``start_of``).
+    """
     if executable is None:
-        return InferredExecutable((), f"component {plugin} is compiled code, which is not analysed")
+        return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
     try:
         path = executable_path(package, executable, prefixes)
     except (PackageNotFoundError, ExecutableNotFoundError, ValueError) as error:
-        return InferredExecutable((), str(error))
+        return _compiled(package, executable, None, sources, start_of, str(error))
     if not _is_python(path):
-        return InferredExecutable((), f"{path} is a compiled program, which is not analysed")
+        return _compiled(package, executable, None, sources, start_of, f"{path} is a compiled program")
     finder = _Finder(prefixes)
     with without_collector():
         run = finder.run(path, package, executable)
@@ -74,6 +85,26 @@ def infer_executable(
         reasons = "; ".join(f"{source}: {why}" for source, why in run.findings.gaps)
         return InferredExecutable((), f"no node was found in {path}" + (f" ({reasons})" if reasons else ""))
     return InferredExecutable(_with_gaps(interfaces, run))
+
+
+def _compiled(
+    package: str,
+    executable: str | None,
+    plugin: str | None,
+    sources: SourcesInReach | None,
+    start_of: Start | None,
+    what: str,
+) -> InferredExecutable:
+    if sources is None:
+        return InferredExecutable((), f"{what}, whose sources were not looked for")
+    from nodl.infer.cpp.syntax import CppSupportMissing
+
+    try:
+        answer = sources.infer(package, executable, plugin, start_of)
+    except CppSupportMissing as error:
+        return InferredExecutable((), f"{what}: {error}")
+    why = f"{what}: {answer.why}" if answer.why else ""
+    return InferredExecutable(answer.interfaces, why, answer.consulted)
 
 
 def _with_gaps(interfaces: list[NodeInterface], run: Run) -> tuple[NodeInterface, ...]:

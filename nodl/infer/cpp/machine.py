@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.declarations import FileIndex, Function, Scope
 from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
@@ -32,6 +32,7 @@ from nodl.infer.cpp.values import (
     plain,
     unknown,
 )
+from nodl.infer.start import Start
 from nodl.name_template import ParameterPart, UnknownPart
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
@@ -111,14 +112,6 @@ class Frame:
                 return frame
             frame = frame.outer
         return None
-
-
-class Start(Protocol):
-    """What launch decides: the parameters and the final name and namespace of a node, by its name in the source."""
-
-    def parameters(self, node: str | None) -> Mapping[str, object]: ...
-
-    def final_name(self, node: str | None) -> tuple[str | None, str | None]: ...
 
 
 @dataclass(frozen=True)

@@ -2,39 +2,68 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.program import Findings
 from nodl.infer.cpp.values import NodePart, Text, Value, concatenated, plain
 from nodl.infer.results import certainty_of
+from nodl.infer.start import Start
 from nodl.name_template import NameTemplate, Part, UnknownPart
 from nodl.node_interface import RANDOM_ENDING, Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
 from nodl.remap import InvalidRemapRuleError, parse_rule
 
 
 def interfaces_of(
-    findings: Findings, package: str | None, executable: str | None, plugin: str | None
+    findings: Findings,
+    package: str | None,
+    executable: str | None,
+    plugin: str | None,
+    start: Start | None = None,
 ) -> list[NodeInterface]:
-    """One interface for each node and each name that it may have; gaps of the whole program go to the first."""
+    """One interface for each node and each name that it may have; gaps of the whole program go to the first.
+
+    With ``start`` the names of further nodes, which the parameters of the first do not reach, are filled in.
+    """
     found: list[NodeInterface] = []
-    for record in findings.nodes:
-        found += _of_node(record, findings, package, executable, plugin)
+    for index, record in enumerate(findings.nodes):
+        made = _of_node(record, package, executable, plugin)
+        if start is not None and (index or record.arguments):
+            made = [_filled(each, start) for each in made]
+        found += made
     if found:
         found[0] = found[0]._replace(gaps=tuple(dict.fromkeys((*found[0].gaps, *program_gaps(findings)))))
     return found
+
+
+def _filled(interface: NodeInterface, start: Start) -> NodeInterface:
+    parameters = start.parameters(interface.name)
+    endpoints = tuple(
+        endpoint._replace(name=template)
+        for endpoint in interface.endpoints
+        for template in endpoint.name.fill_each(parameters)
+    )
+    return interface._replace(endpoints=tuple(dict.fromkeys(endpoints)))
 
 
 def program_gaps(findings: Findings) -> list[Gap]:
     """What belongs to no single node, and every place without a result."""
     gaps = [Gap(source, why) for source, why in findings.gaps]
     gaps += [Gap(answer.source, answer.reason) for answer in findings.answers if not answer.dead]
+    if findings.from_default and findings.nodes:
+        why = f"what is made depends on {_listed(findings.from_default)}; listed is what the defaults make"
+        gaps.append(Gap(findings.nodes[0].source, why))
     return list(dict.fromkeys(gaps))
 
 
+def _listed(names: Sequence[str]) -> str:
+    words = [name if name.startswith("the ") else f"parameter {name}" for name in names]
+    return ", ".join(words)
+
+
 def _of_node(
-    record: NodeRecord, findings: Findings, package: str | None, executable: str | None, plugin: str | None
+    record: NodeRecord, package: str | None, executable: str | None, plugin: str | None
 ) -> list[NodeInterface]:
     gaps = [Gap(source, why) for source, why in record.gaps]
     gaps += _conditional_gaps(record)

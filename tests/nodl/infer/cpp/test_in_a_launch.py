@@ -1,0 +1,163 @@
+"""From the sources of a colcon workspace to signed permissions: no manifest, nothing built, nothing executed."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.flow import provision, resolve
+from enclave_launch.options import ResolveOptions
+from enclave_launch.plan import LaunchPlan
+from tests.nodl.infer.cpp.workspace import HEAD, package, write
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+FILTER = (
+    HEAD
+    + """
+#include <rclcpp_components/register_node_macro.hpp>
+namespace demo {
+class Filter : public rclcpp::Node {
+public:
+  explicit Filter(const rclcpp::NodeOptions & options) : Node("filter", options) {
+    auto input = declare_parameter<std::string>("input", "scan");
+    sub_ = create_subscription<sensor_msgs::msg::LaserScan>(input, 10, [](const auto &) {});
+    pub_ = create_publisher<sensor_msgs::msg::LaserScan>(input + "_filtered", 10);
+    for (const auto & name : declare_parameter<std::vector<std::string>>("monitors", {"front"})) {
+      create_publisher<std_msgs::msg::Bool>("~/" + name + "/ok", 1);
+    }
+  }
+};
+}
+RCLCPP_COMPONENTS_REGISTER_NODE(demo::Filter)
+"""
+)
+CMAKE = """
+add_library(filter SHARED src/filter.cpp)
+rclcpp_components_register_node(filter PLUGIN "demo::Filter" EXECUTABLE filter_node)
+"""
+LAUNCH = """
+<launch>
+  <push-ros-namespace namespace="rover"/>
+  <node pkg="demo" exec="filter_node" name="front">
+    <param name="input" value="lidar"/>
+    <param name="monitors" value="[left, right]"/>
+    <remap from="lidar_filtered" to="/safe/scan"/>
+  </node>
+</launch>
+"""
+COMPONENT = """
+<launch>
+  <node_container pkg="rclcpp_components" exec="component_container" name="box" namespace="">
+    <composable_node pkg="demo" plugin="demo::Filter" name="rear" namespace="rover"/>
+  </node_container>
+</launch>
+"""
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    """``src/demo`` beside an ``install`` that holds a binary and no manifest."""
+    package(tmp_path / "src/demo", {"src/filter.cpp": FILTER}, CMAKE)
+    install(tmp_path)
+    return tmp_path
+
+
+def install(workspace: Path) -> None:
+    index = workspace / "install/share/ament_index/resource_index/packages"
+    index.mkdir(parents=True)
+    for name in ("demo", "rclcpp_components"):
+        (index / name).touch()
+        program = workspace / "install/lib" / name / {"demo": "filter_node"}.get(name, "component_container")
+        program.parent.mkdir(parents=True)
+        program.write_bytes(b"\x7fELF\0")
+        program.chmod(0o755)
+
+
+def plan(workspace: Path, launch: str = LAUNCH, **options: object) -> LaunchPlan:
+    file = workspace / "test.launch.xml"
+    write(file, launch)
+    return resolve(file, options=ResolveOptions(prefixes=(workspace / "install",), **options))  # type: ignore[arg-type]
+
+
+def may(plan: LaunchPlan, name: str) -> bool:
+    """Whether any enclave may publish or subscribe ``name``."""
+    return any(rule.expression == name for rules in plan.derived.reasons.values() for rule in rules)
+
+
+def test_parameters_remaps_and_namespaces_reach_the_permissions(workspace: Path) -> None:
+    planned = plan(workspace)
+    assert not planned.problems
+    assert may(planned, "/rover/lidar")
+    assert may(planned, "/safe/scan")
+    assert not may(planned, "/rover/scan")
+    assert not may(planned, "/rover/lidar_filtered")
+
+
+def test_a_list_of_the_launch_file_decides_what_is_made(workspace: Path) -> None:
+    planned = plan(workspace)
+    assert may(planned, "/rover/front/left/ok")
+    assert may(planned, "/rover/front/right/ok")
+    assert not may(planned, "/rover/front/front/ok")
+
+
+def test_a_component_is_found_by_its_plugin(workspace: Path) -> None:
+    planned = plan(workspace, COMPONENT)
+    assert not planned.problems
+    assert may(planned, "/rover/scan")
+    assert may(planned, "/rover/rear/front/ok")
+
+
+def test_the_permissions_are_signed(workspace: Path) -> None:
+    provisioned = provision(plan(workspace), workspace / "keystore")
+    signed = next((workspace / "keystore/enclaves").rglob("permissions.p7s")).read_bytes()
+    assert provisioned is not None
+    assert b"rt/rover/lidar" in signed
+    assert b"rt/rover/scan" not in signed
+
+
+def test_a_gap_is_refused_with_its_place(workspace: Path) -> None:
+    source = FILTER.replace("auto input =", "acme::attach(this); auto input =")
+    write(workspace / "src/demo/src/filter.cpp", source)
+    planned = plan(workspace)
+    (problem,) = planned.problems
+    assert "filter.cpp:8" in str(problem)
+    assert "the node is handed to acme::attach(), which may make interfaces on it" in str(problem)
+
+
+def test_sources_elsewhere_are_named(workspace: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    elsewhere = tmp_path_factory.mktemp("sources")
+    (workspace / "src/demo").rename(elsewhere / "demo")
+    assert plan(workspace).problems
+    planned = plan(workspace, source_folders=(elsewhere,))
+    assert not planned.problems
+    assert may(planned, "/rover/lidar")
+
+
+def test_the_variable_names_sources_too(workspace: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (workspace / "src").rename(workspace / "code")
+    assert plan(workspace).problems
+    monkeypatch.setenv("SECURE_LAUNCH_SOURCE", os.pathsep.join(["/nowhere", str(workspace / "code")]))
+    assert not plan(workspace).problems
+
+
+def test_a_build_folder_remembers_where_the_sources_lie(
+    workspace: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    elsewhere = tmp_path_factory.mktemp("sources")
+    (workspace / "src/demo").rename(elsewhere / "demo")
+    write(workspace / "build/demo/CMakeCache.txt", f"CMAKE_HOME_DIRECTORY:INTERNAL={elsewhere / 'demo'}\n")
+    assert not plan(workspace).problems
+
+
+def test_without_inference_the_sources_are_not_read(workspace: Path) -> None:
+    assert plan(workspace, infer=False).problems
+
+
+def test_what_is_missing_says_where_was_looked(workspace: Path) -> None:
+    (workspace / "src/demo/CMakeLists.txt").write_text("project(demo)\n")
+    (workspace / "src/demo/src/filter.cpp").unlink()
+    (problem,) = plan(workspace).problems
+    assert "builds no executable 'filter_node'" in str(problem)
