@@ -33,6 +33,8 @@ from nodl.record.lines import Line, LineReader, LoadedComponent, Run, StartedPro
 
 INTERVAL = 0.1
 """Seconds between two looks at the record."""
+_LONGEST_WAIT = 2.0
+"""Seconds after which nobody waits any more to hear who started a process."""
 
 
 class Listener(Protocol):
@@ -59,10 +61,16 @@ class Unrecorded(NamedTuple):
 
 
 class Recording:
-    """``record`` is complete when the launch is over; ``data`` is its text."""
+    """``record`` is complete when the launch is over; ``data`` is its text. ``optional``: the launch goes on where
+    nothing can be recorded, which is said."""
 
     def __init__(
-        self, run: Run, listeners: Sequence[Listener] = (), markers: MarkerRun | None = None
+        self,
+        run: Run,
+        listeners: Sequence[Listener] = (),
+        markers: MarkerRun | None = None,
+        *,
+        optional: bool = False,
     ) -> None:
         self.run = run
         self.record = Record([run])
@@ -71,9 +79,11 @@ class Recording:
         self.data = b""
         self._listeners = tuple(listeners)
         self._markers = markers
+        self._optional = optional
         self._processes: dict[str, ResolvedProcess] = {}
         self._marked: dict[str, Marked] = {}
         self._reader = LineReader()
+        self._untold: list[tuple[float, Line]] = []
         self._folder: Path | None = None
         self._task: asyncio.Task[None] | None = None
         self._launch: LaunchControl | None = None
@@ -82,6 +92,20 @@ class Recording:
 
     def opened(self, launch: LaunchControl) -> None:
         self._launch = launch
+        for listener in self._listeners:
+            listener.opened(launch, self)
+        try:
+            self._make_folder()
+        except RuntimeFailure as error:
+            self._remove_folder()
+            if not self._optional:
+                raise
+            self.say_warning(f"a refusal of DDS will not be explained: {error}")
+            return
+        self._write(self.run)
+        self._task = asyncio.get_running_loop().create_task(self._watch())
+
+    def _make_folder(self) -> None:
         self._folder = Path(tempfile.mkdtemp(prefix="enclave_launch_record_"))
         self._folder.chmod(0o711)
         shutil.copyfile(recorder_library(), self._library)
@@ -89,13 +113,16 @@ class Recording:
         self._file.touch()
         self._file.chmod(0o622)
         self._try_it()
-        self._write(self.run)
-        for listener in self._listeners:
-            listener.opened(launch, self)
-        self._task = asyncio.get_running_loop().create_task(self._watch())
+
+    def _remove_folder(self) -> None:
+        if self._folder is not None:
+            shutil.rmtree(self._folder, ignore_errors=True)
+        self._folder = None
 
     def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
         self._processes[process.process_name] = process
+        if self._folder is None:
+            return spec
         program = look_at_command(spec.cmd, spec.environment.get("PATH", os.defpath))
         if program.obstacle:
             self._not_recorded(process.process_name, program.obstacle)
@@ -120,19 +147,21 @@ class Recording:
             self._write(_component(component))
 
     async def closed(self) -> None:
+        if self._folder is None:
+            return
         if self._task is not None:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
         try:
             self._look()
+            self._tell(float("inf"))
             self._reader.close()
             self.record.complaints = list(self._reader.complaints)
             self._name_the_silent()
             for listener in self._listeners:
                 listener.closed()
         finally:
-            if self._folder is not None:
-                shutil.rmtree(self._folder, ignore_errors=True)
+            self._remove_folder()
 
     # what listeners ask for
 
@@ -170,8 +199,9 @@ class Recording:
             )
 
     def _write(self, line: Run | StartedProcess | LoadedComponent) -> None:
-        with self._file.open("ab") as file:
-            file.write(line_text(line))
+        if self._folder is not None:
+            with self._file.open("ab") as file:
+                file.write(line_text(line))
 
     async def _watch(self) -> None:
         try:
@@ -188,11 +218,29 @@ class Recording:
             file.seek(len(self.data))
             new = file.read()
         self.data += new
+        now = time.monotonic()
         for line in self._reader.feed(new):
             if not isinstance(line, Run):
                 self.record.add(line)
-            for listener in self._listeners:
-                listener.added(line)
+                self._untold.append((now, line))
+        self._tell(now)
+
+    def _tell(self, now: float) -> None:
+        """Listeners hear of a line once it is known which process of the launch it comes from: a process may speak
+        before the launch has said that it started."""
+        untold, self._untold = self._untold, []
+        for since, line in untold:
+            if self._has_origin(line) or now - since > _LONGEST_WAIT:
+                for listener in self._listeners:
+                    listener.added(line)
+            else:
+                self._untold.append((since, line))
+
+    def _has_origin(self, line: Line) -> bool:
+        if isinstance(line, Run | StartedProcess | LoadedComponent):
+            return True
+        process = self.record.process_of(line.pid)
+        return process is not None and process.started is not None
 
     def _not_recorded(self, process: str, why: str) -> None:
         if Unrecorded(process, why) not in self.unrecorded:

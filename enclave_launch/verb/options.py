@@ -278,6 +278,17 @@ def _add_recording(group: argparse._ArgumentGroup) -> None:
         action="store_true",
         help="a second run with marker values decides which names come from which parameters",
     )
+    group.add_argument(
+        "--audit",
+        action="store_true",
+        help="run unsecured, and tell what the plan would refuse and what it grants that nobody asks for",
+    )
+    group.add_argument("--audit-report", metavar="FILE", type=Path, help="the audit as JSON, beside the text")
+    group.add_argument(
+        "--no-explain-denials",
+        action="store_true",
+        help="do not record secured processes to explain what DDS refuses them",
+    )
 
 
 def _path_from_environment(variable: str) -> Path | None:

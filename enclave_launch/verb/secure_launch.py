@@ -71,6 +71,10 @@ def _main(options: argparse.Namespace) -> int:
         from enclave_launch.verb.learn import learn_launch
 
         return learn_launch(target, options, lambda companion: _start(target, options, keystore, companion))
+    if options.audit:
+        from enclave_launch.verb.audit import audit_launch
+
+        return audit_launch(_resolve(target, options), options, _run_settings(options))
     return _start(target, options, keystore)
 
 
@@ -257,7 +261,19 @@ def _launch(
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
     _warn((*repair_notices(launch), *launch.report.warnings, *expiry_notices(launch, options.warn_expiry)))
+    if companion is None and not options.no_explain_denials:
+        companion = _explainer(plan)
     return run(launch, options=_run_settings(options, companion))
+
+
+def _explainer(plan: LaunchPlan) -> LaunchCompanion:
+    """Who tells why DDS refused something; the launch goes on where that is not possible."""
+    from enclave_launch.recording.denials import Explainer
+    from enclave_launch.recording.learning import new_run
+    from enclave_launch.recording.recording import Recording
+
+    run = new_run(plan.launch_file, plan.distro, "none", secured=True)
+    return Recording(run, [Explainer(plan)], optional=True)
 
 
 def _check_before_keys_are_made(plan: LaunchPlan) -> None:

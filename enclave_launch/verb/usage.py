@@ -31,6 +31,7 @@ FOR_SECURE = frozenset(
         "ca_passphrase_file",
         "ca_passphrase_env",
         "allow_late",
+        "no_explain_denials",
     }
 )
 """Options of a keystore or of secured processes."""
@@ -79,10 +80,16 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
         check_needs_secure(parser._actions, given & FOR_LEARN, "--learn")
     elif views or options.dry_run:
         raise UsageError("--learn runs the launch; nothing else is looked at")
+    if not options.audit:
+        check_needs_secure(parser._actions, given & {"audit_report"}, "--audit")
+    elif options.secure or options.learn is not None or views or options.dry_run:
+        raise UsageError(
+            "--audit runs the launch unsecured and tells what --secure would refuse: give it alone"
+        )
     if not options.secure:
         check_needs_secure(parser._actions, given & FOR_SECURE)
-        if not views and not options.dry_run:
-            check_needs_secure(parser._actions, given & FOR_PLAN, "--secure (or --dry-run)")
+        if not views and not options.dry_run and not options.audit:
+            check_needs_secure(parser._actions, given & FOR_PLAN, "--secure (or --dry-run, --audit)")
 
 
 def check_needs_secure(

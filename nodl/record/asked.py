@@ -19,6 +19,7 @@ from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
 REFUSED = 1
 """``RCL_RET_ERROR``: what an endpoint gives that DDS refuses. Other results say that an argument is bad."""
 
+_ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
 _PARAMETER_SERVICES = frozenset(
     {
         "describe_parameters",
@@ -115,7 +116,7 @@ def role_of(endpoint: EndpointMade) -> Role:
     if by == "librcl_lifecycle.so":
         return Role.LIFECYCLE
     if by == "librcl_action.so":
-        own = kind in (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
+        own = kind in _ACTIONS
         return Role.REPEATED if own else Role.PART_OF_ACTION
     if kind is EndpointKind.SERVICE_SERVER:
         return _role_of_server(endpoint)
@@ -169,6 +170,24 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
     )
 
 
+def asked_endpoint(process: RecordedProcess, node: RecordedNode, endpoint: EndpointMade) -> Asked | None:
+    """``endpoint`` of ``node`` by itself, as it comes in; whoever made it. ``None`` for what is only a part of an
+    action, or rcl's call of itself."""
+    if role_of(endpoint) in (Role.PART_OF_ACTION, Role.REPEATED):
+        return None
+    final = endpoint.final
+    if endpoint.kind in _ACTIONS:
+        before = node.endpoints[: _place(node, endpoint)]
+        final = _action_name([each for each in before if role_of(each) is Role.PART_OF_ACTION], endpoint)
+    rules = _rules(process.started, node.component) if process.started else None
+    return _own(endpoint, final, node.fqn or endpoint.fqn, rules, set())
+
+
+def _place(node: RecordedNode, endpoint: EndpointMade) -> int:
+    places = (i for i, each in enumerate(node.endpoints) if each is endpoint)
+    return next(places, len(node.endpoints))
+
+
 def all_asked(processes: Iterable[RecordedProcess]) -> list[AskedNode]:
     """Every node that could be made, in the order of the record."""
     return [asked_by(process, node) for process in processes for node in process.nodes.values() if node.fqn]
@@ -212,7 +231,7 @@ def _asked(node: RecordedNode, roles: list[Role], rules: RemapRules | None) -> I
         if role is Role.PART_OF_ACTION:
             parts.append(endpoint)
         elif role is Role.OWN:
-            is_action = endpoint.kind in (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
+            is_action = endpoint.kind in _ACTIONS
             final = _action_name(parts, endpoint) if is_action else endpoint.final
             yield _own(endpoint, final, node.fqn, rules, introspected)
             parts = [] if is_action else parts

@@ -1,0 +1,184 @@
+"""``--audit``: a launch runs as usual, and what its nodes ask for is held against the plan.
+
+Told live and at the end, for each enclave: what the plan would refuse, and what it grants and nobody asked for.
+DDS-Security has no such mode: a team records what enforcement would do before it enforces. Listens to a recording.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import NamedTuple
+
+from enclave_launch.boundary.terminal import printable
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.recording.grants import WORDS, Grants, Need
+from enclave_launch.recording.recording import Recording, Unrecorded
+from enclave_launch.runtime.companion import LaunchControl
+from enclave_launch.runtime.run_events import RunEvent
+from keystore.formats.policy import Operation, Rule
+from nodl.record.asked import Asked, Role, asked_endpoint, role_of
+from nodl.record.lines import EndpointMade, Line
+
+
+class Refusal(NamedTuple):
+    """Something recorded that the plan does not grant."""
+
+    need: Need
+    written: str
+    type: str
+    described_by: str
+
+    @property
+    def text(self) -> str:
+        need = self.need
+        return printable(
+            f"node {need.node} in enclave {need.enclave} would {WORDS[need.operation]} {need.name} (written "
+            f"{self.written!r}), which is not granted; described by {self.described_by}"
+        )
+
+
+class AuditReport(NamedTuple):
+    """``never_asked``: rules by enclave that no recorded endpoint needed. ``complete``: all could be seen."""
+
+    refusals: tuple[Refusal, ...]
+    never_asked: dict[str, tuple[Rule, ...]]
+    checked: int
+    unrecorded: tuple[Unrecorded, ...]
+    complaints: tuple[str, ...]
+
+    @property
+    def exit_status(self) -> int:
+        """0: the plan grants all that was asked for, and all was seen."""
+        return 1 if self.refusals or self.unrecorded or self.complaints else 0
+
+
+class Audit:
+    """Follows one recording."""
+
+    def __init__(self, plan: LaunchPlan) -> None:
+        self._grants = Grants(plan)
+        self._launch: LaunchControl | None = None
+        self._recording: Recording | None = None
+        self._asked: set[Need] = set()
+        self._refusals: dict[Need, Refusal] = {}
+        self._checked = 0
+
+    def opened(self, launch: LaunchControl, recording: Recording) -> None:
+        self._launch, self._recording = launch, recording
+
+    def added(self, line: Line) -> None:
+        if not isinstance(line, EndpointMade) or line.rc not in (0, 1):
+            return
+        assert self._recording is not None
+        process, node = self._recording.record.node_of(line)
+        asked = asked_endpoint(process, node, line)
+        need = self._grants.need(process, node, asked) if asked is not None else None
+        if need is None or asked is None:
+            return
+        self._checked += 1
+        if need not in self._asked:
+            self._asked.add(need)
+            if not self._grants.permits(need):
+                who = self._grants.described(process, node).text
+                self._refuse(Refusal(need, asked.written, asked.type, _by(who, line, asked)))
+
+    def happened(self, event: RunEvent) -> None:
+        """Only what was asked for counts."""
+
+    def looked(self) -> None:
+        """Told when it is seen."""
+
+    def closed(self) -> None:
+        """The report is made when it is asked for."""
+
+    def report(self) -> AuditReport:
+        assert self._recording is not None
+        used = {(need.enclave, need.operation, need.name) for need in self._asked}
+        never = {
+            enclave: tuple(
+                sorted(rule for rule in self._grants.rules_of(enclave) if not _used(rule, enclave, used))
+            )
+            for enclave in self._grants.enclaves
+        }
+        return AuditReport(
+            tuple(sorted(self._refusals.values())),
+            {enclave: rules for enclave, rules in never.items() if rules},
+            self._checked,
+            tuple(self._recording.unrecorded),
+            tuple(complaint.why for complaint in self._recording.record.complaints),
+        )
+
+    def _refuse(self, refusal: Refusal) -> None:
+        self._refusals[refusal.need] = refusal
+        if self._launch is not None:
+            self._launch.say("WARNING", f"audit: {refusal.text}")
+
+
+def _by(who: str, line: EndpointMade, asked: Asked) -> str:
+    role = role_of(line)
+    return who if role is Role.OWN else f"the library ({role.value}); the node: {who}"
+
+
+def _used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bool:
+    if any(character in rule.expression for character in "*?["):
+        from keystore.formats.permissions_patterns import covers
+
+        return any(
+            e == enclave and operation is rule.operation and covers(rule.expression, name)
+            for e, operation, name in used
+        )
+    return (enclave, rule.operation, rule.expression) in used or _parts_used(rule, enclave, used)
+
+
+def _parts_used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bool:
+    """A part of an action that was remapped by itself is used with the action."""
+    action, part, _ = rule.expression.partition("/_action/")
+    actions = (Operation.EXECUTE, Operation.CALL)
+    return bool(part) and any((enclave, operation, action) in used for operation in actions)
+
+
+def audit_text(report: AuditReport) -> str:
+    """For a person, by enclave."""
+    lines = [f"audit: {report.checked} endpoints were asked for; {len(report.refusals)} would be refused"]
+    enclaves = sorted({refusal.need.enclave for refusal in report.refusals} | set(report.never_asked))
+    for enclave in enclaves:
+        lines.append(f"enclave {enclave}")
+        refused = [each for each in report.refusals if each.need.enclave == enclave]
+        lines += [f"  would be refused: {refusal.text}" for refusal in refused]
+        rules = report.never_asked.get(enclave, ())
+        lines += [
+            f"  granted, never asked for: {WORDS[rule.operation]} {printable(rule.expression)}"
+            for rule in rules
+        ]
+    lines += [f"not recorded: {item.process}: {printable(item.why)}" for item in report.unrecorded]
+    lines += [f"the record is not complete: {printable(why)}" for why in report.complaints]
+    return "\n".join([*lines, ""])
+
+
+def audit_json(report: AuditReport) -> str:
+    """For programs; sorted."""
+    content = {
+        "version": 1,
+        "exit_status": report.exit_status,
+        "checked": report.checked,
+        "would_be_refused": [
+            {
+                "enclave": refusal.need.enclave,
+                "node": refusal.need.node,
+                "operation": refusal.need.operation.value,
+                "name": refusal.need.name,
+                "written": refusal.written,
+                "type": refusal.type,
+                "described_by": refusal.described_by,
+            }
+            for refusal in report.refusals
+        ],
+        "never_asked_for": [
+            {"enclave": enclave, "operation": rule.operation.value, "name": rule.expression}
+            for enclave, rules in sorted(report.never_asked.items())
+            for rule in rules
+        ],
+        "not_recorded": [item._asdict() for item in report.unrecorded],
+        "incomplete": list(report.complaints),
+    }
+    return json.dumps(content, indent=2) + "\n"

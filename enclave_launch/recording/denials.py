@@ -1,0 +1,176 @@
+"""A refused endpoint or node, explained within a second: who, in which enclave, what, why, and the patch that cures.
+
+Name, kind and node come from the arguments of the refused call, never from a text. Containers and lifecycle nodes live
+on after a refusal and nothing exits: explanations do not depend on how a process ends. Listens to a recording; reads
+the manifest that it would patch.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from collections import deque
+from pathlib import Path
+from typing import NamedTuple
+
+from enclave_launch.boundary.terminal import printable
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.recording.grants import WORDS, Description, Grants, Need
+from enclave_launch.recording.patches import Patch, manifest_patch, policy_patch
+from enclave_launch.recording.reasons import Cause, cause_of
+from enclave_launch.recording.recording import Recording
+from enclave_launch.runtime.companion import LaunchControl
+from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
+from nodl.record.asked import REFUSED, Asked, Role, asked_endpoint, role_of
+from nodl.record.assembly import RecordedNode, RecordedProcess
+from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade
+
+_PATIENCE = 0.3
+"""Seconds to wait for what a middleware prints about a participant that was not made: it goes another way."""
+_LINES_KEPT = 40
+_MANIFEST = re.compile(r"\.nodl\.(xml|ya?ml)\Z|/resource_index/nodl/")
+
+
+class Denial(NamedTuple):
+    """One endpoint that was refused. ``granted``: the plan allows it all the same, so the reason is elsewhere."""
+
+    process: str
+    need: Need
+    asked: Asked
+    described: Description
+    granted: bool
+    patch: Patch | None
+    cause: Cause | None = None
+
+    @property
+    def text(self) -> str:
+        return "\n".join(printable(line) for line in self._lines())
+
+    def _lines(self) -> list[str]:
+        need, asked = self.need, self.asked
+        head = (
+            f"refused: node {need.node} may not {WORDS[need.operation]} {need.name} (enclave {need.enclave})"
+        )
+        lines = [head, f"  asked for as '{asked.written}', type {asked.type or 'not known'}"]
+        if self.granted:
+            why = "; ".join(asked.error) or "no reason was given"
+            lines.append(f"  the plan grants it, so that it is refused for another reason: {why}")
+            if self.cause is not None:
+                lines.append(f"  {self.cause.what}; {self.cause.remedy}")
+            return lines
+        lines.append(f"  the node is described by {self.described.text}; that does not ask for it")
+        if self.patch is not None:
+            lines.append(f"  this allows it, and nothing else; {self.patch.use}:")
+            lines += [f"    {line}" for line in self.patch.diff.splitlines()]
+        return lines
+
+
+class NotJoined(NamedTuple):
+    """A process or node that could not take part in DDS at all."""
+
+    process: str
+    node: str
+    enclave: str
+    cause: Cause | None
+    texts: tuple[str, ...]
+
+    @property
+    def text(self) -> str:
+        who = f"node {self.node} of {self.process}" if self.node else self.process
+        head = f"{who} (enclave {self.enclave}) could not join DDS"
+        if self.cause is not None:
+            return printable(f"{head}: {self.cause.what}; {self.cause.remedy} (said: {self.cause.said})")
+        said = "; ".join(self.texts) or "no reason was given; its output may tell"
+        return printable(f"{head}: {said}")
+
+
+class Explainer:
+    """Follows one recording of a secured launch; ``denials`` and ``not_joined`` are what it told."""
+
+    def __init__(self, plan: LaunchPlan) -> None:
+        self.denials: list[Denial] = []
+        self.not_joined: list[NotJoined] = []
+        self._grants = Grants(plan)
+        self._launch: LaunchControl | None = None
+        self._recording: Recording | None = None
+        self._printed: dict[str, deque[str]] = {}
+        self._waiting: list[tuple[float, RecordedProcess, str, tuple[str, ...]]] = []
+        self._told: set[Need] = set()
+
+    def opened(self, launch: LaunchControl, recording: Recording) -> None:
+        self._launch, self._recording = launch, recording
+
+    def added(self, line: Line) -> None:
+        assert self._recording is not None
+        if isinstance(line, EndpointMade) and line.rc == REFUSED:
+            self._endpoint(line, *self._recording.record.node_of(line))
+        elif isinstance(line, NodeMade) and line.rc == REFUSED:
+            process, _ = self._recording.record.node_of(line)
+            if not self._endpoint_was_refused(process, line):
+                self._waiting.append((time.monotonic() + _PATIENCE, process, line.name, line.error))
+        elif isinstance(line, Initialised) and line.rc == REFUSED:
+            joining = self._recording.record.process_of(line.pid)
+            if joining is not None:
+                self._waiting.append((time.monotonic() + _PATIENCE, joining, "", line.error))
+
+    def happened(self, event: RunEvent) -> None:
+        if isinstance(event, ProcessOutput):
+            kept = self._printed.setdefault(event.name, deque(maxlen=_LINES_KEPT))
+            kept.extend(event.data.decode(errors="replace").splitlines())
+
+    def looked(self) -> None:
+        self._tell_waiting(time.monotonic())
+
+    def closed(self) -> None:
+        self._tell_waiting(float("inf"))
+
+    def _endpoint(self, line: EndpointMade, process: RecordedProcess, node: RecordedNode) -> None:
+        if role_of(line) is Role.PART_OF_ACTION:
+            return  # the action's own line follows
+        asked = asked_endpoint(process, node, line)
+        need = self._grants.need(process, node, asked) if asked is not None else None
+        if asked is None or need is None or need in self._told:
+            return
+        self._told.add(need)
+        granted, described = self._grants.permits(need), self._grants.described(process, node)
+        patch = None if granted else _patch(need, asked, described)
+        cause = cause_of((*asked.error, *self._printed.get(_name(process), ()))) if granted else None
+        self._tell(Denial(_name(process), need, asked, described, granted, patch, cause))
+
+    def _endpoint_was_refused(self, process: RecordedProcess, line: NodeMade) -> bool:
+        """A node that fails because one of its own endpoints was refused has been explained by that."""
+        return any(endpoint.rc == REFUSED for endpoint in process.node(line.node).endpoints)
+
+    def _tell_waiting(self, now: float) -> None:
+        due = [each for each in self._waiting if each[0] <= now]
+        self._waiting = [each for each in self._waiting if each[0] > now]
+        for _, process, node, error in due:
+            name = _name(process)
+            cause = cause_of((*error, *reversed(self._printed.get(name, ()))))
+            self._tell(NotJoined(name, node, self._grants.enclave_of(process) or "none", cause, error))
+
+    def _tell(self, what: Denial | NotJoined) -> None:
+        if isinstance(what, Denial):
+            self.denials.append(what)
+        else:
+            self.not_joined.append(what)
+        if self._launch is not None:
+            self._launch.say("ERROR", what.text)
+
+
+def _name(process: RecordedProcess) -> str:
+    return process.started.process if process.started else f"process {process.pid}"
+
+
+def _patch(need: Need, asked: Asked, described: Description) -> Patch:
+    """In the node's manifest where it is a file that can be read, else in a policy file."""
+    source = described.node.interface.source if described.node is not None else None
+    if source is not None and _MANIFEST.search(source.file):
+        try:
+            text = Path(source.file).read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError):
+            text = ""
+        found = manifest_patch(source.file, text, source.line, asked) if text else None
+        if found is not None:
+            return found
+    return policy_patch(need.enclave, need.node, asked)

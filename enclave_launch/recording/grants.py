@@ -1,0 +1,141 @@
+"""What the plan grants, asked by what was recorded: in DDS's own terms, as the signed permissions will say it. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from enclave_launch.plan import InterfaceOrigin, LaunchPlan, Missing, PlannedComponent, PlannedProcess
+from enclave_launch.policy import RunningNode
+from enclave_launch.policy.derivation import LIST_NAMES
+from keystore.formats.permissions import DdsRules, dds_rules
+from keystore.formats.permissions_names import dds_topics
+from keystore.formats.permissions_patterns import covers
+from keystore.formats.policy import Operation, Qualifier, Rule
+from nodl.node_interface import EndpointKind
+from nodl.record.asked import Asked
+from nodl.record.assembly import RecordedNode, RecordedProcess
+
+OPERATIONS = {
+    EndpointKind.PUBLISHER: Operation.PUBLISH,
+    EndpointKind.SUBSCRIPTION: Operation.SUBSCRIBE,
+    EndpointKind.SERVICE_SERVER: Operation.REPLY,
+    EndpointKind.SERVICE_CLIENT: Operation.REQUEST,
+    EndpointKind.ACTION_SERVER: Operation.EXECUTE,
+    EndpointKind.ACTION_CLIENT: Operation.CALL,
+}
+WORDS = {
+    Operation.PUBLISH: "publish topic",
+    Operation.SUBSCRIBE: "subscribe to topic",
+    Operation.REPLY: "serve service",
+    Operation.REQUEST: "call service",
+    Operation.EXECUTE: "serve action",
+    Operation.CALL: "call action",
+}
+
+
+NO_ENCLAVE_YET = "(not known: nobody describes the node)"
+
+
+class Need(NamedTuple):
+    """One permission that a node needs."""
+
+    enclave: str
+    node: str
+    operation: Operation
+    name: str
+
+
+class Description(NamedTuple):
+    """What the plan has of a recorded node. ``node`` ``None``: no such node was planned."""
+
+    node: RunningNode | None
+    origin: InterfaceOrigin | None = None
+    missing: Missing | None = None
+
+    @property
+    def text(self) -> str:
+        """Where its interface comes from, for a person."""
+        if self.missing is not None:
+            return f"nobody: {self.missing.why}"
+        if self.node is None:
+            return "nobody: the plan has no node of this name"
+        origin = f"{self.origin}: " if self.origin else ""
+        return f"{origin}{self.node.interface.source}"
+
+
+class Grants:
+    """Answers for one plan."""
+
+    def __init__(self, plan: LaunchPlan) -> None:
+        self._plan = plan
+        self._processes = {item.process.process_name: item for item in plan.processes}
+        self._rules = {enclave.path: dds_rules(enclave) for enclave in plan.derived.policy.enclaves}
+
+    @property
+    def enclaves(self) -> tuple[str, ...]:
+        return tuple(self._rules)
+
+    def enclave_of(self, process: RecordedProcess) -> str | None:
+        """``None`` for a process that runs without an enclave, or was not planned."""
+        planned = self._processes.get(process.started.process) if process.started else None
+        if planned is None:
+            return None
+        if planned.enclave is None:
+            return NO_ENCLAVE_YET if planned.missing is not None else None
+        return planned.enclave.path
+
+    def need(self, process: RecordedProcess, node: RecordedNode, asked: Asked) -> Need | None:
+        """The permission for ``asked``; ``None`` where nothing is enforced, or no name is known."""
+        enclave = self.enclave_of(process)
+        if enclave is None or not asked.final:
+            return None
+        return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final)
+
+    def permits(self, need: Need) -> bool:
+        rules = self._rules.get(need.enclave)
+        if rules is None:
+            return False
+        publish, subscribe = dds_topics(need.operation, need.name)
+        return all(_allowed(rules, topic, "publish") for topic in publish) and all(
+            _allowed(rules, topic, "subscribe") for topic in subscribe
+        )
+
+    def described(self, process: RecordedProcess, node: RecordedNode) -> Description:
+        """Who describes this node in the plan."""
+        planned = self._planned(process, node)
+        if planned is None:
+            return Description(None)
+        found = [each for each in planned.nodes if each.fqn == node.fqn]
+        own = node.made.name if node.made else ""
+        named = [each for each in found if each.original_name == own] or found
+        return Description(named[0] if named else None, planned.origin, planned.missing)
+
+    def rules_of(self, enclave: str) -> Iterable[Rule]:
+        """What the plan allows in ``enclave``, without what every node has."""
+        built_in = self._plan.derived.built_in_names(enclave)
+        for rule in self._plan.derived.reasons.get(enclave, {}):
+            asked_for = (LIST_NAMES[rule.operation], rule.expression) not in built_in
+            if asked_for and rule.qualifier is Qualifier.ALLOW:
+                yield rule
+
+    def _planned(
+        self, process: RecordedProcess, node: RecordedNode
+    ) -> PlannedProcess | PlannedComponent | None:
+        if node.component is not None:
+            for item in self._plan.components:
+                same = (item.component.package, item.component.plugin) == node.component[1:3]
+                if same and any(each.fqn == node.fqn for each in item.nodes):
+                    return item
+        return self._processes.get(process.started.process) if process.started else None
+
+
+def _allowed(rules: DdsRules, topic: str, direction: str) -> bool:
+    if any(covers(pattern, topic) for pattern in getattr(rules.deny, direction)):
+        return False
+    allowed = getattr(rules.allow, direction)
+    return topic in allowed or any(covers(pattern, topic) for pattern in allowed if _has_wildcard(pattern))
+
+
+def _has_wildcard(pattern: str) -> bool:
+    return any(character in pattern for character in "*?[")

@@ -1,0 +1,144 @@
+"""The smallest change that allows one refused endpoint, as a patch (unified diff). Pure: text in, text out.
+
+Where the node's manifest is a file, one entry is added to it, under the name as the source writes it, so that it holds
+for every launch of the node. Else a policy file for ``--policy`` grants exactly the refused name to exactly this node.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from typing import NamedTuple
+from xml.sax.saxutils import quoteattr
+
+from enclave_launch.recording.grants import OPERATIONS
+from keystore.formats.policy import Operation
+from nodl.document.v2_schema import NAME_PATTERN, TYPE_PATTERN
+from nodl.document.v2_section import CATEGORIES
+from nodl.names import split_fqn
+from nodl.node_interface import EndpointKind
+from nodl.record.asked import Asked
+
+_LISTS = {kind: category for category, kind in CATEGORIES.items()}
+_HISTORY = {1: "KEEP_LAST", 2: "KEEP_ALL"}
+_V1 = {
+    EndpointKind.PUBLISHER: ("topic", "publisher"),
+    EndpointKind.SUBSCRIPTION: ("topic", "subscription"),
+    EndpointKind.SERVICE_SERVER: ("service", "server"),
+    EndpointKind.SERVICE_CLIENT: ("service", "client"),
+    EndpointKind.ACTION_SERVER: ("action", "server"),
+    EndpointKind.ACTION_CLIENT: ("action", "client"),
+}
+_POLICY_ELEMENTS = {
+    Operation.PUBLISH: ("topics", "topic"),
+    Operation.SUBSCRIBE: ("topics", "topic"),
+    Operation.REPLY: ("services", "service"),
+    Operation.REQUEST: ("services", "service"),
+    Operation.EXECUTE: ("actions", "action"),
+    Operation.CALL: ("actions", "action"),
+}
+POLICY_FILE = "allow.policy.xml"
+
+
+class Patch(NamedTuple):
+    """``file`` is what it changes or makes; ``use`` how it takes effect."""
+
+    file: str
+    diff: str
+    use: str
+
+
+def manifest_patch(file: str, text: str, line: int, asked: Asked) -> Patch | None:
+    """One entry more in the manifest ``text`` of ``file`` for the node that begins at ``line``; ``None`` where the
+    name or the shape of the file does not let a line be added safely."""
+    if not re.search(NAME_PATTERN, asked.name) or not re.search(TYPE_PATTERN, asked.type):
+        return None
+    added = _into_v1(text, line, asked) if text.lstrip()[:1] == "<" else _into_v2(text, asked)
+    if added is None:
+        return None
+    return Patch(file, _diff(file, text, added), "start the launch again")
+
+
+def policy_patch(enclave: str, node: str, asked: Asked) -> Patch:
+    """A policy file that adds the one permission to what is derived."""
+    operation = OPERATIONS[asked.kind]
+    group, element = _POLICY_ELEMENTS[operation]
+    namespace, name = split_fqn(node)
+    text = (
+        '<policy version="0.2.0">\n'
+        "  <enclaves>\n"
+        f"    <enclave path={quoteattr(enclave)}>\n"
+        "      <profiles>\n"
+        f"        <profile ns={quoteattr(namespace)} node={quoteattr(name)}>\n"
+        f'          <{group} {operation.value}="ALLOW">\n'
+        f"            <{element}>{asked.final}</{element}>\n"
+        f"          </{group}>\n"
+        "        </profile>\n"
+        "      </profiles>\n"
+        "    </enclave>\n"
+        "  </enclaves>\n"
+        "</policy>\n"
+    )
+    return Patch(
+        POLICY_FILE, _diff(POLICY_FILE, "", text), f"start the launch again with --policy {POLICY_FILE}"
+    )
+
+
+def _diff(file: str, before: str, after: str) -> str:
+    lines = difflib.unified_diff(
+        before.splitlines(keepends=True),
+        after.splitlines(keepends=True),
+        file if before else "/dev/null",
+        file,
+        n=2,
+    )
+    return "".join(
+        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines
+    )
+
+
+def _into_v2(text: str, asked: Asked) -> str | None:
+    category = _LISTS[asked.kind]
+    head = re.search(rf"^{category}:[ \t]*(#.*)?$", text, re.MULTILINE)
+    if head is None:
+        if re.search(rf"^[\"']?{category}[\"']?[ \t]*:", text, re.MULTILINE) or text.lstrip()[:1] == "{":
+            return None  # written inline, or JSON
+        end = "" if text.endswith("\n") else "\n"
+        return f"{text}{end}{category}:\n  - {_v2_entry(asked)}\n"
+    first = re.match(r"(?:[ \t]*(?:#.*)?\n)*([ \t]*)- ", text[head.end() :] + "\n")
+    if first is None:
+        return None
+    return f"{text[: head.end()]}\n{first[1]}- {_v2_entry(asked)}{text[head.end() :]}"
+
+
+def _v2_entry(asked: Asked) -> str:
+    fields = f"name: {_scalar(asked.name)}, type: {asked.type}"
+    if asked.kind not in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION):
+        return f"{{{fields}}}"
+    history, depth, reliability, durability = asked.qos if len(asked.qos) == 4 else (1, 10, 1, 2)
+    qos = f"history: {_HISTORY.get(history, 'SYSTEM_DEFAULT')}"
+    qos += f", depth: {max(depth, 1)}" if history == 1 else ""
+    qos += f", reliability: {'BEST_EFFORT' if reliability == 2 else 'RELIABLE'}"
+    qos += f", durability: {'TRANSIENT_LOCAL' if durability == 1 else 'VOLATILE'}"
+    return f"{{{fields}, qos: {{{qos}}}}}"
+
+
+def _scalar(name: str) -> str:
+    return f"'{name}'"  # such as ~, y or no, which are something else without quotes
+
+
+def _into_v1(text: str, line: int, asked: Asked) -> str | None:
+    """Before the end of the ``node`` element that begins at ``line``, counted from 1."""
+    lines = text.splitlines(keepends=True)
+    for number in range(max(line - 1, 0), len(lines)):
+        if "</node>" in lines[number]:
+            element, role = _V1[asked.kind]
+            entry = f'<{element} name="{asked.name}" type="{asked.type}" role="{role}"/>'
+            before, end, after = lines[number].partition("</node>")
+            blank = before if not before.strip() else ""
+            rest = "" if not before.strip() else before
+            lines[number] = f"{rest}{blank}  {entry}\n{blank}{end}{after}"
+            return "".join(lines)
+        if number > line - 1 and "<node" in lines[number]:
+            return None
+    return None

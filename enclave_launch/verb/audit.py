@@ -1,0 +1,43 @@
+"""``secure-launch --audit``: run a launch unsecured and hold what its nodes ask for against its plan."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from typing import TYPE_CHECKING
+
+from enclave_launch.errors import RuntimeFailure
+from enclave_launch.recording.audit import Audit, audit_json, audit_text
+from enclave_launch.recording.learning import new_run
+from enclave_launch.recording.recording import Recording
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from enclave_launch.options import RunSettings
+    from enclave_launch.plan import LaunchPlan
+
+
+def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
+    """The status of the launch; else 1 when the plan would refuse something, or not everything could be seen."""
+    from dataclasses import replace
+
+    from enclave_launch.flow import run
+
+    for problem in plan.problems:
+        print(f"secure-launch: warning: {problem}", file=sys.stderr)
+    audit = Audit(plan)
+    recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])
+    status = run(plan, options=replace(settings, companion=recording))
+    report = audit.report()
+    sys.stdout.write(audit_text(report))
+    if options.audit_report is not None:
+        _write(options.audit_report, audit_json(report))
+    return status or report.exit_status
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise RuntimeFailure(f"--audit-report {path}: cannot be written: {error.strerror}") from error

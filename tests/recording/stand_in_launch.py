@@ -1,0 +1,100 @@
+"""Launches of programs on the stand-in: a workspace with scripts and manifests, run as a user runs it."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parent.parent.parent
+PACKAGE = "stand_in_nodes"
+QOS = "qos: {history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
+LISTS = {
+    "publisher": "publishers",
+    "subscription": "subscriptions",
+    "service_server": "service_servers",
+    "service_client": "service_clients",
+    "action_server": "action_servers",
+    "action_client": "action_clients",
+}
+TYPES = {
+    "publisher": "std_msgs/msg/String",
+    "subscription": "std_msgs/msg/String",
+    "service_server": "std_srvs/srv/Empty",
+    "service_client": "std_srvs/srv/Empty",
+    "action_server": "test_msgs/action/Fibonacci",
+    "action_client": "test_msgs/action/Fibonacci",
+}
+
+
+class Program(NamedTuple):
+    """``script`` as of stand_in/rclcpp.c; ``manifest``: pairs of kind and name, ``None`` for no manifest."""
+
+    name: str
+    script: str
+    manifest: tuple[tuple[str, str], ...] | None = None
+    attributes: str = ""
+    inside: str = ""
+    codegen: str = "library: rclcpp"
+
+
+class Workspace(NamedTuple):
+    folder: Path
+    programs: tuple[Program, ...]
+
+    def manifest(self, name: str) -> Path:
+        return self.folder / "share/ament_index/resource_index/nodl" / f"{PACKAGE}__{name}"
+
+    def run(
+        self, *arguments: str, variables: Mapping[str, str] | None = None, timeout: float = 90
+    ) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "enclave_launch", "--prefix", str(self.folder), "--distro", "jazzy"]
+        return subprocess.run(
+            [*command, *arguments, PACKAGE, "all.launch.xml"],
+            cwd=ROOT,
+            env={**os.environ, "ROS_LOG_DIR": str(self.folder / "log"), **(variables or {})},
+            capture_output=True,
+            text=True,
+            check=False,
+            timeout=timeout,
+        )
+
+
+def asks(endpoints: Iterable[tuple[str, str]]) -> str:
+    return "".join(f"{kind} {name} {TYPES[kind]}\n" for kind, name in endpoints)
+
+
+def make_workspace(folder: Path, stand_in: Path, programs: Iterable[Program]) -> Workspace:
+    made = tuple(programs)
+    index = folder / "share/ament_index/resource_index"
+    binaries, share = folder / "lib" / PACKAGE, folder / "share" / PACKAGE / "launch"
+    for each in (index / "packages", index / "nodl", binaries, share):
+        each.mkdir(parents=True, exist_ok=True)
+    (index / "packages" / PACKAGE).touch()
+    nodes = []
+    for program in made:
+        (binaries / program.name).unlink(missing_ok=True)
+        (binaries / program.name).symlink_to(stand_in / "program")
+        (binaries / f"{program.name}.asks").write_text(program.script)
+        if program.manifest is not None:
+            text = manifest_text(program.manifest, program.codegen)
+            (index / "nodl" / f"{PACKAGE}__{program.name}").write_text(text)
+        nodes.append(
+            f'<node pkg="{PACKAGE}" exec="{program.name}" {program.attributes}>{program.inside}</node>'
+        )
+    (share / "all.launch.xml").write_text(f"<launch>\n{chr(10).join(nodes)}\n</launch>\n")
+    return Workspace(folder, made)
+
+
+def manifest_text(endpoints: Iterable[tuple[str, str]], codegen: str) -> str:
+    lines = ["nodl_version: 2", f"codegen: {{enclave_launch: {{{codegen}}}}}"]
+    for kind, category in LISTS.items():
+        names = [name for each, name in endpoints if each == kind]
+        quality = f", {QOS}" if kind in ("publisher", "subscription") else ""
+        if names:
+            lines.append(f"{category}:")
+            lines += [f"  - {{name: {name}, type: {TYPES[kind]}{quality}}}" for name in names]
+    return "\n".join([*lines, ""])

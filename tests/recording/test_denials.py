@@ -1,0 +1,244 @@
+"""Refused endpoints explained under --secure, by processes that ask for more than they were granted.
+
+The stand-in for rcl reads the permissions that were really signed for its enclave, and refuses as DDS does.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.recording.patches import manifest_patch, policy_patch
+from enclave_launch.recording.reasons import cause_of
+from nodl.document import read_document
+from nodl.node_interface import EndpointKind
+from nodl.record.asked import Asked
+from tests.recording.stand_in_launch import (
+    LISTS,
+    PACKAGE,
+    TYPES,
+    Program,
+    Workspace,
+    asks,
+    make_workspace,
+    manifest_text,
+)
+
+CATCHES = {"STAND_IN_CATCHES": "1"}
+WORDS = {
+    "publisher": "publish topic",
+    "subscription": "subscribe to topic",
+    "service_server": "serve service",
+    "service_client": "call service",
+    "action_server": "serve action",
+    "action_client": "call action",
+}
+PROGRAMS = 34
+GRANTED = tuple((kind, f"granted_{kind}") for kind in LISTS)
+
+
+def secured(workspace: Workspace, *arguments: str, **variables: str) -> str:
+    keystore = str(workspace.folder / "ks")
+    ran = workspace.run(
+        *("--secure", "--keystore", keystore, "--enclave-scope", "node", *arguments),
+        variables={**CATCHES, **variables},
+    )
+    return ran.stdout + ran.stderr
+
+
+def denied_program(number: int) -> Program:
+    """One that asks for six names that its manifest has and six that it lacks; renamed, pushed, remapped; some as
+    lifecycle nodes."""
+    name = f"node_{number}"
+    wanted = tuple((kind, f"{'~/' if number % 3 == 0 else ''}secret_{number}") for kind in LISTS)
+    begin = "lifecycle" if number % 4 == 0 else "node"
+    lifecycle = ", lifecycle: true" if begin == "lifecycle" else ""
+    attributes = f'name="renamed_{number}" namespace="/ns_{number % 5}"' if number % 2 else ""
+    inside = f'<remap from="secret_{number}" to="moved_{number}"/>' if number % 5 == 0 else ""
+    return Program(
+        name,
+        f"{begin} {name}\n{asks([*GRANTED, *wanted])}",
+        GRANTED,
+        attributes,
+        inside,
+        f"library: rclcpp{lifecycle}",
+    )
+
+
+def expected(number: int) -> set[tuple[str, str, str]]:
+    """Node, words and final name of what is refused to it."""
+    namespace = f"/ns_{number % 5}" if number % 2 else ""
+    node = f"{namespace}/{'renamed' if number % 2 else 'node'}_{number}"
+    private, moved = number % 3 == 0, number % 5 == 0
+    found = set()
+    for kind, words in WORDS.items():
+        is_action = kind.startswith("action")  # jazzy does not remap actions
+        name = f"moved_{number}" if moved and not private and not is_action else f"secret_{number}"
+        found.add((node, words, f"{node if private else namespace}/{name}"))
+    return found
+
+
+def told(output: str) -> set[tuple[str, str, str]]:
+    pattern = r"refused: node (\S+) may not ((?:publish|subscribe|serve|call) (?:to )?\w+) (\S+) \(enclave"
+    return {(node, words, name) for node, words, name in re.findall(pattern, output)}
+
+
+def patches(output: str) -> list[tuple[str, str, str]]:
+    """File, line before and line added of each patch in the output."""
+    found = []
+    for hunk in re.findall(r"^    --- .*?(?=^    --- |^\[|\Z)", output, re.MULTILINE | re.DOTALL):
+        lines = [line[4:] for line in hunk.splitlines() if line.startswith("    ")]
+        file = lines[1].removeprefix("+++ ")
+        at = next(i for i, line in enumerate(lines) if line.startswith("+") and not line.startswith("+++"))
+        found.append((file, lines[at - 1][1:], lines[at][1:]))
+    return found
+
+
+def test_two_hundred_denials_are_explained_and_their_patches_cure(stand_in: Path, tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path, stand_in, map(denied_program, range(PROGRAMS)))
+    output = secured(workspace)
+    wanted = {each for number in range(PROGRAMS) for each in expected(number)}
+    assert len(wanted) == PROGRAMS * 6 > 200
+    assert told(output) == wanted
+    assert "could not join DDS" not in output
+    found = patches(output)
+    assert len(found) == len(wanted)
+    for file, before, added in found:
+        text = Path(file).read_text()
+        Path(file).write_text(text.replace(f"{before}\n", f"{before}\n{added}\n", 1))
+    assert told(secured(workspace)) == set()
+
+
+def test_a_program_that_ends_at_its_first_refusal_is_explained_too(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("strict", "node strict\npublisher secret std_msgs/msg/String\n", ())
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    output = secured(workspace, STAND_IN_CATCHES="") + secured(workspace)
+    assert told(output) == {("/strict", "publish topic", "/secret")}
+
+
+def test_output_of_the_process_decides_nothing(stand_in: Path, tmp_path: Path) -> None:
+    """``output=log`` processes are explained on the screen all the same."""
+    program = Program("quiet", "node quiet\nsubscription secret std_msgs/msg/String\n", (), 'output="log"')
+    assert told(secured(make_workspace(tmp_path, stand_in, [program]))) == {
+        ("/quiet", "subscribe to topic", "/secret")
+    }
+
+
+def test_what_is_granted_is_not_explained(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("good", f"node good\n{asks(GRANTED)}", GRANTED)
+    output = secured(make_workspace(tmp_path, stand_in, [program]))
+    assert "refused" not in output and "could not join" not in output
+
+
+def test_explanations_can_be_switched_off(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("bad", "node bad\npublisher secret std_msgs/msg/String\n", ())
+    assert "refused:" not in secured(make_workspace(tmp_path, stand_in, [program]), "--no-explain-denials")
+
+
+def test_without_a_compiler_a_secured_launch_goes_on_and_says_so(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("good", f"node good\n{asks(GRANTED)}", GRANTED)
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    empty = {"CC": "no-such-compiler", "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    output = secured(workspace, **empty)
+    assert "a refusal of DDS will not be explained: recording needs a C compiler" in output
+    assert "process has finished cleanly" in output
+
+
+WORDS_OF_MIDDLEWARES = {
+    "It is not allowed to create participant: Could not find domain 7 in governance(code: 141)": (
+        "its permissions are not for DDS domain 7; provision with --domain-id 7"
+    ),
+    "Error occurred while validating local permission: Certificate not valid: error: unable to get local issuer "
+    "certificate; subject: /CN=ros.a(code: 200)": "its certificate was issued by another CA",
+    "Error occurred while validating local permission: Certificate not valid: error: certificate has expired; "
+    "subject: /CN=ros.a(code: 200)": "its certificate has expired",
+    "Error occurred while validating local permissions: Permissions validity period expired for CN=ros.a (expired: "
+    "2026-11-21T20:06:54)(code: 147)": "its permissions have expired",
+    "Error occurred while validating local permissions: Failed to parse PKCS7 SMIME document: digest failure(code: "
+    "127)": "its signed permissions or governance are damaged",
+    "Error occurred while validating local permissions: Subject name is invalid(code: 146)": (
+        "its permissions are those of another subject"
+    ),
+    "[rmw_cyclonedds_cpp]: could not find all security files": "files of its enclave are missing",
+}
+
+
+def test_a_node_that_cannot_join_is_explained_by_what_the_middleware_says(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    programs = [
+        Program(f"n{i}", f"node n{i}\n", (), inside=f'<env name="STAND_IN_NODE_FAILS" value="{said}"/>')
+        for i, said in enumerate(WORDS_OF_MIDDLEWARES)
+    ]
+    output = secured(make_workspace(tmp_path, stand_in, programs))
+    for i, explanation in enumerate(WORDS_OF_MIDDLEWARES.values()):
+        assert f"node n{i} of n{i}-{i + 1} (enclave /n{i}) could not join DDS: {explanation}" in output
+    assert output.count("could not join DDS") == len(programs)
+
+
+def test_a_missing_enclave_is_explained_by_rcl_itself(stand_in: Path, tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path, stand_in, [Program("lost", "node lost\n", ())])
+    output = secured(workspace, STAND_IN_INIT_FAILS="/ks/enclaves/lost")
+    assert (
+        "lost-1 (enclave /lost) could not join DDS: its enclave /ks/enclaves/lost is not in the key" in output
+    )
+
+
+def test_harmless_lines_explain_nothing() -> None:
+    assert cause_of(["Remote secure participant 1:2:3:4 not allowed"]) is None
+    assert cause_of(["process has died"]) is None
+
+
+def asked(kind: str, name: str, final: str = "/n") -> Asked:
+    return Asked(EndpointKind(kind), name, name, final, TYPES[kind], 1)
+
+
+@pytest.mark.parametrize("kind", sorted(LISTS))
+def test_a_patch_adds_one_entry_to_a_manifest(kind: str, tmp_path: Path) -> None:
+    for text in (manifest_text(GRANTED, "library: rclcpp"), manifest_text((), "library: rclcpp")):
+        file = tmp_path / f"{PACKAGE}__x.nodl.yaml"
+        file.write_text(text)
+        patch = manifest_patch(str(file), text, 1, asked(kind, "~/new"))
+        assert patch is not None
+        plus = [line[1:] for line in patch.diff.splitlines() if line[:1] == "+" and line[:3] != "+++"]
+        minus = [line for line in patch.diff.splitlines() if line[:1] == "-" and line[:3] != "---"]
+        assert minus == [] and plus[-1].strip().startswith("- {name: '~/new', type: ")
+
+
+def test_a_patch_of_a_v1_manifest_goes_into_the_right_node(tmp_path: Path) -> None:
+    text = """<interface version="1">
+  <node name="a" executable="a">
+    <topic name="x" type="m/msg/A" role="publisher"/>
+  </node>
+  <node name="b" executable="b">
+    <topic name="y" type="m/msg/A" role="publisher"/>
+  </node>
+</interface>
+"""
+    patch = manifest_patch("f.nodl.xml", text, 5, asked("subscription", "z"))
+    assert patch is not None
+    lines = text.splitlines()
+    added = '    <topic name="z" type="std_msgs/msg/String" role="subscription"/>'
+    file = tmp_path / "f.nodl.xml"
+    file.write_text("\n".join([*lines[:6], added, *lines[6:], ""]))
+    assert f"+{added}" in patch.diff.splitlines()
+    assert [len(node.interface.endpoints) for node in read_document(file)] == [1, 2]
+
+
+@pytest.mark.parametrize("text", ["{nodl_version: 2}", "nodl_version: 2\npublishers: []\n"])
+def test_a_manifest_of_another_shape_is_left_alone(text: str) -> None:
+    assert manifest_patch("f", text, 1, asked("publisher", "x")) is None
+
+
+def test_a_node_without_manifest_gets_exactly_the_refused_name_in_a_policy_file(tmp_path: Path) -> None:
+    from keystore.formats.policy_xml import read_policy
+
+    patch = policy_patch("/e", "/ns/me", asked("action_client", "go", "/ns/go"))
+    text = "".join(line[1:] + "\n" for line in patch.diff.splitlines()[3:])
+    (tmp_path / "p.xml").write_text(text)
+    (enclave,) = read_policy(tmp_path / "p.xml").policy.enclaves
+    (profile,) = enclave.profiles
+    assert (enclave.path, profile.ns, profile.node) == ("/e", "/ns", "me")
+    assert [(rule.operation.value, rule.expression) for rule in profile.rules] == [("call", "/ns/go")]

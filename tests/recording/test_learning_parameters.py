@@ -1,0 +1,95 @@
+"""--learn-parameters: a second run with marker values decides where names come from."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nodl.document import read_document
+from nodl.name_template import NameTemplate, ParameterPart
+from tests.recording.stand_in_launch import PACKAGE, Program, make_workspace
+
+LEARN = ("--learn-for", "1s", "--learn-isolation", "local")
+
+
+def learn(folder: Path, stand_in: Path, program: Program, *arguments: str) -> dict[str, NameTemplate]:
+    """Names by the text of the standard entry."""
+    workspace = make_workspace(folder / "ws", stand_in, [program])
+    ran = workspace.run("--learn", str(folder / "learnt"), *LEARN, *arguments)
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    (file,) = (folder / "learnt").glob(f"{PACKAGE}__{program.name}*.nodl.yaml")
+    assert "enclave_launch_marker" not in file.read_text()
+    (node,) = read_document(file)
+    return {endpoint.kind.value: endpoint.name for endpoint in node.interface.endpoints}
+
+
+@pytest.mark.parametrize("again", [False, True])
+def test_a_word_of_the_command_line_beside_a_fixed_name_of_the_same_value(
+    again: bool, stand_in: Path, tmp_path: Path
+) -> None:
+    """Matching takes both for the argument; the second run sees that one of them stays."""
+    program = Program(
+        "relay",
+        "node relay\nsubscription %1 std_msgs/msg/String\npublisher scan std_msgs/msg/Bool\nwait\n",
+        attributes='args="scan"',
+    )
+    names = learn(tmp_path, stand_in, program, *(["--learn-parameters"] if again else []))
+    assert names["subscription"].parts == (ParameterPart("<1>"),)
+    assert names["publisher"].parts == (("scan",) if again else (ParameterPart("<1>"),))
+
+
+def test_a_parameter_that_only_looks_like_the_source_is_ruled_out(stand_in: Path, tmp_path: Path) -> None:
+    program = Program(
+        "fixed",
+        "node fixed\npublisher map nav_msgs/msg/OccupancyGrid\nwait\n",
+        inside='<param name="world" value="map"/>',
+    )
+    assert learn(tmp_path / "a", stand_in, program)["publisher"].parts == (ParameterPart("world"),)
+    decided = learn(tmp_path / "b", stand_in, program, "--learn-parameters")
+    assert decided["publisher"].parts == ("map",)
+
+
+def test_runs_are_united_and_what_a_person_wrote_stays(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("talker", "node talker\npublisher one std_msgs/msg/String\nwait\n")
+    learn(tmp_path, stand_in, program)
+    (file,) = (tmp_path / "learnt").glob("*.nodl.yaml")
+    added = "service_servers:\n- {name: by_hand, type: std_srvs/srv/Empty, description: mine}\n"
+    file.write_text(file.read_text() + added)
+    other = program._replace(script="node talker\npublisher two std_msgs/msg/String\nwait\n")
+    learn(tmp_path, stand_in, other)
+    (node,) = read_document(file)
+    assert {str(endpoint.name) for endpoint in node.interface.endpoints} == {"one", "two", "by_hand"}
+    assert "description: mine" in file.read_text()
+    assert len(list((tmp_path / "learnt" / "records").glob("*.record"))) == 2
+
+
+def test_a_lifecycle_node_that_was_never_active_is_incomplete(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("life", "lifecycle life\nstate 1\npublisher p std_msgs/msg/String\nwait\n")
+    learn(tmp_path, stand_in, program)
+    (file,) = (tmp_path / "learnt").glob("*.nodl.yaml")
+    assert "incomplete:\n    - 'a lifecycle node that was never active" in file.read_text()
+
+
+def test_nodes_whose_names_differ_in_each_run_are_reported(stand_in: Path, tmp_path: Path) -> None:
+    program = Program(
+        "listener",
+        "node listener\npublisher p std_msgs/msg/String\n"
+        "node transform_listener_impl_5581a2b3c4d0\nsubscription /tf tf2_msgs/msg/TFMessage\nwait\n",
+    )
+    workspace = make_workspace(tmp_path / "ws", stand_in, [program])
+    ran = workspace.run("--learn", str(tmp_path / "learnt"), *LEARN)
+    assert "transform_listener_impl_* of stand_in_nodes/listener have another name in each run" in ran.stderr
+    assert len(list((tmp_path / "learnt").glob("*.nodl.yaml"))) == 1
+
+
+def test_a_plan_that_was_learnt_needs_nothing_else(stand_in: Path, tmp_path: Path) -> None:
+    """Learn unsecured, then start secured under another name: nothing is refused."""
+    program = Program(
+        "node_a", "node node_a\npublisher %n/out std_msgs/msg/String\nsubscription in m/msg/X\nwait\n"
+    )
+    learn(tmp_path, stand_in, program)
+    renamed = program._replace(attributes='name="other" namespace="/far"', script=program.script[:-5])
+    workspace = make_workspace(tmp_path / "ws", stand_in, [renamed])
+    ran = workspace.run(*("--secure", "--keystore", str(tmp_path / "ks"), "--nodl", str(tmp_path / "learnt")))
+    assert ran.returncode == 0 and "refused" not in ran.stdout + ran.stderr, ran.stdout + ran.stderr
