@@ -24,9 +24,9 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
             return [], ros_specific_arguments
         from launch.substitutions import TextSubstitution
 
-        from enclave_launch.ros2.observation import observe_components, observe_node
+        from enclave_launch.ros2.observation import loads_components, observe_node
 
         process = observe_node(node_action, context, ros_specific_arguments)
-        grant = session.enter(process, observe_components(node_action, context))
+        grant = session.enter(process, loads_components=loads_components(node_action))
         setattr(node_action, attributes.GRANT, grant)
         return [[TextSubstitution(text=word)] for word in grant.arguments], ros_specific_arguments

@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import re
 import shlex
-from collections.abc import Iterable
 from typing import Any
 
 import launch_ros.actions
@@ -23,7 +22,6 @@ from enclave_launch.process import (
     EnclaveRequest,
     ProcessKind,
     RemapRule,
-    ResolvedComponent,
     ResolvedProcess,
 )
 from enclave_launch.ros2.attributes import enclave_attribute, scope_in_force
@@ -96,30 +94,10 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
     )
 
 
-def observe_components(action: Any, context: Any) -> tuple[ResolvedComponent, ...]:
-    """The composable nodes that a ``ComposableNodeContainer`` names itself and will load."""
-    descriptions = getattr(action, "_ComposableNodeContainer__composable_node_descriptions", None)
-    return tuple(_components(str(action.node_name), descriptions or (), context))
-
-
-def _components(container: str, descriptions: Iterable[Any], context: Any) -> Iterable[ResolvedComponent]:
-    from launch_ros.actions.load_composable_nodes import get_composable_node_load_request
-
-    for description in descriptions:
-        if description.condition() is not None and not description.condition().evaluate(context):
-            continue
-        request = get_composable_node_load_request(description, context)
-        yield ResolvedComponent(
-            container=container,
-            package=request.package_name,
-            plugin=request.plugin_name,
-            name=request.node_name,
-            namespace=request.node_namespace,
-            remaps=tuple(RemapRule(*rule.split(":=", 1)) for rule in request.remap_rules),
-            parameters={},
-            extra_arguments={},
-            location=location_in(context, "ComposableNode"),
-        )
+def loads_components(action: Any) -> bool:
+    """Whether a ``ComposableNodeContainer`` names composable nodes itself. They are not looked at: what upstream keeps
+    of them may be iterators (``ComposableNode.remappings`` is), and the real load must find them untouched."""
+    return bool(getattr(action, "_ComposableNodeContainer__composable_node_descriptions", None))
 
 
 def next_process_name(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[int, str]:

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NoReturn, Protocol
 
@@ -13,16 +12,16 @@ from launch.event_handlers import OnShutdown
 
 from enclave_launch.errors import ProvisionError
 from enclave_launch.policy.launcher import LAUNCHER_NODE
-from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.process import ResolvedProcess
 from enclave_launch.ros2.context import KEY
 from enclave_launch.runtime.gate import Grant, PlannedGate
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 
 
 class Doorkeeper(Protocol):
-    """Decides about one process with the components it is to hold."""
+    """Decides about one process; a container may load components at once."""
 
-    def admit(self, process: ResolvedProcess, components: Sequence[ResolvedComponent]) -> Grant: ...
+    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> Grant: ...
 
     def launcher(self) -> Grant | None: ...
 
@@ -33,7 +32,7 @@ class PlannedDoor:
 
     gate: PlannedGate
 
-    def admit(self, process: ResolvedProcess, components: Sequence[ResolvedComponent]) -> Grant:
+    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> Grant:
         return self.gate.ensure(process)
 
     def launcher(self) -> Grant | None:
@@ -48,9 +47,9 @@ class OpenDoor:
     def __init__(self, launch: ProvisionedLaunch) -> None:
         self._provider = PlanProvider(launch)
 
-    def admit(self, process: ResolvedProcess, components: Sequence[ResolvedComponent]) -> Grant:
+    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> Grant:
         """:raises ProvisionError: no manifest, or something to load that only a plan could have permitted."""
-        if components:
+        if loads_components:
             raise ProvisionError(f"{process.location}: {process.fqn} loads components; {_NEEDS_PLAN}")
         return self._provider.ensure_late(process)
 
@@ -71,9 +70,9 @@ class EnclaveSession:
             OnShutdown(on_shutdown=lambda *_: context.locals.ros_adapter.shutdown_if_running())
         )
 
-    def enter(self, process: ResolvedProcess, components: Sequence[ResolvedComponent] = ()) -> Grant:
+    def enter(self, process: ResolvedProcess, *, loads_components: bool = False) -> Grant:
         """:raises EnclaveLaunchError: not foreseen in the plan, or its enclave cannot be completed."""
-        return self._door.admit(process, components)
+        return self._door.admit(process, loads_components=loads_components)
 
 
 _NEEDS_PLAN = (

@@ -331,3 +331,30 @@ def test_a_node_without_interface_ends_that_launch(demo: Workspace) -> None:
     assert status == 1
     assert "no NoDL manifest for demo/unknown" in screen
     assert "process started" not in screen
+
+
+TAKEN_AWAY = """
+from launch import LaunchDescription
+from launch.actions import ExecuteProcess, SetEnvironmentVariable, UnsetEnvironmentVariable
+from launch_ros.actions import Node
+def generate_launch_description():
+    return LaunchDescription([
+        UnsetEnvironmentVariable("ROS_SECURITY_KEYSTORE"),
+        SetEnvironmentVariable("ROS_SECURITY_ENABLE", "false"),
+        SetEnvironmentVariable("ROS_SECURITY_ENCLAVE_OVERRIDE", "/other"),
+        Node(package="demo", executable="talker", name="own", env={"PATH": "/usr/bin:/bin"}),
+        Node(package="demo", executable="talker", name="set", additional_env={"ROS_SECURITY_STRATEGY": "Permissive"}),
+        ExecuteProcess(cmd=["%s/lib/demo/talker"], name="tool", output="screen"),
+    ])
+"""
+
+
+def test_what_a_launch_file_sets_takes_no_enclave_away(demo: Workspace) -> None:
+    demo.add("prefix/share/demo/launch/taken.launch.py", TAKEN_AWAY % demo.prefix)
+    keystore = demo.directory / "ks"
+    _, screen = launch(demo, "--secure", "--keystore", str(keystore), "demo", "taken.launch.py")
+    lines = {line.partition("]")[0]: line for line in screen.splitlines() if "enclave=" in line}
+    assert len(lines) == 3
+    for label, line in lines.items():
+        expected = "files=0" if "tool" in label else "enclave=/ files=6"
+        assert expected in line and "enable=true strategy=Enforce" in line
