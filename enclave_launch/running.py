@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Union
 
 from enclave_launch.boundary.terminal import printable_lines
@@ -34,7 +35,7 @@ def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -
     ``LaunchFileError`` for a program that is not there."""
     source = _source(launch)
     gate, options = _gate(launch, settings), _options(launch, settings)
-    with ament_prefixes(source.prefixes):
+    with ament_prefixes(source.prefixes), _expiry_watch(launch):
         _check_programs(launch)
         return run_launch(source.launch_file, source.arguments, gate=gate, options=options, warden=warden)
 
@@ -43,7 +44,7 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     """The same inside a running event loop."""
     source = _source(launch)
     gate, options = _gate(launch, settings), _options(launch, settings)
-    with ament_prefixes(source.prefixes):
+    with ament_prefixes(source.prefixes), _expiry_watch(launch):
         _check_programs(launch)
         return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
 
@@ -57,7 +58,7 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     _check_programs(launch)
 
     async def main(observe: Observer, hold: Callable[[LaunchService], None]) -> int:
-        with ament_prefixes(source.prefixes):
+        with ament_prefixes(source.prefixes), _expiry_watch(launch):
             service = LaunchService(
                 source.launch_file, source.arguments, gate=gate, options=options, observe=observe
             )
@@ -65,6 +66,19 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
             return await service.run()
 
     return RunningLaunch(main)
+
+
+def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
+    """Warns while a provisioned launch runs that what its processes use is about to end."""
+    if isinstance(launch, _UNSECURED):
+        return nullcontext()
+    from enclave_launch.expiry_watch import watched
+
+    return watched(launch, _say)
+
+
+def _say(text: str) -> None:
+    print(f"secure-launch: warning: {printable_lines(text)}", file=sys.stderr)
 
 
 def _check_programs(launch: Launch) -> None:
@@ -101,7 +115,7 @@ def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
         evaluation.components,
         PlanProvider(launch),
         allow_late=settings.allow_late,
-        say_late=lambda text: print(f"secure-launch: warning: {printable_lines(text)}", file=sys.stderr),
+        say_late=_say,
     )
 
 

@@ -34,6 +34,7 @@ FLOORS = (
     {"review"},
     {"report", "runtime"},
     {"recording", "secured"},
+    {"expiry_watch"},
     {"running"},
     {"flow"},
     {"verb"},

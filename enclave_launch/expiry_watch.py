@@ -1,0 +1,116 @@
+"""Tells in time, while a launch runs, that what its processes use is about to end.
+
+Cyclone DDS peers stop receiving at the second in which a writer's certificate or permissions end; Fast DDS 2.9 looks at
+the dates at start and handshake only. Neither says anything, so the supervisor does.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from datetime import datetime, timedelta
+from typing import TYPE_CHECKING, NamedTuple
+
+from keystore.errors import KeystoreError
+from keystore.formats.validity import utc_now
+
+if TYPE_CHECKING:
+    from enclave_launch.secured import ProvisionedLaunch
+    from keystore.steps.expiry import Expiry
+
+MARGINS = (
+    timedelta(days=7),
+    timedelta(days=1),
+    timedelta(hours=1),
+    timedelta(minutes=5),
+    timedelta(0),
+)
+_LONGEST_SLEEP = timedelta(hours=1)
+"""A clock that is set is noticed after that."""
+_FOREVER = timedelta(days=36500)
+
+
+class Notice(NamedTuple):
+    """What to say, and when."""
+
+    at: datetime
+    text: str
+
+
+def notices(ends: Iterable[Expiry], keystore: str, after: datetime) -> list[Notice]:
+    """In their order: for what ends together one notice at each of ``MARGINS`` that is not over yet."""
+    together: dict[datetime, list[str]] = {}
+    for one in ends:
+        together.setdefault(one.not_after, []).append(one.subject)
+    found = [
+        Notice(end - margin, _text(subjects, end, margin, keystore))
+        for end, subjects in together.items()
+        for margin in MARGINS
+        if end - margin > after
+    ]
+    return sorted(found)
+
+
+def _text(subjects: list[str], end: datetime, margin: timedelta, keystore: str) -> str:
+    what = ", ".join(subjects[:3]) + (f" and {len(subjects) - 3} more" if len(subjects) > 3 else "")
+    if not margin:
+        return (
+            f"{what} ended now: Cyclone DDS peers receive nothing more from these processes, and no process can start "
+            f"with it; renew with: secure-keystore renew {keystore}, then restart the launch"
+        )
+    return (
+        f"{what} end{'s' if len(subjects) == 1 else ''} in {_span(margin)}, at {end:%Y-%m-%d %H:%M:%S} UTC; renew "
+        f"with: secure-keystore renew {keystore} --within {_span(margin + timedelta(days=1), short=True)}, and restart the "
+        "launch before then"
+    )
+
+
+def _span(span: timedelta, *, short: bool = False) -> str:
+    for name, unit in (("day", 86400), ("hour", 3600), ("minute", 60)):
+        count, rest = divmod(int(span.total_seconds()), unit)
+        if count and (not rest or short):
+            return f"{count}{name[0]}" if short else f"{count} {name}{'s' if count != 1 else ''}"
+    return f"{int(span.total_seconds())} s"
+
+
+@contextmanager
+def watched(
+    launch: ProvisionedLaunch, say: Callable[[str], None], now: Callable[[], datetime] = utc_now
+) -> Iterator[None]:
+    """While inside, ``say`` is called with each notice when its time has come, from a thread of its own."""
+    over = threading.Event()
+    watch = threading.Thread(target=_watch, args=(launch, say, now, over), name="expiry-watch", daemon=True)
+    watch.start()
+    try:
+        yield
+    finally:
+        over.set()
+
+
+def _watch(
+    launch: ProvisionedLaunch,
+    say: Callable[[str], None],
+    now: Callable[[], datetime],
+    over: threading.Event,
+) -> None:
+    due = _all_notices(launch, now())
+    while due:
+        left = min(due[0].at - now(), _LONGEST_SLEEP)
+        if left > timedelta(0):
+            if over.wait(left.total_seconds()):
+                return
+            continue
+        say(due.pop(0).text)
+
+
+def _all_notices(launch: ProvisionedLaunch, after: datetime) -> list[Notice]:
+    from keystore.steps.expiry import expires_soon
+
+    keystore = launch.settings.keystore
+    enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]
+    try:
+        found = expires_soon(keystore, _FOREVER, enclaves=enclaves, known=launch.report.validities)
+    except KeystoreError:
+        return []  # whatever is wrong with it is told where it is used
+    return notices(found, keystore, after)

@@ -1,0 +1,64 @@
+"""While a launch runs it is told in time that certificates, permissions or the CRL end."""
+
+from __future__ import annotations
+
+import threading
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+
+import pytest
+
+from enclave_launch import SecurityOptions, provision, resolve
+from enclave_launch.expiry_watch import notices, watched
+from keystore.formats.validity import utc_now
+from keystore.steps.expiry import Expiry
+from keystore.steps.options import ProvisionOptions
+
+NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
+HOUR, DAY = timedelta(hours=1), timedelta(days=1)
+
+
+def ends(after: timedelta, what: str = "certificate", enclave: str = "/a") -> Expiry:
+    return Expiry(NOW + after, what, enclave, NOW - DAY)
+
+
+def test_each_margin_is_told_once_and_those_that_are_over_are_left_out() -> None:
+    found = notices([ends(2 * DAY)], "ks", NOW)
+    assert [one.at - NOW for one in found] == [DAY, 47 * HOUR, 2 * DAY - timedelta(minutes=5), 2 * DAY]
+    assert "ends in 1 day" in found[0].text and "secure-keystore renew ks --within 2d" in found[0].text
+    assert "ended now: Cyclone DDS peers receive nothing more" in found[-1].text
+
+
+def test_what_ends_together_is_one_line() -> None:
+    found = notices([ends(DAY, enclave=f"/{name}") for name in "abcde"], "ks", NOW)
+    assert len(found) == 3 and "and 2 more end in 1 hour" in found[0].text
+
+
+def test_what_has_ended_or_lives_long_is_told_in_its_time_only() -> None:
+    assert notices([ends(-HOUR)], "ks", NOW) == []
+    assert notices([ends(3650 * DAY)], "ks", NOW)[0].at == NOW + 3643 * DAY
+
+
+@pytest.mark.parametrize("ahead", [timedelta(minutes=55), None])
+def test_a_running_launch_says_so(tmp_path: Path, ahead: timedelta | None) -> None:
+    """The clock is the watch's own: an hour of certificate is left, or, beside it, a day."""
+    file = tmp_path / "test.launch.xml"
+    file.write_text('<launch><executable cmd="true" enclave="/tool"/></launch>')
+    start = utc_now()
+    options = ProvisionOptions(valid_until=start + (HOUR if ahead else 30 * DAY), durable=False)
+    launch = provision(resolve(file), tmp_path / "ks", options=SecurityOptions(keystore=options))
+    said, heard = list[str](), threading.Event()
+
+    def say(text: str) -> None:
+        said.append(text)
+        heard.set()
+
+    clock = iter([start])
+
+    def now() -> datetime:
+        return next(clock, start + (ahead or timedelta(0)))
+
+    with watched(launch, say, now):
+        heard.wait(20 if ahead else 0.2)
+    assert bool(said) is bool(ahead)
+    assert not said or "of /tool ends" in said[0] or ("/tool" in said[0] and "5 minutes" in said[0])
