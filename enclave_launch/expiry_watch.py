@@ -59,10 +59,10 @@ def _text(subjects: list[str], end: datetime, margin: timedelta, keystore: str) 
             f"{what} ended now: Cyclone DDS peers receive nothing more from these processes, and no process can start "
             f"with it; renew with: secure-keystore renew {keystore}, then restart the launch"
         )
+    verb = "ends" if len(subjects) == 1 else "end"
     return (
-        f"{what} end{'s' if len(subjects) == 1 else ''} in {_span(margin)}, at {end:%Y-%m-%d %H:%M:%S} UTC; renew "
-        f"with: secure-keystore renew {keystore} --within {_span(margin + timedelta(days=1), short=True)}, and restart the "
-        "launch before then"
+        f"{what} {verb} in {_span(margin)}, at {end:%Y-%m-%d %H:%M:%S} UTC; renew with: secure-keystore renew "
+        f"{keystore} --within {_span(margin + timedelta(days=1), short=True)}, and restart the launch before then"
     )
 
 
