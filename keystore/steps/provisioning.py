@@ -14,6 +14,7 @@ from pathlib import Path
 from keystore.disk import layout, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
+from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInput, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy
@@ -22,6 +23,7 @@ from keystore.steps.comparison import WantedEnclave, compare, wanted_enclave, wi
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.report import ProvisionReport
 from keystore.steps.sharing import refuse_running
+from keystore.verification.before_launch import exposures
 
 
 def provision(
@@ -73,8 +75,8 @@ def bring_about(
 ) -> ProvisionReport:
     """Compare, and reconcile what differs. ``root`` is resolved, the names are valid and in order."""
     now = options.now or utc_now()
-    if (unchanged := compare(root, wanted, options, now)) is not None:
-        return unchanged
-    from keystore.steps.reconciliation import reconcile  # brings cryptography: not on the warm path
+    if (report := compare(root, wanted, options, now)) is None:
+        from keystore.steps.reconciliation import reconcile  # brings cryptography: not on the warm path
 
-    return reconcile(root, wanted, options, now)
+        report = reconcile(root, wanted, options, now)
+    return report._replace(warnings=(*report.warnings, *exposures(KeystoreView(root))))

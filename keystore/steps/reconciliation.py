@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
@@ -15,7 +14,6 @@ from keystore.disk.governance_file import governance_domains
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.formats.enclave_name import check_distinct
-from keystore.formats.role import Role
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity
 from keystore.steps.comparison import WantedEnclave, as_found, inspect_wanted
 from keystore.steps.creation import CreateOptions, complete, renew_governance
@@ -47,7 +45,6 @@ def reconcile(
         view = KeystoreView(root)
         register = opened.register if opened.has_register else None
         refuse_foreign_authorities(view, register)
-        warnings += _exposures(view)
         check_distinct(dict.fromkeys((*view.enclaves(), *wanted)))
         writer = EnclaveWriter(opened, view, options, now)
         wanted = {name: _as_it_is_now(one) for name, one in wanted.items()}
@@ -107,23 +104,6 @@ def _complete_keystore(
         done.append(f"governance signed for domains {domains}")
     done += restore_crl(opened, options.access, now, min(options.renew_within, _CRL_MARGIN))
     return done, list(report.warnings)
-
-
-def _exposures(view: KeystoreView) -> list[str]:
-    """What SROS2 leaves behind; it works, so it is said and not refused."""
-    said = []
-    if view.shares_one_ca:
-        said.append(
-            "this keystore has one CA for identities and permissions (CVE-2023-24010, CVE-2023-24011); "
-            "secure-keystore renew separates them"
-        )
-    files = [name for role in Role if (name := view.key_file(role)) is not None]
-    if any(os.stat(view.root / name).st_mode & 0o077 for name in files):
-        said.append(
-            "the CA keys can be read by others; secure-keystore renew closes them. Whoever read them can make any "
-            "enclave: secure-keystore renew --ca start replaces them"
-        )
-    return said
 
 
 def _write_all(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shutil
 import stat
 from pathlib import Path
 
@@ -180,6 +181,9 @@ def test_a_bundle_whose_enclaves_stand_alone_gets_no_other_ca(tmp_path: Path) ->
     root = filled(tmp_path / "ks", ["/a"])
     bundle = tmp_path / "bundle"
     assert main(["export", str(root), "-o", str(bundle), "--enclave", "/a", "--public", "copy"]) == 0
+    assert not provision(bundle, [policy("/a")], options=options()).changed
+    shutil.rmtree(bundle / "public")  # of earlier versions
+    (bundle / "enclaves/governance.p7s").unlink()
     with pytest.raises(DamagedKeystore, match="a deployed copy"):
         provision(bundle, [policy("/a")], options=options())
     assert not (bundle / "public/identity_ca.cert.pem").exists()

@@ -462,3 +462,35 @@ def test_nothing_of_it_is_exported(name: str, present: Path, tmp_path: Path) -> 
     with pytest.raises(DamagedKeystore):
         export(root, tmp_path / "out", ["/a"])
     assert not (tmp_path / "out").exists()
+
+
+EXPOSED_AT_LAUNCH: dict[str, tuple[str, Change]] = {
+    "parent open to everybody": ("put another keystore in this place", open_parent),
+    "CA keys readable": ("the CA keys can be read by others", lambda root: (root / CA_KEY).chmod(0o644)),
+}
+
+
+@pytest.mark.parametrize("name", EXPOSED_AT_LAUNCH)
+def test_a_launch_says_what_is_exposed_though_nothing_is_to_be_done(
+    name: str, present: Path, tmp_path: Path
+) -> None:
+    from keystore.steps.provisioning import provision
+
+    told, change = EXPOSED_AT_LAUNCH[name]
+    root = copy_of(present, tmp_path)
+    assert not provision(root, [policy("/a", "/chatter")], options=options()).warnings
+    change(root)
+    report = provision(root, [policy("/a", "/chatter")], options=options())
+    assert [warning for warning in report.warnings if told in warning]
+
+
+def test_a_launch_says_where_its_governance_is_weak(present: Path, tmp_path: Path) -> None:
+    from keystore.steps.governance_setting import GovernanceOptions, set_governance
+    from keystore.steps.provisioning import provision
+
+    root = copy_of(present, tmp_path)
+    weak = Governance((DomainRule(rtps_protection_kind=NONE),))
+    set_governance(root, weak, options=GovernanceOptions(durable=False))
+    for _ in range(2):
+        report = provision(root, [policy("/a", "/chatter")], options=options())
+        assert any("rtps_protection_kind NONE" in warning for warning in report.warnings)
