@@ -41,12 +41,14 @@ def resolve(
     refuse is in ``plan.problems``.
     """
     from enclave_launch.interfaces import InterfaceFinder
+    from enclave_launch.interfaces.launch_contents import launched
     from nodl.ament_index import search_prefixes
 
     chosen = options or ResolveOptions()
     evaluated = evaluate_launch(launch_file, arguments, options=chosen)
     with ament_prefixes(evaluated.source.prefixes):
-        finder = InterfaceFinder(search_prefixes(), chosen, evaluated.evaluation.distro)
+        evaluation = evaluated.evaluation
+        finder = InterfaceFinder(search_prefixes(), chosen, evaluation.distro, launched(evaluation))
         plan = Planner(evaluated.source, finder, chosen.plan_options()).plan(evaluated.evaluation)
     return plan._replace(warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)))
 

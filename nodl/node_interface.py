@@ -7,7 +7,9 @@ whoever derives permissions from them no longer asks where they came from, but c
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from enum import Enum
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.name_template import NameTemplate
@@ -79,8 +81,8 @@ class NodeInterface(NamedTuple):
     ``name`` and ``namespace`` are the program's own defaults (what applies when launch gives none);
     ``None`` when unknown. ``executable`` or ``plugin`` is the key under which launch starts the node.
     ``own_rules``: remap rules in the options with which a program makes a further node beside its main one; such a
-    node obeys them before the process's, and the process's even in a container. ``parameter_services``: the program
-    does not switch them off. ``depends``: what varies with its start.
+    node obeys them before the process's, and the process's even in a container; ``own_parameters`` stand in the
+    same options. ``parameter_services``: the program does not switch them off. ``depends``: what varies with its start.
     """
 
     package: str | None
@@ -95,5 +97,6 @@ class NodeInterface(NamedTuple):
     parameters: tuple[str, ...] = ()
     gaps: tuple[Gap, ...] = ()
     own_rules: tuple[str, ...] = ()
+    own_parameters: Mapping[str, object] = MappingProxyType({})
     parameter_services: bool = True
     depends: Dependence | None = None

@@ -17,6 +17,7 @@ from enclave_launch.interfaces.started_program import StartedProgram
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from nodl.dependence import Launched
 from nodl.errors import NoDLError
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.name_template import UnknownPart
@@ -53,14 +54,19 @@ class InterfaceFinder:
     """Answers for one launch, by the rules of ``distro``; what can be said without knowing the start is kept."""
 
     def __init__(
-        self, prefixes: Sequence[str], options: ResolveOptions | None = None, distro: str = "rolling"
+        self,
+        prefixes: Sequence[str],
+        options: ResolveOptions | None = None,
+        distro: str = "rolling",
+        others: Launched | None = None,
     ) -> None:
-        """Raises ``UsageError`` for a folder of documents that is not there."""
+        """``others``: what of the launch some nodes must know. Raises ``UsageError`` for a folder of documents that is
+        not there."""
         self._options = options or ResolveOptions()
         self._prefixes = prefixes
         self._distro = distro
         self._lookup = ManifestLookup(prefixes, self._options.manifests)
-        self._library = LibraryAccess(prefixes, self._options, distro)
+        self._library = LibraryAccess(prefixes, self._options, distro, others)
         self._known: dict[_Subject, Found | Missing] = {}
 
     def __call__(

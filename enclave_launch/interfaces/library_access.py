@@ -17,7 +17,7 @@ from nodl.ament_index import list_resources, package_version
 from nodl.node_interface import NodeInterface
 
 if TYPE_CHECKING:
-    from nodl.dependence import Situation
+    from nodl.dependence import Launched, Situation
     from nodl.library import Hit, Library
 
 _FURTHER = 32
@@ -26,11 +26,17 @@ _FURTHER = 32
 class LibraryAccess:
     """Opens nothing until a node has no manifest, or one that depends on its start."""
 
-    def __init__(self, prefixes: Sequence[str], options: ResolveOptions, distro: str):
-        """Raises ``UsageError`` for a folder of documents that is not there."""
+    def __init__(
+        self, prefixes: Sequence[str], options: ResolveOptions, distro: str, others: Launched | None = None
+    ):
+        """``others``: what of the launch some nodes must know.
+
+        Raises ``UsageError`` for a folder of documents that is not there.
+        """
         self._prefixes = prefixes
         self._distro = distro
         self._enabled = options.library
+        self._others = others
         self._folders = options.library_folders
         for folder in self._folders:
             if not folder.is_dir():
@@ -101,8 +107,10 @@ class LibraryAccess:
 
         installed = self._installed if (started.package or "") in self._installed else None
         if isinstance(started, ResolvedProcess):
-            return situation_of_process(started, interface, self._distro, installed)
-        return situation_of_component(started, container, interface, self._distro, installed)
+            situation = situation_of_process(started, interface, self._distro, installed)
+        else:
+            situation = situation_of_component(started, container, interface, self._distro, installed)
+        return situation._replace(launched=self._others) if self._others else situation
 
     def of_class(self, plugin_class: str) -> NodeInterface | None:
         hit = self._library.of_class(plugin_class, distro=self._distro)

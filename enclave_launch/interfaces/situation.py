@@ -27,7 +27,7 @@ def situation_of_process(
         distro=distro,
         node=node.name,
         namespace=node.namespace,
-        parameters=_parameters(process, node.namespace, node.name),
+        parameters={**parameters_of_node(process, node.namespace, node.name), **interface.own_parameters},
         words=tuple(own_words(process)),
         installed=installed,
     )
@@ -43,19 +43,19 @@ def situation_of_component(
     """Of one node of ``component``: its main node gets what the load request says, a further one what the container's
     command line says. Raises ``LaunchFileError`` as ``situation_of_process``."""
     node = node_of_component(component, container, interface, "/")
-    parameters: Mapping[str, ParameterValue] = component.parameters
+    parameters: Mapping[str, object] = component.parameters
     if interface.own_rules:
-        parameters = _parameters(container, node.namespace, node.name) if container else {}
+        parameters = parameters_of_node(container, node.namespace, node.name) if container else {}
     return Situation(
         distro=distro,
         node=node.name,
         namespace=node.namespace,
-        parameters=parameters,
+        parameters={**parameters, **interface.own_parameters},
         installed=installed,
     )
 
 
-def _parameters(process: ResolvedProcess, namespace: str, name: str) -> Mapping[str, ParameterValue]:
+def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> Mapping[str, ParameterValue]:
     """What the command line of ``process`` gives the node of this final name."""
     tokens = [token for token in (*namespace.split("/"), name) if token]
     written = process.parameter_files

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_launch.process import ResolvedProcess
+from enclave_launch.ros_rules.ros_arguments import is_bare_rule
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
 
 
@@ -79,6 +80,6 @@ def own_words(process: ResolvedProcess) -> Sequence[str]:
             inside = True
         elif inside:
             inside = word != "--"
-        elif ":=" not in word:  # outside, a bare rule is a deprecated remap
+        elif not is_bare_rule(word):
             words.append(word)
     return words

@@ -11,6 +11,8 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from nodl.remap import InvalidRemapRuleError, parse_rule
+
 _REMAP = ("-r", "--remap")
 _PARAMETER = ("-p", "--param")
 _PARAMETER_FILE = ("--params-file",)
@@ -84,8 +86,19 @@ def _flags(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
             value = next(words, None)
             if value is not None:
                 yield word, value
-        elif not inside and ":=" in word:
+        elif not inside and is_bare_rule(word):
             yield _REMAP[0], word
+
+
+def is_bare_rule(word: str) -> bool:
+    """Whether rcl takes ``word`` outside of its arguments as a remap rule; what does not parse is the program's own."""
+    if ":=" not in word:
+        return False
+    try:
+        parse_rule(word)
+    except InvalidRemapRuleError:
+        return False
+    return True
 
 
 def _parameter_rule(text: str) -> ParameterRule:

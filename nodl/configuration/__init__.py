@@ -16,8 +16,11 @@ from nodl.source_ref import SourceRef
 
 
 class Configured(NamedTuple):
+    """``nodes``: names of further nodes that the program makes, of which nothing else is known to differ."""
+
     endpoints: tuple[Endpoint, ...] = ()
     gaps: tuple[Gap, ...] = ()
+    nodes: tuple[str, ...] = ()
 
 
 def read_configuration(kind: str, file: str, situation: Situation, place: SourceRef) -> Configured:
@@ -26,6 +29,10 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         from nodl.configuration.ros_gz_bridge import of_arguments
 
         return of_arguments(situation.words, place)
+    if kind == "ros2_control":
+        from nodl.configuration.ros2_control import of_robot_description
+
+        return of_robot_description(situation.launched.robot_description, place)
     if not file:
         return Configured(
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)

@@ -65,6 +65,7 @@ class FurtherNode(NamedTuple):
 class PluginList(NamedTuple):
     """Plugins that the node loads. ``parameter`` holds the names of the instances (a list, a text, or a pattern with
     ``*``); the parameter ``type`` (a template with ``$(plugin)``) holds the class of each. ``types``: default classes.
+    ``spawned``: spawners of the launch name instances too.
     """
 
     parameter: str
@@ -72,6 +73,7 @@ class PluginList(NamedTuple):
     type: str = "$(plugin).plugin"
     types: Mapping[str, str] = MappingProxyType({})
     when: When = When()
+    spawned: bool = False
 
 
 class Transport(NamedTuple):
@@ -87,10 +89,12 @@ class Transport(NamedTuple):
 
 
 class Configuration(NamedTuple):
-    """A file (or command line) of a tool's own format that names what it needs; ``kind`` chooses the reader."""
+    """A file (or command line) of a tool's own format that names what it needs; ``kind`` chooses the reader.
+    ``document`` describes the nodes that it names, if it does."""
 
     kind: str
     file: str = ""
+    document: str = ""
     when: When = When()
 
 
@@ -123,6 +127,25 @@ class Dependence(NamedTuple):
     tf_listener: bool = False
 
 
+class Spawned(NamedTuple):
+    """A controller that a spawner of the launch loads. ``manager``: full name of the controller manager; ``type``: its
+    class, empty where the spawner gives none; ``rules``: remap rules of the controller's own."""
+
+    controller: str
+    manager: str
+    type: str = ""
+    parameters: Mapping[str, object] = MappingProxyType({})
+    rules: tuple[str, ...] = ()
+
+
+class Launched(NamedTuple):
+    """What else the launch starts, as far as this node depends on it. ``robot_description``: the URDF that a node has
+    as its parameter."""
+
+    robot_description: str = ""
+    spawned: tuple[Spawned, ...] = ()
+
+
 class Situation(NamedTuple):
     """One start of a node. ``node`` and ``namespace`` are final; ``words``: of its command line, without ROS arguments.
 
@@ -135,3 +158,4 @@ class Situation(NamedTuple):
     parameters: Mapping[str, object] = MappingProxyType({})
     words: tuple[str, ...] = ()
     installed: frozenset[str] | None = None
+    launched: Launched = Launched()

@@ -16,6 +16,7 @@ from nodl.dependence import (
     FurtherNode,
     PluginList,
     Situation,
+    Spawned,
     Transport,
     Variation,
 )
@@ -112,17 +113,20 @@ class _Application:
             self.gaps.append(Gap(by.source, "plugins that load plugins are nested too deep"))
             return
         instances = list(scope.items(plugins.parameter))
+        types = dict(plugins.types)
+        if plugins.spawned:
+            for spawned in self._spawned():
+                instances.append(spawned.controller)
+                types |= {spawned.controller: spawned.type} if spawned.type else {}
         if not instances and scope.value(plugins.parameter) is None:
             instances = [scope.fill(name).text or "" for name in plugins.default]
         for instance in dict.fromkeys(instances):
-            self._load_one(instance, plugins, scope, by, depth)
+            self._load_one(instance, plugins._replace(types=types), by, depth)
 
-    def _load_one(
-        self, instance: str, plugins: PluginList, scope: Scope, by: NodeInterface, depth: int
-    ) -> None:
-        inner = Scope(self._situation, {}, {}, instance)
+    def _load_one(self, instance: str, plugins: PluginList, by: NodeInterface, depth: int) -> None:
+        inner = Scope(self._situation, (by.depends or _NOTHING).defaults, {}, instance)
         class_parameter = inner.fill(plugins.type).text
-        value = scope.value(class_parameter or "", plugins.types.get(instance))
+        value = inner.value(class_parameter or "", plugins.types.get(instance))
         if value is None:
             self.gaps.append(
                 Gap(by.source, f"the class of plugin '{instance}' is not known: {class_parameter} is not set")
@@ -135,9 +139,23 @@ class _Application:
             )
             return
         if described.depends is not None and described.depends.own_node:
-            self.further.append(described._replace(name=instance, own_rules=(f"__node:={instance}",)))
+            self.further.append(self._own_node(described, instance))
             return
         self.describe(described, instance, (f"plugin {instance} of class {value.value}",), depth + 1)
+
+    def _own_node(self, described: NodeInterface, instance: str) -> NodeInterface:
+        """A plugin that is a node: a controller, with what its spawner gives it."""
+        mine = [item for item in self._spawned() if item.controller == instance]
+        return described._replace(
+            name=instance,
+            own_rules=(f"__node:={instance}", *(rule for item in mine for rule in item.rules)),
+            own_parameters={name: value for item in mine for name, value in item.parameters.items()},
+        )
+
+    def _spawned(self) -> Iterator[Spawned]:
+        """The controllers that spawners of the launch load into this node."""
+        manager = join(self._situation.namespace, self._situation.node)
+        return (item for item in self._situation.launched.spawned if item.manager == manager)
 
     def _transport(
         self, transport: Transport, scope: Scope, by: NodeInterface, notes: tuple[str, ...]
@@ -202,6 +220,14 @@ class _Application:
         found = read_configuration(configuration.kind, file or "", self._situation, by.source)
         self.endpoints.extend(found.endpoints)
         self.gaps.extend(found.gaps)
+        for name in found.nodes:
+            described = self._documents.named(configuration.document)
+            if described is None:
+                self.gaps.append(
+                    Gap(by.source, f"no document {configuration.document} describes node '{name}'")
+                )
+            else:
+                self.further.append(described._replace(name=name, own_rules=(f"__node:={name}",)))
 
 
 _LONE = re.compile(r"\$\(param (?:[^ ()$]|\$\([a-z]+\))+\)\Z")

@@ -21,6 +21,7 @@ from nodl.dependence import Situation, Test, When
 from nodl.name_template import NameTemplate, Part, UnknownPart
 
 _REFERENCE = re.compile(r"\$\(([a-z]+)(?: ([^()]*))?\)")
+_ARGUMENTS = "arguments "
 _HELD = re.compile("\x00([0-9]+)\x00")
 
 
@@ -82,10 +83,14 @@ class Scope:
         return not when.any_of or any(all(self._passes(t, item) for t in group) for group in when.any_of)
 
     def items(self, each: str) -> Iterator[str]:
-        """The entries of a list parameter, the words of a text, or what ``*`` stands for in parameter names."""
+        """The entries of a list parameter, the words of a text, what ``*`` (or ``#``, a number) stands for in parameter
+        names, or with ``arguments N`` the words of the command line from the N-th on."""
         each = self._plain(each)
-        if "*" in each:
-            pattern = re.compile(re.escape(each).replace(r"\*", "([^.]+)"))
+        if each.startswith(_ARGUMENTS):
+            yield from self._arguments[int(each.removeprefix(_ARGUMENTS)) - 1 :]
+            return
+        if "*" in each or "#" in each:
+            pattern = re.compile(re.escape(each).replace(r"\*", "([^.]+)").replace(r"\#", "([0-9]+)"))
             found = (pattern.fullmatch(name) for name in self.situation.parameters)
             yield from dict.fromkeys(match[1] for match in found if match)
             return
@@ -121,7 +126,10 @@ class Scope:
 
     def _passes(self, test: Test, item: str) -> bool:
         name = self._plain(test.parameter).replace("$(item)", item)
-        if name.startswith("argument "):
+        found: Value | None
+        if name == "words":
+            found = Value(self.situation.words, "the command line")
+        elif name.startswith("argument "):
             found = self.argument(name.removeprefix("argument "))
         else:
             found = self.value(name)

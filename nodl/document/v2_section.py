@@ -65,6 +65,7 @@ _PLUGINS = map_of(
         "default": _TEXTS,
         "type": text_of(),
         "types": map_of(others=text_of()),
+        "spawned": boolean,
         **_CONDITION,
     },
     required=("parameter",),
@@ -73,7 +74,9 @@ _TRANSPORT = map_of(
     {"side": one_of(*_SIDES), "base": text_of(), "parameter": text_of(), **_CONDITION},
     required=("side", "base"),
 )
-_CONFIGURATION = map_of({"kind": text_of(), "file": text_of(), **_CONDITION}, required=("kind",))
+_CONFIGURATION = map_of(
+    {"kind": text_of(), "file": text_of(), "document": text_of(), **_CONDITION}, required=("kind",)
+)
 _GAP = map_of({"why": text_of(), "each": text_of(), **_CONDITION}, required=("why",))
 _EVIDENCE = map_of(
     {
@@ -165,7 +168,7 @@ def dependence_of(root: YamlMap) -> Dependence | None:
             for each in _maps(given, "transports")
         ),
         configurations=tuple(
-            Configuration(each["kind"], each.get("file", ""), _when(each))
+            Configuration(each["kind"], each.get("file", ""), each.get("document", ""), _when(each))
             for each in _maps(given, "configurations")
         ),
         gaps=tuple(StatedGap(e["why"], e.get("each", ""), _when(e)) for e in _maps(given, "gaps")),
@@ -212,7 +215,9 @@ def _plugins(each: Mapping[str, object]) -> PluginList:
     assert isinstance(default, (list, tuple))
     assert isinstance(types, dict)
     kind = str(each.get("type") or PluginList("").type)
-    return PluginList(str(each["parameter"]), tuple(default), kind, types, _when(each))
+    return PluginList(
+        str(each["parameter"]), tuple(default), kind, types, _when(each), each.get("spawned") is True
+    )
 
 
 def _when(each: Mapping[str, object]) -> When:

@@ -1,0 +1,29 @@
+"""The hardware components in a robot description: each runs a node named after it.
+
+Source: ros-controls/ros2_control jazzy, hardware_component_interface.cpp: the name of the ``ros2_control`` element in
+small letters, ``/`` as ``_``.
+"""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+from nodl.configuration import Configured
+from nodl.node_interface import Gap
+from nodl.source_ref import SourceRef
+
+
+def of_robot_description(text: str, place: SourceRef) -> Configured:
+    """``text``: URDF, as a node of the launch publishes it; empty when no node of the launch has one."""
+    if not text:
+        why = (
+            "no node of this launch has a robot_description, which names the nodes of the hardware components"
+        )
+        return Configured(gaps=(Gap(place, why),))
+    try:
+        root = ElementTree.fromstring(text)
+    except (ElementTree.ParseError, ValueError) as error:
+        why = f"the robot_description, which names the nodes of the hardware components, cannot be read: {error}"
+        return Configured(gaps=(Gap(place, why),))
+    names = (element.get("name", "").lower().replace("/", "_") for element in root.iter("ros2_control"))
+    return Configured(nodes=tuple(dict.fromkeys(name for name in names if name)))
