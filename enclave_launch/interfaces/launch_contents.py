@@ -64,7 +64,7 @@ def _spawned(process: ResolvedProcess) -> Iterator[Spawned]:
     for name in (*names, *_values(options, _NAME)):
         tokens = [token for token in (*namespace.split("/"), name) if token]
         of_its_own = parameters_of_node(process, namespace or "/", name)
-        parameters = {**of_its_own, **resolve_parameters(tokens, files)}
+        parameters = {**of_its_own, **resolve_parameters(tokens, files).values}
         given = _values(options, _TYPE)
         yield Spawned(
             controller=name,
