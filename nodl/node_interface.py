@@ -7,9 +7,7 @@ whoever derives permissions from them no longer asks where they came from, but c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from enum import Enum
-from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.name_template import NameTemplate
@@ -97,6 +95,6 @@ class NodeInterface(NamedTuple):
     parameters: tuple[str, ...] = ()
     gaps: tuple[Gap, ...] = ()
     own_rules: tuple[str, ...] = ()
-    own_parameters: Mapping[str, object] = MappingProxyType({})
+    own_parameters: tuple[tuple[str, object], ...] = ()
     parameter_services: bool = True
     depends: Dependence | None = None

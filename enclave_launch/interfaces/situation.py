@@ -6,16 +6,17 @@ description has there. Reads the parameter files on the command line.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from enclave_launch.policy.program_inputs import own_words
-from enclave_launch.policy.running_node import node_of_component, node_of_process
+from enclave_launch.policy.running_node import RunningNode, node_of_component, node_of_process
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_parameters
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from nodl.dependence import Situation
 from nodl.node_interface import NodeInterface
+from nodl.remap import NodeNames
 
 
 def situation_of_process(
@@ -27,9 +28,13 @@ def situation_of_process(
         distro=distro,
         node=node.name,
         namespace=node.namespace,
-        parameters={**parameters_of_node(process, node.namespace, node.name), **interface.own_parameters},
+        parameters={
+            **parameters_of_node(process, node.namespace, node.name),
+            **dict(interface.own_parameters),
+        },
         words=tuple(own_words(process)),
         installed=installed,
+        remap=_remap(node),
     )
 
 
@@ -50,8 +55,9 @@ def situation_of_component(
         distro=distro,
         node=node.name,
         namespace=node.namespace,
-        parameters={**parameters, **interface.own_parameters},
+        parameters={**parameters, **dict(interface.own_parameters)},
         installed=installed,
+        remap=_remap(node),
     )
 
 
@@ -65,3 +71,9 @@ def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> M
         lambda path: parameters_of_text(written[path], path) if path in written else None,
         process.cwd,
     ).values
+
+
+def _remap(node: RunningNode) -> Callable[[str], str]:
+    """What a topic that the node's code names is called in the end. Raises ``InvalidNameError``."""
+    names = NodeNames(node.name, node.namespace, node.rules)
+    return lambda name: names.topic(name).name

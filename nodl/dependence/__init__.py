@@ -8,7 +8,7 @@ a description and a ``Situation`` into the interface that this one start has. do
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -110,7 +110,7 @@ class Dependence(NamedTuple):
     """All of it for one document. ``defaults``: of the parameters. ``options``: command-line options that take a value,
     by their name here. ``node_name``: a template for the node's own name; ``random_name``: the program appends ``_``
     and something of its own making, unless launch names the node. ``own_node``: a plugin that is a node, named
-    as its instance. ``tf_listener``: it makes a ``TransformListener`` without a node, which then makes its own.
+    as its instance. ``tf_listener``: when it makes a ``TransformListener`` without a node, which then makes its own.
     """
 
     variations: Mapping[tuple[EndpointKind, str], Variation] = MappingProxyType({})
@@ -124,7 +124,7 @@ class Dependence(NamedTuple):
     node_name: str = ""
     random_name: bool = False
     own_node: bool = False
-    tf_listener: bool = False
+    tf_listener: When | None = None
 
 
 class Spawned(NamedTuple):
@@ -149,7 +149,8 @@ class Launched(NamedTuple):
 class Situation(NamedTuple):
     """One start of a node. ``node`` and ``namespace`` are final; ``words``: of its command line, without ROS arguments.
 
-    ``installed``: the packages of the ament index, ``None`` when nothing can be said about them.
+    ``installed``: the packages of the ament index, ``None`` when nothing can be said about them. ``remap``: the final
+    name of a topic, for programs that ask for it and make other names from it.
     """
 
     distro: str
@@ -159,3 +160,4 @@ class Situation(NamedTuple):
     words: tuple[str, ...] = ()
     installed: frozenset[str] | None = None
     launched: Launched = Launched()
+    remap: Callable[[str], str] = str

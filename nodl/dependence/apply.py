@@ -86,7 +86,7 @@ class _Application:
         depends = interface.depends or _NOTHING
         scope = Scope(self._situation, depends.defaults, depends.options, plugin)
         for endpoint in interface.endpoints:
-            if depends.tf_listener and _is_of_tf_listener(endpoint):
+            if depends.tf_listener is not None and _is_of_tf_listener(endpoint):
                 continue
             variation = depends.variations.get((endpoint.kind, endpoint.name.text))
             self.endpoints.extend(_varied(endpoint, variation or Variation(), scope, notes))
@@ -103,7 +103,7 @@ class _Application:
             self._further(node, scope, interface)
         for configuration in depends.configurations:
             self._configured(configuration, scope, interface)
-        if depends.tf_listener:
+        if depends.tf_listener is not None and scope.holds(depends.tf_listener):
             self.further.append(_tf_listener(self._main))
 
     def _load(self, plugins: PluginList, scope: Scope, by: NodeInterface, depth: int) -> None:
@@ -149,7 +149,7 @@ class _Application:
         return described._replace(
             name=instance,
             own_rules=(f"__node:={instance}", *(rule for item in mine for rule in item.rules)),
-            own_parameters={name: value for item in mine for name, value in item.parameters.items()},
+            own_parameters=tuple(pair for item in mine for pair in item.parameters.items()),
         )
 
     def _spawned(self) -> Iterator[Spawned]:

@@ -5,6 +5,8 @@
     $(argument N [DEFAULT])      the N-th word of the command line that is neither option nor value of one, from 1
     $(item) $(plugin)            the entry of ``each``, the instance of a plugin list
     $(node) $(namespace)         the node's final name and namespace
+    $(remapped NAME)             the final name of a topic, where the program asks for it itself
+    $(camera_info NAME)          the camera_info beside the final name of an image
     $(parent)                    the namespace less its last part: that of the node which made a costmap
 
 Inner references are replaced first: ``$(param $(plugin).topic)``.
@@ -20,7 +22,7 @@ from nodl.builtin_interfaces import DISTROS
 from nodl.dependence import Situation, Test, When
 from nodl.name_template import NameTemplate, Part, UnknownPart
 
-_REFERENCE = re.compile(r"\$\(([a-z]+)(?: ([^()]*))?\)")
+_REFERENCE = re.compile(r"\$\(([a-z_]+)(?: ([^()]*))?\)")
 _ARGUMENTS = "arguments "
 _HELD = re.compile("\x00([0-9]+)\x00")
 
@@ -165,6 +167,8 @@ class _Filling:
         name, blank, default = rest.partition(" ")
         name = self._released(name)
         given = self._released(default).strip("'") if blank else None
+        if word in ("remapped", "camera_info"):
+            return self._hold(self._remapped(word, name))
         look = {"param": self._scope.value, "option": self._scope.option, "argument": self._scope.argument}[
             word
         ]
@@ -174,6 +178,11 @@ class _Filling:
             return self._hold(None)
         self._notes.append(found.origin)
         return self._hold(_text(found.value, lower=False))
+
+    def _remapped(self, word: str, name: str) -> str:
+        """``image_transport::getCameraInfoTopic`` takes the remapped name of the image, and what stands beside it."""
+        final = self._scope.situation.remap(name)
+        return final if word == "remapped" else f"{final.rpartition('/')[0]}/camera_info"
 
     def _hold(self, text: str | None) -> str:
         self._held.append(text)

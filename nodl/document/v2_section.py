@@ -121,7 +121,7 @@ SECTION = map_of(
         "classes": _TEXTS,
         "own_node": boolean,
         "random_name": boolean,
-        "tf_listener": boolean,
+        "tf_listener": either(map_of(_CONDITION), boolean),
         "node_name": text_of(),
         "options": map_of(others=_TEXTS),
         "names": map_of({category: map_of(others=_VARIATION) for category in CATEGORIES}),
@@ -177,7 +177,7 @@ def dependence_of(root: YamlMap) -> Dependence | None:
         node_name=str(given.get("node_name") or ""),
         random_name=given.get("random_name") is True,
         own_node=given.get("own_node") is True,
-        tf_listener=given.get("tf_listener") is True,
+        tf_listener=_tf_listener(given.get("tf_listener")),
     )
 
 
@@ -188,6 +188,12 @@ def plain(value: YamlValue) -> object:
     if isinstance(value, YamlList):
         return [plain(item) for item in value.items]
     return {name: plain(item) for name, item in value.items.items()}
+
+
+def _tf_listener(given: object) -> When | None:
+    if isinstance(given, dict):
+        return _when(given)
+    return When() if given is True else None
 
 
 def _maps(given: Mapping[str, object], key: str) -> list[dict[str, str]]:
