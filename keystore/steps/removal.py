@@ -62,7 +62,8 @@ def remove(
     """Revoke what they have and had, publish the CRL to all remaining enclaves, then delete. Repeating completes an
     interrupted run.
 
-    Enclaves below a removed one stay. Raises InvalidInput for an enclave that is not there.
+    Enclaves below a removed one stay. One whose files are lost is revoked as the register knows it. Raises InvalidInput
+    for an enclave that was never there.
     """
     chosen = options or RemoveOptions()
     now = chosen.now or utc_now()
@@ -70,14 +71,18 @@ def remove(
     root = resolve_root(keystore)
     KeystoreView(root).require_complete()
     with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
-        unknown = sorted(set(wanted) - set(KeystoreView(root).enclaves()))
+        view = KeystoreView(root)
+        lost = {one.enclave for one in revocable(view, opened.register, wanted)}
+        unknown = sorted(set(wanted) - set(view.enclaves()) - lost)
         if unknown:
             raise InvalidInput(
                 f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
             )
         warnings = _strike(opened, wanted, chosen, now)
         for name in wanted:
-            _delete(opened, name)
+            opened.remove(layout.shares(name))
+            if opened.is_directory(layout.enclave_directory(name)):
+                _delete(opened, name)
         issuer = fingerprint(KeystoreView(root).ca(Role.IDENTITY).der)
         return RemoveReport(tuple(wanted), len(opened.register.revoked(issuer)), tuple(warnings))
 
@@ -116,7 +121,6 @@ def revoke_replaced(opened: Store, names: Iterable[str], access: CaAccess, now: 
 def _delete(opened: Store, name: str) -> None:
     """Exactly the files of this enclave; the root's governance belongs to the keystore."""
     directory = layout.enclave_directory(name)
-    opened.remove(layout.shares(name))
     for file in _DELETE_ORDER:
         if not (name == "/" and file == layout.ENCLAVE_GOVERNANCE):
             opened.remove(f"{directory}/{file}")

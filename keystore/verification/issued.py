@@ -81,10 +81,7 @@ def check_published(view: KeystoreView, register: Register | None, now: datetime
             yield Finding(
                 Severity.WARNING, "enclave-gone", layout.enclave_directory(enclave),
                 f"is not here, but its certificate is valid until {iso(held.not_after)} and not revoked",
-                repair.run(
-                    view.root, "create-enclave", enclave,
-                    note="makes it anew; or restore it from a backup. To end it: then secure-keystore remove",
-                ),
+                repair.run(view.root, "remove", enclave, note="revokes it; or restore it from a backup"),
             )  # fmt: skip
 
 

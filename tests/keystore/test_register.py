@@ -196,6 +196,15 @@ class TestRevocations:
         remove(root, ["/b"], options=QUICK)
         assert is_revoked(root, first)
 
+    def test_an_enclave_whose_files_are_lost_is_revoked_all_the_same(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks")
+        lost = serial(root, "/b")
+        shutil.rmtree(root / "enclaves/b")
+        assert remove(root, ["/b"], options=QUICK).revoked == 1
+        assert is_revoked(root, lost) and codes(root) == set()
+        with pytest.raises(InvalidInput, match="no enclave /b"):
+            remove(root, ["/b"], options=QUICK)
+
 
 class TestRightsThatAreTakenAway:
     def reduced(self, tmp_path: Path) -> Path:
