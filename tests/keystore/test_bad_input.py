@@ -46,7 +46,7 @@ ARGUMENTS = {
     "not a keystore": ["verify", "."],
     "enclave that leaves": ["remove", "KS", "/../private"],
     "enclave with a line break": ["renew", "KS", "/a\n"],
-    "bundle in a missing folder": ["export", "KS", "-o", "no/where/out", "--enclave", "/a"],
+    "bundle below a file": ["export", "KS", "-o", "KS/secure-keystore.json/out", "--enclave", "/a"],
     "bundle in the keystore": ["export", "KS", "-o", "KS/enclaves/out", "--enclave", "/a"],
     "policy is a folder": ["apply-policy", "KS", "."],
     "governance is a folder": ["governance", "KS", "."],
