@@ -288,10 +288,9 @@ def _component(component: ResolvedComponent) -> LoadedComponent:
 
 
 def _plain(parameters: Mapping[str, object]) -> dict[str, object]:
-    """Only what may be a name: texts and lists of them."""
-    return {
-        name: value
-        for name, value in parameters.items()
-        if isinstance(value, (str, bool))
-        or (isinstance(value, tuple) and all(isinstance(v, str) for v in value))
-    }
+    """As JSON has them; byte strings, which are no names, are left out."""
+    return {name: value for name, value in parameters.items() if not _has_bytes(value)}
+
+
+def _has_bytes(value: object) -> bool:
+    return isinstance(value, bytes) or (isinstance(value, tuple) and any(isinstance(v, bytes) for v in value))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -73,7 +74,12 @@ def _record(
     start: Start,
     markers: MarkerRun | None = None,
 ) -> int:
-    run = new_run(target.launch_file, options.distro or "", isolation.value, secured=options.secure)
+    run = new_run(
+        target.launch_file,
+        options.distro or os.environ.get("ROS_DISTRO", ""),
+        isolation.value,
+        secured=options.secure,
+    )
     recording = Recording(run, [QuietWatch(patience)], markers)
     status = start(recording)
     keep_record(folder, run, recording.data)

@@ -102,6 +102,7 @@ class AskedNode(NamedTuple):
     container: bool = False
     process: str = ""
     location: str = ""
+    distro: str = ""
 
     @property
     def program(self) -> str:

@@ -2,7 +2,8 @@
 
 A process of the record belongs to the process that the supervisor started if it is in its session, or if one of its
 parents is: a shell or ``nice`` has another pid than the node behind it. Nodes of a container belong to the components
-that the launch asked it to load, by final name and, where names are equal, in the order of the requests.
+that the launch asked it to load, by final name and, where names are equal, in the order of the requests; a node that
+no request names was made by the component before it (loads of one container run one after another).
 """
 
 from __future__ import annotations
@@ -163,10 +164,12 @@ class Record:
         if process.started is None or process.started.kind != "container":
             return
         taken = {id(node.component) for node in process.nodes.values() if node.component}
+        before: LoadedComponent | None = None
         for node in process.nodes.values():
             if node.component is None and node.fqn and node.fqn != container:
-                node.component = self._component(node, container, taken)
+                node.component = self._component(node, container, taken) or before
                 taken.add(id(node.component))
+            before = node.component
 
     def _component(self, node: RecordedNode, container: str, taken: set[int]) -> LoadedComponent | None:
         """The first request with this name; a plugin may have been loaded twice under one."""

@@ -25,6 +25,8 @@ from nodl.record.origins import (
 )
 
 _NUMBERED = re.compile(r"(.+?)_((?:0x)?(?=[0-9a-f]*[0-9])[0-9a-f]{6,}|[0-9]{3,})\Z")
+_TF_LISTENER = "transform_listener_impl_*"
+"""The node that tf2_ros makes for a ``TransformListener`` that was given none; our section has a word for it."""
 _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ros, when it is given no name
 
 _UNKNOWN_TYPES = {
@@ -62,7 +64,10 @@ class ProgramKey(NamedTuple):
 
 
 class LearntNode(NamedTuple):
-    """One node of one program. ``incomplete`` and ``notes`` are for the person who reads the manifest."""
+    """One node of one program. ``incomplete`` and ``notes`` are for the person who reads the manifest.
+
+    ``random_name``: the program appends ``_`` and something to the name; ``tf_listener``: it makes a node for tf2.
+    """
 
     key: ProgramKey
     library: ClientLibrary
@@ -72,6 +77,8 @@ class LearntNode(NamedTuple):
     runs: tuple[Run, ...]
     incomplete: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    random_name: bool = False
+    tf_listener: bool = False
 
     @property
     def program(self) -> str:
@@ -93,26 +100,37 @@ class _Seen(NamedTuple):
 def learn(records: Iterable[Record]) -> Learnt:
     """What all ``records`` together teach; order does not matter."""
     groups: dict[ProgramKey, list[_Seen]] = {}
+    listeners: set[ProgramKey] = set()
     unforeseeable: set[str] = set()
     for record in sorted(records, key=lambda record: record.run.id):
+        before: dict[tuple[str, str], ProgramKey] = {}  # the last node of each program in each process
         for node in all_asked(record.attributed()):
             if not node.known_start or node.container:
                 continue
-            pattern = _unforeseeable(node)
-            if pattern:
+            place, pattern = (node.process, node.program), _unforeseeable(node)
+            if pattern == _TF_LISTENER and place in before:
+                listeners.add(before[place])
+            elif pattern:
                 unforeseeable.add(f"{pattern} of {node.program}")
             else:
+                before[place] = _key(node)
                 groups.setdefault(_key(node), []).append(_Seen(node, record.run))
-    nodes = tuple(_learnt(key, groups[key]) for key in sorted(groups))
-    return Learnt(nodes, tuple(sorted(unforeseeable)))
+    nodes = [_learnt(key, groups[key]) for key in sorted(groups)]
+    return Learnt(
+        tuple(node._replace(tf_listener=node.key in listeners) for node in nodes),
+        tuple(sorted(unforeseeable)),
+    )
 
 
 def _unforeseeable(node: AskedNode) -> str:
-    """The final name as a pattern, if the program makes it of a number or an address: another one in each run."""
+    """The final name as a pattern, where rules inside the program make it of a number or an address: another one in
+    each run. A number in the source's own name is learnt (``random_name``)."""
     name = node.fqn.rpartition("/")[2]
-    numbered = _numbered(name)
-    given = node.rules.node_name(node.name).rules  # by the launch, so it is the same next time
-    return f"{numbered}_*" if numbered and not given else ""
+    pattern = f"{_numbered(name)}_*"
+    if pattern == _TF_LISTENER:
+        return pattern
+    by_code = _numbered(name) and name != node.name and not node.rules.node_name(node.name).rules
+    return pattern if by_code else ""
 
 
 def _numbered(name: str) -> str:
@@ -138,6 +156,7 @@ def _learnt(key: ProgramKey, seen: Sequence[_Seen]) -> LearntNode:
         tuple({each.run.id: each.run for each in seen}.values()),
         tuple(_missing(lifecycle, seen)),
         tuple(_notes(entries, seen)),
+        random_name=any(_numbered(each.node.name) for each in seen),
     )
 
 

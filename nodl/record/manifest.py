@@ -74,6 +74,8 @@ def _section(node: LearntNode) -> dict[str, Any]:
         "library": node.library.value if node.library is not ClientLibrary.UNKNOWN else "",
         "lifecycle": node.lifecycle,
         "logger_services": node.logger_services,
+        "random_name": node.random_name,
+        "tf_listener": node.tf_listener,
         "incomplete": [_line(text) for text in node.incomplete],
         "runs": [_run(run._asdict()) for run in node.runs],
         "endpoints": [_about(entry) for entry in node.entries],

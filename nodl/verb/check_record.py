@@ -1,4 +1,4 @@
-"""Hold manifests and inference against records of what nodes really asked for (secure-launch --learn writes them)."""
+"""Hold manifests, inference and the library against records of what nodes asked for (secure-launch --learn)."""
 
 from __future__ import annotations
 
@@ -9,21 +9,23 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from nodl.names import split_fqn
 from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
+    from nodl.library import Library
     from nodl.lookup import ManifestLookup
     from nodl.node_interface import NodeInterface
     from nodl.record.asked import AskedNode
     from nodl.record.checking import Comparison
 
-JUDGED = ("manifest", "inference")
+JUDGED = ("manifest", "inference", "library")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
     parser = subparsers.add_parser(
         "check-record",
-        help="hold manifests and inference against recorded nodes",
+        help="hold manifests, inference and the library against recorded nodes",
         description=__doc__,
         epilog="exit status: 0 nothing is missing or wrong, 1 something is, 2 a record cannot be used",
     )
@@ -35,7 +37,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "--judge",
         choices=(*JUDGED, "all"),
         default="all",
-        help="what to hold against the records: manifests, inference from source, or each that says something",
+        help="what to hold against the records: manifests, inference from source, the library, or each that speaks",
     )
     parser.add_argument("--format", choices=("text", "json"), default="text")
     add_prefix_argument(parser)
@@ -44,7 +46,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 class Judgement(NamedTuple):
-    """``described_by``: ``manifest`` or ``inference``; ``comparison`` ``None``: it says nothing of the node."""
+    """``described_by``: one of ``JUDGED``; ``comparison`` ``None``: it says nothing of the node."""
 
     node: AskedNode
     described_by: str
@@ -83,7 +85,11 @@ def _recorded(files: Iterable[Path]) -> tuple[list[AskedNode], list[str]]:
     complaints: list[str] = []
     for file in files:
         record = read_record(file.read_bytes())
-        nodes += [node for node in all_asked(record.attributed()) if node.known_start and not node.container]
+        nodes += [
+            node._replace(distro=record.run.distro)
+            for node in all_asked(record.attributed())
+            if node.known_start and not node.container
+        ]
         complaints += [f"{file}: {complaint.why}" for complaint in record.complaints]
     return nodes, complaints
 
@@ -94,7 +100,7 @@ def _judge(
     from nodl.record.checking import compare
 
     for judge in judges:
-        interfaces, why = (_described if judge == "manifest" else _inferred)(node, lookup, prefixes)
+        interfaces, why = _SAYS[judge](node, lookup, prefixes)
         yield Judgement(node, judge, compare(node, interfaces) if interfaces else None, why)
 
 
@@ -112,6 +118,47 @@ def _inferred(
 
     inferred = infer_executable(node.package, node.executable or None, node.plugin or None, prefixes=prefixes)
     return inferred.interfaces, inferred.why
+
+
+def _of_library(
+    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str]
+) -> tuple[Sequence[NodeInterface], str]:
+    """As the document is for this start: with the parameters and words that the launch gave it."""
+    from nodl.dependence import Situation
+    from nodl.dependence.apply import applied
+    from nodl.library import Library
+
+    library = Library()
+    hit = library.find(node.package, node.plugin or node.executable, distro=node.distro)
+    if hit is None:
+        return (), "the library has no document of it"
+    namespace, name = split_fqn(node.fqn)
+    situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)
+    documents = _Documents(library, node.distro)
+    done = applied(hit.document.interface, situation, documents)
+    further = [applied(each, situation, documents).interface for each in done.further]
+    return (done.interface, *further), ""
+
+
+class _Documents(NamedTuple):
+    """What documents of the library refer to (``nodl.dependence.apply.Documents``)."""
+
+    library: Library
+    distro: str
+
+    def of_class(self, plugin_class: str) -> NodeInterface | None:
+        hit = self.library.of_class(plugin_class, distro=self.distro)
+        return hit.document.interface if hit else None
+
+    def named(self, name: str) -> NodeInterface | None:
+        hit = self.library.named(name, distro=self.distro)
+        return hit.document.interface if hit else None
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
+        return self.library.transports()
+
+
+_SAYS = {"manifest": _described, "inference": _inferred, "library": _of_library}
 
 
 def _counted(judgements: Sequence[Judgement]) -> list[Judgement]:
