@@ -16,6 +16,7 @@ from enclave_launch.errors import UsageError
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
+from enclave_launch.policy.conditions import ALSO
 
 if TYPE_CHECKING:
     from enclave_launch.runtime.companion import LaunchCompanion
@@ -41,6 +42,7 @@ class ResolveOptions:
     source_folders: tuple[Path, ...] = ()
     accept_patterns: bool = False
     allow_missing_packages: bool = False
+    also: tuple[str, ...] = ()
     accept_prefixes: tuple[str, ...] = ()
     accept_middlewares: tuple[str, ...] = ()
     no_python: bool = False
@@ -50,7 +52,7 @@ class ResolveOptions:
         """One path or name may be given where several can be: text is not taken letter by letter."""
         for name in ("prefixes", "manifests", "library_folders", "source_folders"):
             object.__setattr__(self, name, tuple(map(Path, _several(getattr(self, name)))))
-        for name in ("accept_prefixes", "accept_middlewares"):
+        for name in ("also", "accept_prefixes", "accept_middlewares"):
             object.__setattr__(self, name, _several(getattr(self, name)))
         if isinstance(self.policy, str):
             object.__setattr__(self, "policy", Path(self.policy))
@@ -63,8 +65,12 @@ class ResolveOptions:
     def plan_options(self) -> PlanOptions:
         """Raises ``UsageError`` for a policy file that cannot be used."""
         document = _read_policy(self.policy) if self.policy else None
+        unknown = [name for name in self.also if name not in ALSO]
+        if unknown:
+            raise UsageError(f"--also {unknown[0]}: choose from {', '.join(ALSO)}")
+        policy = PolicyOptions(self.accept_patterns, document, also=frozenset(self.also))
         admission = AdmissionOptions(frozenset(self.accept_prefixes), frozenset(self.accept_middlewares))
-        return PlanOptions(self.enclave_scope, PolicyOptions(self.accept_patterns, document), admission)
+        return PlanOptions(self.enclave_scope, policy, admission)
 
 
 def _several(given: Any) -> tuple[Any, ...]:

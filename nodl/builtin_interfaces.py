@@ -3,7 +3,8 @@
 A missing permission for one of these is fatal inside the node's constructor, a needless one is a gift; so
 each row says for which client library and since which distribution it holds, under which condition, and
 where that is known from. A node of unknown library gets the rows of both. What is off unless a program
-asks for it (logger services, topic statistics, service introspection) is not here: a manifest has to name it.
+asks for it (topic statistics, service introspection) is not here: a manifest has to name it; logger services are
+a row with a condition. A name with ``*`` is of a helper node whose name nobody can foresee.
 ``ros_discovery_info`` is a matter of DDS permissions, not of ROS names, and has its place there.
 Pure; read by policy derivation and by the reports of inference.
 """
@@ -28,6 +29,7 @@ class Condition(Enum):
     TYPE_DESCRIPTION = "unless start_type_description_service is false"
     LIFECYCLE = "lifecycle node"
     CONTAINER = "component container"
+    LOGGER_SERVICES = "with logger services"
     TF_LISTENER = "subscribes to /tf, as a TransformListener does"
 
 
@@ -111,7 +113,30 @@ TABLE: tuple[BuiltIn, ...] = (
             ("list_nodes", "ListNodes"),
         )
     ),
+    *(
+        BuiltIn(
+            _R,
+            f"~/{name}",
+            f"rcl_interfaces/srv/{type_name}",
+            "rclcpp node_logger_services.cpp, rclpy logging_service.py",
+            Condition.LOGGER_SERVICES,
+            since="iron",
+        )
+        for name, type_name in (
+            ("get_logger_levels", "GetLoggerLevels"),
+            ("set_logger_levels", "SetLoggerLevels"),
+        )
+    ),
     BuiltIn(_S, "/tf_static", "tf2_msgs/msg/TFMessage", "tf2_ros transform_listener", Condition.TF_LISTENER),
+    BuiltIn(
+        _R,
+        "transform_listener_impl_*/get_type_description",
+        "type_description_interfaces/srv/GetTypeDescription",
+        "tf2_ros transform_listener.cpp: its helper node is named after an address, in the namespace of the process",
+        Condition.TF_LISTENER,
+        ClientLibrary.RCLCPP,
+        since="iron",
+    ),
 )
 
 

@@ -169,4 +169,5 @@ def _container(subject: _Subject) -> NodeInterface:
         endpoints=(),
         source=SourceRef("rclcpp_components, a container"),
         library=ClientLibrary.RCLCPP,
+        parameter_services=False,  # component_manager.hpp: nor the publisher of parameter events
     )

@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from enclave_launch.policy.running_node import RunningNode
 from nodl.builtin_interfaces import Condition
 from nodl.node_interface import EndpointKind, NodeInterface
 
+ALSO: dict[str, frozenset[Condition]] = {
+    "clock": frozenset({Condition.SIM_TIME}),
+    "logger-services": frozenset({Condition.LOGGER_SERVICES}),
+    "service-events": frozenset(),
+}
+"""What ``--also`` grants every node beyond what it has by itself: ``/clock``, which a node needs once somebody sets
+``use_sim_time`` while it runs; the logger services; ``<service>/_service_event`` of service introspection."""
 
-def conditions_of(node: RunningNode) -> frozenset[Condition]:
-    met = {Condition.ALWAYS}
+
+def conditions_of(node: RunningNode, also: Iterable[str] = ()) -> frozenset[Condition]:
+    met = {Condition.ALWAYS}.union(*(ALSO[name] for name in also))
     if node.interface.parameter_services:
         met.add(Condition.PARAMETERS)
     if node.parameters.get("use_sim_time") is True:

@@ -44,6 +44,7 @@ ProfileKey = tuple[str, str]  # namespace and node name
 class PolicyOptions(NamedTuple):
     """``accept_patterns``: partly known names become wildcards, each with a warning.
 
+    ``also``: what every node gets beyond what it has by itself (``conditions.ALSO``).
     ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: whether rcl remaps action
     names; by default what the distribution does.
     """
@@ -51,6 +52,7 @@ class PolicyOptions(NamedTuple):
     accept_patterns: bool = False
     policy_file: PolicyDocument | None = None
     actions_as_a_whole: bool | None = None
+    also: frozenset[str] = frozenset()
 
 
 class DerivedPolicy(NamedTuple):
@@ -95,6 +97,7 @@ def derive_policy(
                 distro=distro,
                 actions_as_a_whole=distro in _REMAPS_ACTION_NAMES if whole is None else whole,
                 accept_patterns=chosen.accept_patterns,
+                also=chosen.also,
             ),
             chosen.policy_file,
         )

@@ -26,7 +26,7 @@ from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from nodl.builtin_interfaces import Condition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
-from nodl.names import MAX_NAME_LENGTH, InvalidNameError, validate_namespace, validate_node_name
+from nodl.names import MAX_NAME_LENGTH, InvalidNameError, join, validate_namespace, validate_node_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind
 from nodl.remap import ACTION_SERVICES, NodeNames, ParsedRule, Resolved
 
@@ -89,14 +89,30 @@ class NodePermissions:
 
 
 def node_permissions(
-    node: RunningNode, *, distro: str, actions_as_a_whole: bool, accept_patterns: bool
+    node: RunningNode,
+    *,
+    distro: str,
+    actions_as_a_whole: bool,
+    accept_patterns: bool,
+    also: frozenset[str] = frozenset(),
 ) -> NodePermissions:
-    """All that ``node`` needs under its final name. Raises ``ValueError`` for an unknown distribution."""
-    return _Collector(node, distro, actions_as_a_whole, accept_patterns).collect()
+    """All that ``node`` needs under its final name, with what ``also`` adds (``conditions.ALSO``).
+
+    Raises ``ValueError`` for an unknown distribution.
+    """
+    return _Collector(node, distro, actions_as_a_whole, accept_patterns, also).collect()
 
 
 class _Collector:
-    def __init__(self, node: RunningNode, distro: str, actions_as_a_whole: bool, accept_patterns: bool):
+    def __init__(
+        self,
+        node: RunningNode,
+        distro: str,
+        actions_as_a_whole: bool,
+        accept_patterns: bool,
+        also: frozenset[str],
+    ):
+        self._also = also
         self._node = node
         self._fqn = node.fqn
         self._distro = distro
@@ -114,7 +130,10 @@ class _Collector:
             return self._result
         for endpoint in self._node.interface.endpoints:
             self._endpoint(endpoint)
-        self._built_in(_built_in_rows(self._distro, self._node.interface.library, conditions_of(self._node)))
+        if "service-events" in self._also:
+            self._service_events()
+        conditions = conditions_of(self._node, self._also)
+        self._built_in(_built_in_rows(self._distro, self._node.interface.library, conditions))
         for gap in self._node.interface.gaps:
             self._unresolved(None, str(gap.source), gap.why)
         return self._result
@@ -160,12 +179,33 @@ class _Collector:
             event = Permission(Operation.PUBLISH, f"{service}/_service_event", reason._replace(note=note))
             self._result.permissions.append(event)
 
+    def _service_events(self) -> None:
+        """rcl service_event_publisher.c: each service that is introspected has a topic below its own name."""
+        for operation, name, reason in tuple(self._result.permissions):
+            if operation in _SERVICES:
+                events = reason._replace(note="service introspection, by --also service-events")
+                self._result.permissions.append(
+                    Permission(Operation.PUBLISH, f"{name}/_service_event", events)
+                )
+
+    def _helper(self, operation: Operation, name: str, place: str) -> Permission:
+        """What a node of this process serves whose name nobody can foresee."""
+        final = join(self._node.process_namespace, name)
+        note = "a pattern, because its name is made up at each start"
+        self._result.warnings.append(
+            pattern_accepted(self._fqn, operation.value, final, f"{note} ({place})", self._node.location)
+        )
+        return Permission(operation, final, Reason(self._fqn, "built-in", place, name, (), note))
+
     def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
         """Every node has them, by the dozen, and their names need no check but of the length."""
         node, permissions = self._fqn, self._result.permissions
         remapped = self._names.has_rules
         try:
             for operation, name, place in rows:
+                if "*" in name:
+                    permissions.append(self._helper(operation, name, place))
+                    continue
                 rules: tuple[ParsedRule, ...] = ()
                 final = node + name[1:] if name[0] == "~" else name
                 if remapped or len(final) > MAX_NAME_LENGTH:

@@ -43,6 +43,7 @@ class RunningNode(NamedTuple):
     location: SourceLocation
     role: Role = "node"
     inputs: ProgramInputs = ProgramInputs()
+    process_namespace: str = "/"  # of the nodes that its process makes without being asked
 
     @property
     def fqn(self) -> str:
@@ -64,7 +65,8 @@ def node_of_process(
         process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location),
     )
     inputs = program_inputs(process)
-    return _named(interface, rules, process.parameters, enclave, process.location, role, inputs)
+    node = _named(interface, rules, process.parameters, enclave, process.location, role, inputs)
+    return node._replace(process_namespace=_namespace(process))
 
 
 def node_of_component(
@@ -84,7 +86,14 @@ def node_of_component(
     local = _own_rules(interface) or _parse(texts, component.remaps, component.location)
     rules = RemapRules(local=local, process=forwarded)
     inputs = ProgramInputs()
-    return _named(interface, rules, component.parameters, enclave, component.location, "component", inputs)
+    node = _named(interface, rules, component.parameters, enclave, component.location, "component", inputs)
+    return node._replace(process_namespace=_namespace(container)) if container is not None else node
+
+
+def _namespace(process: ResolvedProcess) -> str:
+    """The first ``__ns`` rule of the command line that is for every node."""
+    rules = parse_ros_arguments(process.cmd).remaps
+    return next((rule.partition(":=")[2] for rule in rules if rule.startswith("__ns:=")), "/")
 
 
 def _own_rules(interface: NodeInterface) -> tuple[ParsedRule, ...]:

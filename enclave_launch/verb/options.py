@@ -150,6 +150,15 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
         help="enclave of a process that names none (default: namespace)",
     )
     group.add_argument(
+        "--also",
+        metavar="WHAT",
+        action="append",
+        choices=("clock", "logger-services", "service-events"),
+        default=[],
+        help="grant every node also: clock (use_sim_time set at run time), logger-services, service-events "
+        "(service introspection) (repeatable)",
+    )
+    group.add_argument(
         "--accept-prefix",
         metavar="NAME",
         action="append",

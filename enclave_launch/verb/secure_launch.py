@@ -141,6 +141,7 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
         source_folders=tuple(options.source),
         accept_patterns=options.accept_patterns,
         allow_missing_packages=options.allow_missing_packages,
+        also=tuple(options.also),
         accept_prefixes=tuple(options.accept_prefix),
         accept_middlewares=tuple(options.accept_middleware),
         no_python=options.no_python,

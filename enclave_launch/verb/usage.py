@@ -41,6 +41,7 @@ FOR_PLAN = frozenset(
         "nodl",
         "missing_nodl",
         "accept_patterns",
+        "also",
         "accept_prefix",
         "accept_middleware",
         "enclave_scope",
