@@ -110,12 +110,14 @@ def evaluation_surroundings(host: Host) -> Iterator[None]:
     """What evaluation needs around it, undone at the end: our packages under their public names, the host in
     place, the environment as it was."""
     from enclave_launch.description.install import installed
+    from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
 
     with ExitStack() as stack:
         stack.enter_context(_one_at_a_time)
         stack.enter_context(environment_untouched())
         stack.enter_context(active_host(host))
         stack.enter_context(installed(host.prefixes()))
+        stack.enter_context(libyaml_for_launch_files())
         stack.callback(_forget_elements_of_launch_files)
         yield
 

@@ -27,7 +27,7 @@ MAX_SLOW_CHARACTERS = 500_000  # of a text that only PyYAML's own scanner can re
 # Where libyaml reads otherwise, found by fuzzing: trailing tab, lone tag, "?" in flow context, mark inside.
 _LIBYAML_DIFFERS = re.compile(r"[\t!?\ufeff]")
 # Surely no part of a text whose quotes end in the same line.
-_COMMENT = re.compile(r"(?:^|\s)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
+_COMMENT = re.compile(r"(?<!\S)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ def parse_yaml(text: str) -> YamlDocument:
     if len(text) > MAX_CHARACTERS:
         raise RefusedYaml(f"the text has more than {MAX_CHARACTERS} characters")
     refuse_deep_nesting(text)
-    if not (_LIBYAML_DIFFERS.search(text) and _LIBYAML_DIFFERS.search(_COMMENT.sub("", text))):
+    if libyaml_reads_alike(text):
         try:
             return _load(text, SafeLoader)
         except RefusedYaml:
@@ -56,6 +56,11 @@ def parse_yaml(text: str) -> YamlDocument:
             f"a text with tabs, '!' or '?' outside of comments has more than {MAX_SLOW_CHARACTERS} characters"
         )
     return _load(text, yaml.SafeLoader)
+
+
+def libyaml_reads_alike(text: str) -> bool:
+    """Whether libyaml, where it accepts ``text``, reads the same as PyYAML's own scanner."""
+    return not (_LIBYAML_DIFFERS.search(text) and _LIBYAML_DIFFERS.search(_COMMENT.sub("", text)))
 
 
 def _load(text: str, base: Any) -> YamlDocument:

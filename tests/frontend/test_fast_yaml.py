@@ -1,0 +1,157 @@
+"""What launch files read and write with PyYAML is the same with libyaml behind it, errors included."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from enclave_launch.frontend import fast_yaml
+from enclave_launch.frontend.fast_yaml import accelerated, libyaml_for_launch_files
+
+LOADERS = [yaml.SafeLoader, yaml.FullLoader]
+
+# fmt: off
+FRAGMENTS = [
+    "a", "b: ", "- ", ": ", "\n", "  ", "'", '"', "#c", "{", "}", "[", "]", ",", "&x ", "*x", "1", "0o7", "1e3", "true",
+    "~", "null", "2001-01-01", "|\n", ">-\n  ", "...\n", "---\n", "%", "@", "`", "é", "\\", "k: v\n", "- 1\n", "? ",
+    "!", "!!str ", "\t", "<<: ", "0x1F", "1:30", ".inf", " ",
+]
+# fmt: on
+
+texts = st.lists(st.sampled_from(FRAGMENTS), max_size=14).map("".join)
+words = st.sampled_from(
+    ["a", "true", "1", "1.0", "~", "", "-", "- x", "a b", "a: b", "#", "'q'", "x" * 60, "word " * 7, "=", "<<", "é",
+     "a\nb", "*", "%x", "@", "[b]", ":", "a:", "?", " lead", "trail ", "1e5", "1_000", "12:30", "2001-01-01", "...",
+     "---", "/a/path.xml", "a #b", ">", "|"]
+)  # fmt: skip
+printable = st.text(st.characters(min_codepoint=32, max_codepoint=126), max_size=8)
+sentences = st.lists(printable, max_size=30).map(" ".join)  # longer than a line
+keys_of_sentences = sentences.map(lambda text: text[:100])
+scalars = st.one_of(
+    sentences,
+    st.booleans(),
+    st.none(),
+    st.integers(),
+    st.floats(allow_nan=False),
+    words,
+    st.text(max_size=50),
+)
+trees = st.recursive(
+    scalars,
+    lambda inner: st.one_of(
+        st.lists(inner, max_size=4),
+        st.dictionaries(st.one_of(words, keys_of_sentences, scalars), inner, max_size=4),
+    ),
+    max_leaves=25,
+)
+
+
+def outcome(function: Callable[[], Any]) -> tuple[str, str]:
+    try:
+        return "gives", repr(function())
+    except Exception as error:
+        return type(error).__name__, str(error)
+
+
+@pytest.mark.parametrize("loader", LOADERS)
+@given(text=texts)
+@example(text="a: 1\t#c")  # a tab before a comment: libyaml takes it, PyYAML does not
+@example(text="a: [1, 2\n")
+@example(text="a: &x {b: 1}\nc: *x\n")
+@settings(max_examples=150)
+def test_a_text_reads_the_same(loader: Any, text: str) -> None:
+    plainly = outcome(lambda: yaml.load(text, loader))
+    of_a_file = outcome(lambda: yaml.load(named(text), loader))
+    with accelerated(yaml):
+        assert outcome(lambda: yaml.load(text, loader)) == plainly
+        assert outcome(lambda: yaml.load(named(text), loader)) == of_a_file
+
+
+def named(text: str) -> io.StringIO:
+    file = io.StringIO(text)
+    file.name = "params.yaml"
+    return file
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"sort_keys": False}, {"default_flow_style": True}, {"width": 20}], ids=str
+)
+@given(tree=trees)
+@example(tree={"": 1})  # an empty key: libyaml writes another, equal text
+@settings(max_examples=60)
+def test_values_are_written_the_same(options: dict[str, Any], tree: Any) -> None:
+    plainly = outcome(lambda: yaml.dump(tree, **options))
+    with accelerated(yaml):
+        assert outcome(lambda: yaml.dump(tree, **options)) == plainly
+        into = io.StringIO()
+        if plainly[0] == "gives":
+            assert yaml.dump(tree, into, **options) is None
+            assert repr(into.getvalue()) == plainly[1]
+
+
+def test_nesting_that_ends_the_stack_of_libyaml_is_pyyamls_error() -> None:
+    deep = "[" * 3_000
+    with accelerated(yaml), pytest.raises(RecursionError):
+        yaml.safe_load(deep)
+
+
+def test_each_reader_has_values_of_its_own() -> None:
+    with accelerated(yaml):
+        first, second = yaml.safe_load("a: [1]\n"), yaml.safe_load("a: [1]\n")
+        first["a"].append(2)
+        assert second == {"a": [1]}
+
+
+def test_a_loader_that_was_taught_a_tag_keeps_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Taught(yaml.SafeLoader):
+        pass
+
+    Taught.add_constructor("tag:yaml.org,2002:int", lambda loader, node: "a number")
+    with accelerated(yaml):
+        assert yaml.load("a: 1", Taught) == {"a": "a number"}
+        monkeypatch.setattr(yaml.SafeLoader, "yaml_constructors", dict(Taught.yaml_constructors))
+        assert yaml.safe_load("a: 1") == {"a": "a number"}
+
+
+def test_pyyaml_is_as_it_was_afterwards() -> None:
+    before = yaml.load, yaml.dump, yaml.safe_load, yaml.safe_dump
+    with libyaml_for_launch_files():
+        assert yaml.load is not before[0]
+        with libyaml_for_launch_files():
+            assert yaml.safe_load("1") == 1
+        assert yaml.load is not before[0]
+    assert (yaml.load, yaml.dump, yaml.safe_load, yaml.safe_dump) == before
+
+
+def test_a_later_import_gets_it_too() -> None:
+    program = (
+        "import sys\n"
+        "from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files\n"
+        "with libyaml_for_launch_files():\n"
+        "    assert 'yaml' not in sys.modules\n"
+        "    import yaml\n"
+        "    fast = type(yaml.load).__name__\n"
+        "print(fast, type(yaml.load).__name__, yaml.safe_load('a: 1'))\n"
+    )
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.split("\n")[0] == "_Load function {'a': 1}"
+
+
+def test_parameter_files_of_nav2s_size_go_the_fast_way(tmp_path: Path) -> None:
+    tree = {f"server_{i}": {"ros__parameters": {f"p{j}": j * 0.5 for j in range(30)}} for i in range(10)}
+    file = tmp_path / "nav2_params.yaml"
+    file.write_text(yaml.dump(tree))
+    fast_yaml._read.cache_clear()
+    with accelerated(yaml), file.open() as stream:
+        assert yaml.safe_load(stream) == tree
+    assert fast_yaml._read.cache_info().currsize == 1
+    assert fast_yaml._is_simple(tree, 0, set())
