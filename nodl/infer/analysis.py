@@ -9,11 +9,13 @@ from __future__ import annotations
 import ast
 import functools
 import re
+import sys
 from bisect import bisect_left
 from collections.abc import Callable, Iterable
 
 from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.imports import execute_module
+from nodl.infer.interpreter.raising import Raised
 from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Frame, Run
 from nodl.infer.interpreter.tables import new_run
 from nodl.infer.models.foreign import is_node_class
@@ -30,6 +32,7 @@ from nodl.infer.values import (
 )
 from nodl.source_ref import SourceRef
 
+MAX_NESTING = 6_000  # Python calls of the interpreter
 MAX_ROUNDS = 12
 WIDEN_TEXTS_FROM = 4
 
@@ -48,7 +51,8 @@ def start(program: Program, main: SourceModule, functions: Iterable[str] = ()) -
 
 
 def _start(run: Run, main: SourceModule, functions: tuple[str, ...]) -> None:
-    module = execute_module(run, main, "__main__")
+    _completed(run, lambda: execute_module(run, main, "__main__"))
+    module = run.modules["__main__"]
     for name in functions or ("main",):
         for atom in module.cells.get(name, ()):
             if isinstance(atom, FunctionValue) and (functions or atom.node not in run.called):
@@ -61,7 +65,8 @@ def start_function(program: Program, module: SourceModule, path: list[str]) -> R
     run = new_run(program, module)
 
     def body() -> None:
-        imported = execute_module(run, module, module.name)
+        _completed(run, lambda: execute_module(run, module, module.name))
+        imported = run.modules[module.name]
         value = imported.cells.get(path[0], ())
         frame = Frame(imported, {}, None, 0)
         for step in path[1:]:
@@ -201,13 +206,32 @@ def _defaults_only(function: FunctionValue) -> Arguments:
 
 def _call(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple[object, ...]:
     frame = Frame(module, {}, None, run.state.depth)
-    return run.call_atom(atom, Call(args, module.source.tree, frame))
+    results: list[tuple[object, ...]] = []
+    _completed(run, lambda: results.append(run.call_atom(atom, Call(args, module.source.tree, frame))))
+    return results[0] if results else ()
+
+
+def _completed(run: Run, body: Callable[[], object]) -> None:
+    """Run ``body`` to its end, or to the exception that ends the program there; what it registered stays."""
+    state = run.state
+    before = len(run.stack), run.context, state.depth, run.unrolled
+    try:
+        body()
+    except Raised:
+        size, run.context, state.depth, run.unrolled = before
+        del run.stack[size:]
+        run.tries = 0
+        run.try_forks = 0
 
 
 def _guarded(run: Run, body: Callable[[], None]) -> None:
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(max(limit, MAX_NESTING))
     try:
         body()
     except BudgetExceeded as error:
         run.findings.gap(SourceRef(run.main.path), f"the analysis was given up: {error}")
     except RecursionError:
         run.findings.gap(SourceRef(run.main.path), "the analysis was given up: nested too deep")
+    finally:
+        sys.setrecursionlimit(limit)

@@ -36,6 +36,7 @@ class State:
         self.learned = 0  # containers opened to foreign code, which no branch takes back
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
+        self.forks = 0  # how many of them are undecided: what happens there may not happen
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
         """Strong update. ``local``: only the running function can see the cell (no new stamp)."""
@@ -92,6 +93,7 @@ class State:
         stamp = self.stamp
         outcomes: list[Written] = []
         self.depth += 1
+        self.forks += 1
         for alternative in alternatives:
             mark = len(self._trail)
             if alternative():
@@ -99,6 +101,7 @@ class State:
             self._undo(mark)
             self.stamp = stamp
         self.depth -= 1
+        self.forks -= 1
         return outcomes
 
     def join_seen(self, mark: int, own: Cells | None = None) -> None:

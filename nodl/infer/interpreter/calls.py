@@ -63,7 +63,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     cells = bind(run, function, call)
     run.called.setdefault(node)
     run.understood.add(call.node)
-    if node not in run.stack:
+    if node not in run.stack or _decided_recursion(run, node):
         return _remembered(run, function, cells, call)
     summary = run.summaries.setdefault(node, Summary())
     _widen_parameters(run, summary, cells)
@@ -71,6 +71,14 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
         _run_recursive(run, function, summary, call)
     result: Value = summary.result
     return result  # nothing yet: this path ends in a call that has not come back so far
+
+
+def _decided_recursion(run: Run, node: ast.AST) -> bool:
+    """Whether a function calls itself without an undecided test in between: it is followed as it runs."""
+    if run.entries.get(node) != (run.state.forks, run.repeated) or node in run.summaries:
+        return False
+    run.turns -= 1
+    return run.turns > 0 and len(run.stack) < MAX_DEPTH - 8
 
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
@@ -99,6 +107,9 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame = Frame(function.module, cells, closure, run.state.depth)
     frame.again = earlier is not None
     frame.function = function
+    frame.forks = frame.loop_forks = run.state.forks
+    entry = run.entries.get(function.node)
+    run.entries[function.node] = (run.state.forks, run.repeated)
     run.stack.append(function.node)
     mark = run.state.mark()
     node = function.node
@@ -115,6 +126,8 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     else:
         cells.dead = True
     run.stack.pop()
+    if entry is not None:
+        run.entries[function.node] = entry
     run.context = previous
     if frame.yielded is not None:
         return run.sequence(node, "generator", Items(None, frame.yielded or ANY))
@@ -126,6 +139,7 @@ def _run_recursive(run: Run, function: FunctionValue, summary: Summary, call: Ca
     outermost = not any(other.active for other in run.summaries.values())
     summary.active = True
     run.repeated += 1
+    run.state.forks += 1
     for _ in range(MAX_ROUNDS if outermost else 1):
         run.unstable = False if outermost else run.unstable
         cells = LocalCells()
@@ -139,6 +153,7 @@ def _run_recursive(run: Run, function: FunctionValue, summary: Summary, call: Ca
         if outermost:
             run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
     run.repeated -= 1
+    run.state.forks -= 1
     summary.active = False
     if outermost:
         run.summaries.clear()

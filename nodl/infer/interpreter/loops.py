@@ -31,25 +31,32 @@ WIDEN_TEXTS_FROM = 3
 
 def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
     items = elements(run, run.evaluate(node.iter, frame), node, frame)
-    before = frame.unsettled
+    before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = False
+    frame.loop_forks = run.state.forks
+    finished = True
     if items.exact is not None and len(items.exact) * run.unrolled <= _limit(run, items.exact, node):
         run.unrolled *= len(items.exact) or 1
-        passes = _unrolled(run, node, items.exact, frame)
+        passes, finished = _unrolled(run, node, items.exact, frame)
         run.unrolled //= len(items.exact) or 1
     else:
         element = items.any_element()
         passes = True
         if element or items.exact is None:
             _fixpoint(run, frame, lambda: _turn(run, node.target, element, node.body, frame))
-    frame.unsettled = before
-    if passes and node.orelse:
-        run.execute(node.orelse, frame)
+    frame.unsettled, frame.loop_forks = before, loop_forks
+    frame.jump = ""
+    if passes and finished and node.orelse:
+        return run.execute(node.orelse, frame)
     return passes
 
 
 def _limit(run: Run, exact: tuple[Value, ...], node: ast.For | ast.AsyncFor) -> int:
-    if not (run.repeated and all(len(element) == 1 and type(element[0]) is int for element in exact)):
+    numbers = all(len(element) == 1 and type(element[0]) is int for element in exact)
+    if not run.repeated:
+        followed = not numbers or len(exact) <= MAX_UNROLLED or _may_name(node)
+        return run.turns if followed else MAX_UNROLLED
+    if not numbers:
         return MAX_UNROLLED
     return MAX_UNROLLED_NUMBERS if _may_name(node) else 1
 
@@ -75,40 +82,94 @@ def _turn(run: Run, target: ast.expr, element: Value, body: list[ast.stmt], fram
     return run.execute(body, frame)
 
 
-def _unrolled(run: Run, node: ast.For | ast.AsyncFor, exact: tuple[Value, ...], frame: Frame) -> bool:
-    """One turn after the other. False: no turn lets control pass (a ``return`` in the first one)."""
+def _unrolled(
+    run: Run, node: ast.For | ast.AsyncFor, exact: tuple[Value, ...], frame: Frame
+) -> tuple[bool, bool]:
+    """One turn after the other; can control pass the loop, and may it have run to its end?"""
     start = run.state.mark()
     broken = False
     run.state.depth += 1
     for index, element in enumerate(exact):
+        run.turns -= not run.repeated
         previous = run.enter((id(node), index))
         mark = run.state.mark()
+        frame.jump = ""
         passes = _turn(run, node.target, element, node.body, frame)
         run.context = previous
         if frame.unsettled:
             run.state.join_seen(mark)
             frame.unsettled = False
             broken = passes = True
+        elif frame.jump == "continue":
+            passes = True
         if not passes:
             run.state.depth -= 1
             if broken:
                 run.state.join_seen(start)
-            return broken
+            return broken or frame.jump == "break", broken
     run.state.depth -= 1
     if broken:
         run.state.join_seen(start)
-    return True
+    return True, True
 
 
 def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
-    before = frame.unsettled
+    before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = False
-    first = decide(run, node.test, frame)
-    if first is False:
-        frame.unsettled = before
-        return run.execute(node.orelse, frame) if node.orelse else True
-    endless = isinstance(node.test, ast.Constant)
+    frame.loop_forks = run.state.forks
+    passes, finished = _while(run, node, frame)
+    frame.unsettled, frame.loop_forks = before, loop_forks
+    frame.jump = ""
+    if passes and finished and node.orelse:
+        return run.execute(node.orelse, frame)
+    return passes
+
+
+def _while(run: Run, node: ast.While, frame: Frame) -> tuple[bool, bool]:
+    """Turn by turn while the test is decided, then to a fixpoint; can control pass, and through the test?"""
+    run.state.depth += 1
+    start = run.state.mark()
+    turn = 0
     broken = False
+    while True:
+        outcome = decide(run, node.test, frame)
+        if outcome is False:
+            run.state.depth -= 1
+            return True, True
+        if outcome is None or not _fuel(run, turn):
+            break
+        turn += 1
+        version, mark = run.state.version(), run.state.mark()
+        previous = run.enter((id(node), turn))
+        frame.jump = ""
+        passes = run.execute(node.body, frame)
+        run.context = previous
+        if frame.unsettled:
+            run.state.join_seen(mark)
+            frame.unsettled = False
+            broken = True
+            break
+        if not passes and frame.jump != "continue":
+            run.state.depth -= 1
+            return frame.jump == "break", False
+        if run.state.version() == version and run.state.unchanged_since(mark):
+            break  # it would go on like this without end
+    run.state.depth -= 1
+    passes, finished = _repeated_while(run, node, frame, broken)
+    if broken:
+        run.state.join_seen(start)
+    return passes, finished
+
+
+def _fuel(run: Run, turn: int) -> bool:
+    if run.repeated:
+        return turn < MAX_UNROLLED_NUMBERS
+    run.turns -= 1
+    return run.turns > 0
+
+
+def _repeated_while(run: Run, node: ast.While, frame: Frame, broken: bool) -> tuple[bool, bool]:
+    endless = isinstance(node.test, ast.Constant)
 
     def turn() -> bool:
         nonlocal broken
@@ -120,18 +181,16 @@ def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
         return passes
 
     _fixpoint(run, frame, turn)
-    frame.unsettled = before
     if broken or not endless:
         narrowed(run, node.test, False, frame)
-        if node.orelse:
-            run.execute(node.orelse, frame)
-        return True
-    return False  # ``while True`` without break: only return or an exception leaves it
+        return True, not endless
+    return False, False  # ``while True`` without break: only return or an exception leaves it
 
 
 def _fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     run.repeated += 1
     run.state.depth += 1
+    run.state.forks += 1
     start = run.state.mark()
     jumped = False
     for count in range(MAX_ROUNDS):
@@ -147,6 +206,7 @@ def _fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
         frame_source = frame.function.node if frame.function else frame.module.source.tree
         run.gap(frame_source, frame, "a loop whose values do not settle; names made in it may be missing")
     run.state.depth -= 1
+    run.state.forks -= 1
     run.repeated -= 1
     if jumped:
         run.state.join_seen(start)

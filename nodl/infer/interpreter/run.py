@@ -15,6 +15,7 @@ from typing import Any
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.state import State
+from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -34,6 +35,7 @@ from nodl.infer.values import (
     Partial,
     Sequence,
     SuperProxy,
+    Unknown,
     Value,
     Variables,
     join,
@@ -43,7 +45,8 @@ from nodl.source_ref import SourceRef
 # What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
 MAX_STEPS = 800_000
-MAX_DEPTH = 48  # analysed calls inside calls
+MAX_DEPTH = 120  # analysed calls inside calls
+MAX_TURNS = 3_000  # of loops that are followed turn by turn, in one run
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
 
@@ -55,7 +58,7 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "closure", "depth", "early", "function", "globals", "is_class", "module",
+        "again", "cells", "forks", "jump", "loop_forks", "raised", "closure", "depth", "early", "function", "globals", "is_class", "module",
         "nonlocals", "returned", "unsettled", "yielded",
     )  # fmt: skip
 
@@ -68,7 +71,11 @@ class Frame:
         self.returned: Value = BOTTOM
         self.yielded: Value | None = None
         self.early = False  # some path left before the end
-        self.unsettled = False  # a break or continue since the loop asked last
+        self.unsettled = False  # a break or continue that may have happened, since the loop asked last
+        self.jump = ""  # the break or continue that certainly ended the latest statement
+        self.raised = False  # some path ended in an exception
+        self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
+        self.loop_forks = 0
         self.again = False  # the cells also hold an earlier call, whose inner functions live on
         self.is_class = False
         self.globals: set[str] = set()
@@ -183,6 +190,11 @@ class Run:
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
+        self.turns = MAX_TURNS
+        self.try_forks = 0  # undecided branches around the innermost try
+        self.tries = 0  # how many try statements surround the current point
+        self.risks = 0  # what may have raised an exception, counted inside of them
+        self.entries: dict[ast.AST, tuple[int, int]] = {}  # forks and repetition when a function was last entered
         self.context = 0
         self._contexts: dict[tuple[int, object], int] = {}
         self._context_ids = itertools.count(1)
@@ -195,7 +207,19 @@ class Run:
     def evaluate(self, node: ast.expr, frame: Frame) -> Value:
         self.steps += 1
         handler = self._expressions.get(type(node))
+        if self.tries:
+            return self._watched(handler(self, node, frame) if handler else ANY, node)
         return handler(self, node, frame) if handler else ANY
+
+    def _watched(self, value: Value, node: ast.expr) -> Value:
+        """Count what could have failed: an unknown or symbolic value, or the call of a library."""
+        atom = value[0] if len(value) == 1 else None
+        kind = type(atom)
+        if kind is Unknown or kind is Text or (len(value) != 1):
+            self.risks += 1
+        elif type(node) is ast.Call and (kind is External or (kind is Instance and type(atom.cls) is External)):  # type: ignore[union-attr]
+            self.risks += 1
+        return value
 
     def execute(self, body: list[ast.stmt], frame: Frame) -> bool:
         """Run statements in order. False: control cannot reach the end of ``body``."""

@@ -11,13 +11,34 @@ from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.define import define_class, define_function
 from nodl.infer.interpreter.operators import binary_operation
 from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
-from nodl.infer.values import ANY, NONE, External, Instance, Sequence, Value, join, sole
+from nodl.infer.interpreter.raising import (
+    Raised,
+    Unwinding,
+    catches,
+    handled_value,
+    throw,
+    throw_value,
+)
+from nodl.infer.values import (
+    ANY,
+    NONE,
+    BoundMethod,
+    ClassValue,
+    External,
+    Instance,
+    Sequence,
+    Unknown,
+    Value,
+    join,
+    sole,
+)
 
 
 def _expression(run: Run, node: ast.Expr, frame: Frame) -> bool:
     if type(node.value) is not ast.Constant:
         run.evaluate(node.value, frame)
         if type(node.value) is ast.Call and _never_returns(run, node.value.func, frame):
+            throw(run, SystemExit)
             _leave(run, frame)
             return False
     return True
@@ -100,30 +121,104 @@ def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
 
 
 def _leave(run: Run, frame: Frame) -> None:
-    if run.state.depth > frame.depth:
+    frame.jump = ""
+    if run.state.forks > frame.forks:
         frame.early = True
 
 
 def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
-    if node.exc is not None:
-        run.evaluate(node.exc, frame)
+    frame.raised = True
+    value = run.evaluate(node.exc, frame) if node.exc is not None else frame.cells.get("[exception]", ANY)
+    if node.cause is not None:
+        run.evaluate(node.cause, frame)
+    if len(value) == 1 and isinstance(value[0], ClassValue):
+        value = run.call(value, Arguments(), node, frame)
+    throw_value(run, value)
     _leave(run, frame)
     return False
 
 
 def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
-    frame.unsettled = True
+    if run.state.forks == frame.loop_forks:
+        frame.jump = "break" if isinstance(node, ast.Break) else "continue"
+    else:
+        frame.unsettled = True
     return False
 
 
 def _try(run: Run, node: Any, frame: Frame) -> bool:
-    """A handler may run after any prefix of the body: it sees every value written on the way."""
+    """Handlers run after a certain exception, or after any prefix of a body that may have raised one."""
     mark = run.state.mark()
+    before = Unwinding(run, frame)
+    risks = run.risks
+    raised = None
     run.state.depth += 1
-    passes = run.execute(node.body, frame)
+    run.tries += 1
+    run.try_forks = run.state.forks
+    tries = run.tries
+    try:
+        passes = run.execute(node.body, frame)
+    except Raised as found:
+        raised, passes = found, False
+    jump = frame.jump
+    before.restore(run, frame)
+    frame.jump = jump if raised is None else ""
+    run.tries = tries - 1
     if passes and node.orelse:
         passes = run.execute(node.orelse, frame)
-    run.state.depth -= 1
+    try:
+        if raised is not None and run.risks - risks <= raised_risks(raised):
+            passes = _handled(run, node.handlers, raised, frame)
+        elif raised is not None or run.risks != risks:
+            passes = _perhaps_handled(run, node, passes, mark, frame)
+    except Raised:
+        if node.finalbody:
+            run.execute(node.finalbody, frame)
+        raise
+    if node.finalbody:
+        if not passes:
+            jump = frame.jump
+            run.state.join_seen(mark)
+            done = run.execute(node.finalbody, frame)
+            frame.jump = jump if done else frame.jump
+            return False
+        passes = run.execute(node.finalbody, frame)
+    return passes
+
+
+def raised_risks(raised: Raised) -> int:
+    """A certain exception is itself one risk."""
+    return 1
+
+
+def _handled(run: Run, handlers: list[ast.ExceptHandler], raised: Raised, frame: Frame) -> bool:
+    """The handler that certainly catches the exception, or the exception again."""
+    for handler in handlers:
+        outcome = catches(handled_value(run, handler, frame), raised)
+        if outcome is None:
+            break
+        if outcome:
+            return _run_handler(run, handler, raised.value, frame)
+    else:
+        raise raised
+    return run.state.branches(
+        [lambda handler=handler: _run_handler(run, handler, raised.value, frame) for handler in handlers]
+    )
+
+
+def _run_handler(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> bool:
+    if handler.name:
+        run.assign_name(handler.name, value, frame)
+    outer = frame.cells.get("[exception]")
+    run.assign_name("[exception]", value, frame)
+    passes = run.execute(handler.body, frame)
+    if outer is not None:
+        run.assign_name("[exception]", outer, frame)
+    return passes
+
+
+def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame) -> bool:
+    """Each handler may run: it sees every value written on the way through the body."""
 
     def no_exception() -> bool:
         return passes
@@ -131,33 +226,81 @@ def _try(run: Run, node: Any, frame: Frame) -> bool:
     def handler_of(handler: ast.ExceptHandler) -> Any:
         def handle() -> bool:
             run.state.join_seen(mark)
-            if handler.name:
-                run.assign_name(handler.name, ANY, frame)
-            return run.execute(handler.body, frame)
+            return _run_handler(run, handler, ANY, frame)
 
         return handle
 
-    alternatives = [no_exception, *(handler_of(handler) for handler in node.handlers)]
-    if node.handlers:
-        passes = run.state.branches(alternatives)
-    if node.finalbody:
-        if not passes:
-            run.state.join_seen(mark)
-        passes = run.execute(node.finalbody, frame) and passes
-    return passes
+    if not node.handlers:
+        return passes
+    jump = frame.jump
+    result = run.state.branches([no_exception, *(handler_of(handler) for handler in node.handlers)])
+    if not passes:
+        if jump:
+            frame.unsettled = True  # the jump of the body may happen, or a handler runs instead
+        else:
+            frame.early = True
+    return result
 
 
 def _with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
+    managers: list[Value] = []
     for item in node.items:
         manager = run.evaluate(item.context_expr, frame)
+        managers.append(manager)
         entered = _entered(run, manager, node, frame)
         if item.optional_vars is not None:
             assign(run, item.optional_vars, entered, frame)
+    swallows = any(_may_swallow(atom) for manager in managers for atom in manager)
+    if swallows:
+        return _swallowing(run, node, managers, frame)
+    before = frame.raised
+    frame.raised = False
     mark = run.state.mark()
     passes = run.execute(node.body, frame)
-    if not passes:  # the manager may swallow an exception
+    if not passes and frame.raised and any(_is_unknown(atom) for manager in managers for atom in manager):
+        run.state.join_seen(mark)  # a manager that is not known may swallow an exception
+        passes = True
+    frame.raised = before or frame.raised
+    _exited(run, managers, node, frame)
+    return passes
+
+
+def _is_unknown(atom: object) -> bool:
+    return not isinstance(atom, External) or not atom.path.startswith(_PLAIN_MANAGERS)
+
+
+_PLAIN_MANAGERS = ("threading.", "builtins.open", "rclpy.", "multiprocessing.")
+
+
+def _may_swallow(atom: object) -> bool:
+    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
+        leave = special.method(atom, "__exit__")
+        nodes = [each.function.node for each in leave if isinstance(each, BoundMethod)]
+        return any(isinstance(part, ast.Return) and part.value for each in nodes for part in ast.walk(each))
+    return isinstance(atom, Unknown) and "contextlib.suppress" in atom.why
+
+
+def _swallowing(run: Run, node: ast.With | ast.AsyncWith, managers: list[Value], frame: Frame) -> bool:
+    """``contextlib.suppress``, or a manager of the program that may return true: the body up to an exception."""
+    mark = run.state.mark()
+    before = Unwinding(run, frame)
+    risks = run.risks
+    run.tries += 1
+    run.try_forks = run.state.forks
+    tries = run.tries
+    run.state.depth += 1
+    try:
+        passes = run.execute(node.body, frame)
+        certain = False
+    except Raised:
+        passes, certain = True, run.risks - risks <= 1
+    before.restore(run, frame)
+    run.tries = tries - 1
+    if not certain and run.risks != risks:
         run.state.join_seen(mark)
-    return True
+        passes = True
+    _exited(run, managers, node, frame)
+    return passes
 
 
 def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
@@ -165,15 +308,21 @@ def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
     for atom in manager:
         if isinstance(atom, Instance):
             enter = run.attribute((atom,), "__enter__", node, frame)
-            entered = run.call(enter, Arguments(), node, frame)
-            leave = run.attribute((atom,), "__exit__", node, frame)
-            run.register_callback(leave, 3)
-            result = join(result, entered)
+            result = join(result, run.call(enter, Arguments(), node, frame))
         elif isinstance(atom, Sequence) and atom.kind == "generator":
             result = join(result, atom.items.any_element())
         else:
             result = join(result, ANY)
     return result or ANY
+
+
+def _exited(run: Run, managers: list[Value], node: ast.AST, frame: Frame) -> None:
+    """``__exit__`` without an exception, and perhaps with one."""
+    for atom in (atom for manager in reversed(managers) for atom in manager):
+        leave = special.method(atom, "__exit__") or special.method(atom, "__aexit__")
+        if leave:
+            run.call(leave, Arguments([NONE, NONE, NONE]), node, frame)
+            run.register_callback(leave, 3)
 
 
 def _match(run: Run, node: Any, frame: Frame) -> bool:

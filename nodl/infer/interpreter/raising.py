@@ -1,0 +1,126 @@
+"""Exceptions of the analysed program, thrown through the interpreter where it is certain that they are raised.
+
+An exception is certain when no undecided test lies between the ``raise`` and the innermost ``try`` (or the start). All
+others end their path, as ever, and count as a risk: a handler is left out only when nothing in its ``try`` could fail.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+
+from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.values import (
+    ClassValue,
+    External,
+    Instance,
+    Value,
+    external,
+)
+
+
+class Raised(Exception):
+    """A certain exception of the program. ``value``: its object; ``kinds``: paths or classes, most special first."""
+
+    def __init__(self, value: Value, kinds: tuple[object, ...]):
+        super().__init__()
+        self.value = value
+        self.kinds = kinds
+
+
+def is_certain(run: Run) -> bool:
+    return run.state.forks == run.try_forks
+
+
+def throw(run: Run, error: type[BaseException] | str, text: str = "") -> None:
+    """Raise a built-in exception of the program if that is certain; else note the risk and return."""
+    run.risks += 1
+    if is_certain(run):
+        kind = error if isinstance(error, type) else getattr(builtins, error)
+        raised = Instance(External(f"builtins.{kind.__name__}"), ("", 0))
+        raised.cells["text"] = (text,)
+        raise Raised((raised,), _builtin_kinds(kind))
+
+
+def throw_value(run: Run, value: Value) -> None:
+    """The same for an exception of the program's own making."""
+    run.risks += 1
+    if not is_certain(run) or len(value) != 1:
+        return
+    kinds = kinds_of(value[0])
+    if kinds:
+        raise Raised(value, kinds)
+
+
+def kinds_of(atom: object) -> tuple[object, ...]:
+    """The classes of an exception object; nothing when they are not all known."""
+    cls = atom.cls if isinstance(atom, Instance) else atom
+    if isinstance(cls, External):
+        return _builtin_kinds(_builtin(cls.path))
+    if not isinstance(cls, ClassValue):
+        return ()
+    kinds: list[object] = []
+    for base in linearized(cls):
+        if isinstance(base, ClassValue):
+            kinds.append(base)
+        elif isinstance(base, External):
+            kinds.extend(_builtin_kinds(_builtin(base.path)))
+        else:
+            return ()
+    return tuple(kinds)
+
+
+def catches(handled: Value, raised: Raised) -> bool | None:
+    """Whether ``except handled`` catches it; ``None``: not known."""
+    outcomes = {_catches_one(atom, raised) for atom in handled}
+    return outcomes.pop() if len(outcomes) == 1 else None
+
+
+def _catches_one(atom: object, raised: Raised) -> bool | None:
+    if isinstance(atom, ClassValue):
+        return atom in raised.kinds
+    if isinstance(atom, External):
+        if _builtin(atom.path) is not None:
+            return atom.path in raised.kinds
+        known = all(isinstance(kind, str) for kind in raised.kinds)
+        return False if known else None
+    return None
+
+
+def _builtin(path: str) -> type[BaseException] | None:
+    found = getattr(builtins, path.removeprefix("builtins."), None)
+    return found if isinstance(found, type) and issubclass(found, BaseException) else None
+
+
+def _builtin_kinds(kind: type[BaseException] | None) -> tuple[object, ...]:
+    if kind is None:
+        return ()
+    return tuple(f"builtins.{each.__name__}" for each in kind.__mro__ if issubclass(each, BaseException))
+
+
+class Unwinding:
+    """Where the interpreter stood at a ``try``, to go back there after an exception."""
+
+    def __init__(self, run: Run, frame: Frame) -> None:
+        state = run.state
+        self._numbers = (len(run.stack), run.context, state.depth, run.unrolled, run.try_forks, frame.loop_forks)
+
+    def restore(self, run: Run, frame: Frame) -> None:
+        size, run.context, run.state.depth, run.unrolled, run.try_forks, frame.loop_forks = self._numbers
+        del run.stack[size:]
+        frame.jump = ""
+
+
+def handled_value(run: Run, handler: ast.ExceptHandler, frame: Frame) -> Value:
+    """The classes that a handler names, as one alternative each; all exceptions for a bare ``except``."""
+    from nodl.infer.interpreter.iterate import elements
+    from nodl.infer.values import Sequence
+
+    if handler.type is None:
+        return external("builtins.BaseException")
+    value = run.evaluate(handler.type, frame)
+    atom = value[0] if len(value) == 1 else None
+    if isinstance(atom, Sequence):
+        return elements(run, value, handler, frame).any_element()
+    return value
