@@ -34,6 +34,7 @@ class State:
         self._stamps = itertools.count(1)
         self.stamp = 0
         self.learned = 0  # containers opened to foreign code, which no branch takes back
+        self.pulled = 0  # how often an iterator was advanced, which no branch takes back either
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
         self.forks = 0  # how many of them are undecided: what happens there may not happen

@@ -9,7 +9,7 @@ Heap objects keep their contents in ``cells``; only ``state.State`` writes there
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -170,12 +170,13 @@ class Key:
 
 
 class Dictionary(HeapObject):
-    __slots__ = ("default",)
+    __slots__ = ("default", "kind")
 
     def __init__(self) -> None:
         super().__init__()
         self.cells = FieldCells()
         self.default: Value = BOTTOM  # defaultdict's factory
+        self.kind = "dict"
 
     @property
     def is_open(self) -> bool:
@@ -229,6 +230,23 @@ class FunctionValue:
         self.kw_defaults: tuple[Value | None, ...] = ()
         self.context_manager = False
         self.attributes: Cells = {}
+
+
+class NativeObject:
+    """A real object of Python's library: a match, a path, an iterator.
+
+    One that changes (``forks``: how many undecided branches were around when it was made) is ``lost`` once it is used
+    where branches may be undone. ``sources`` went into it; ``fallback`` gives what it may yield after all.
+    """
+
+    __slots__ = ("fallback", "forks", "lost", "object", "sources")
+
+    def __init__(self, found: object, forks: int, sources: tuple[Value, ...] = ()):
+        self.object = found
+        self.forks = forks
+        self.lost = False
+        self.sources = sources
+        self.fallback: Callable[[], Value] | None = None
 
 
 class ClassValue(HeapObject):
@@ -363,7 +381,7 @@ class Variables:
 
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
 _COMPARED_IN_C = frozenset(
-    {str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue}
+    {str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue, NativeObject}
 )
 
 

@@ -6,7 +6,7 @@ import ast
 
 from nodl.infer.interpreter import imports, special
 from nodl.infer.interpreter.define import linearized
-from nodl.infer.interpreter.run import Arguments, AttributeReader, Frame, Run
+from nodl.infer.interpreter.run import Arguments, AttributeReader, Call, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
 from nodl.infer.values import (
@@ -24,6 +24,7 @@ from nodl.infer.values import (
     Instance,
     ModuleValue,
     NativeMethod,
+    NativeObject,
     Partial,
     PartialMethod,
     PropertyValue,
@@ -231,6 +232,10 @@ def _bound_in_class(value: Value, cls: ClassValue) -> Value:
     return result
 
 
+def _of_native_object(run: Run, atom: NativeObject, name: str, node: ast.AST, frame: Frame) -> Value:
+    return foreign.native_attribute(run, atom, name, Call(Arguments(), node, frame))
+
+
 def _of_native(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -> Value:
     return (NativeMethod(atom, name),)
 
@@ -273,4 +278,5 @@ ATTRIBUTES: dict[type, AttributeReader] = {
     Sequence: _of_native,
     Dictionary: _of_native,
     Variables: _of_native,
+    NativeObject: _of_native_object,
 }

@@ -5,7 +5,9 @@ from __future__ import annotations
 import ast
 from dataclasses import dataclass, field
 
+from nodl.infer.interpreter import generators
 from nodl.infer.interpreter.define import foreign_bases, linearized
+from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Caller, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.values import (
@@ -28,6 +30,7 @@ from nodl.infer.values import (
     Key,
     LocalCells,
     NativeMethod,
+    NativeObject,
     Partial,
     Unknown,
     Value,
@@ -63,6 +66,8 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     cells = bind(run, function, call)
     run.called.setdefault(node)
     run.understood.add(call.node)
+    if generators.is_generator(node):
+        return _generator(run, function, cells, call)
     if node not in run.stack or _decided_recursion(run, node):
         return _remembered(run, function, cells, call)
     summary = run.summaries.setdefault(node, Summary())
@@ -71,6 +76,22 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
         _run_recursive(run, function, summary, call)
     result: Value = summary.result
     return result  # nothing yet: this path ends in a call that has not come back so far
+
+
+def _generator(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
+    """An iterator that runs the body step by step; where that is not possible the body is run as a whole."""
+    given = dict(cells)
+    made = NativeObject(generators.steps(run, function, cells, call), run.state.forks, tuple(given.values()))
+
+    def as_a_whole() -> Value:
+        again = LocalCells()
+        again.update(given)
+        found = _run_body(run, function, again, call) if function.node not in run.stack else ANY
+        return elements(run, found, call.node, call.frame).any_element()
+
+    made.fallback = as_a_whole
+    run.state.pulled += 1
+    return (made,)
 
 
 def _decided_recursion(run: Run, node: ast.AST) -> bool:
@@ -85,11 +106,11 @@ def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call
     """A call that leaves the state as it found it gives the same again while the state is the same."""
     key = (function, tuple(cells.values()), id(call.node) if run.context else 0)
     known = run.memo.get(key)
-    version = run.state.version()
+    version = (*run.state.version(), run.state.pulled)
     if known is not None and known[0] == version:
         return known[1]
     result = _run_body(run, function, cells, call)
-    if run.state.version() == version:
+    if (*run.state.version(), run.state.pulled) == version:
         run.memo[key] = (version, result)
     return result
 

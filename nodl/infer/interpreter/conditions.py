@@ -15,9 +15,11 @@ from nodl.infer.values import (
     BOTTOM,
     ITEMS,
     ClassValue,
+    Dictionary,
     FunctionValue,
     Instance,
     ModuleValue,
+    NativeObject,
     Sequence,
     Unknown,
     Value,
@@ -38,6 +40,12 @@ def truth_of(atom: object) -> bool | None:
         return bool(items.exact) if items.exact is not None and len(atom.cells[ITEMS]) == 1 else None
     if isinstance(atom, FunctionValue | ModuleValue | ClassValue):
         return True
+    if isinstance(atom, NativeObject):
+        return bool(atom.object) if not hasattr(atom.object, "__len__") else None
+    if isinstance(atom, Dictionary):
+        entries = atom.entries()
+        certain = any(certain for _, _, certain in entries)
+        return True if certain else None if entries or atom.is_open or atom.summary else False
     if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
         return None if atom.cls.linear is None or _defines_truth(atom.cls) else True
     return None
@@ -157,6 +165,9 @@ def _compare_atoms(operator: ast.cmpop, left: object, right: object) -> bool | N
 def _membership(element: object, container: object) -> bool | None:
     if isinstance(container, str) and isinstance(element, str):
         return element in container
+    if isinstance(container, Dictionary) and isinstance(element, _CONSTANTS):
+        held, certain = container.held(element)
+        return True if certain else None if held or container.is_open else False
     if isinstance(container, Sequence) and isinstance(element, _CONSTANTS):
         exact = container.items.exact
         if exact is None or container.escaped:

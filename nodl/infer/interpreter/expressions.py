@@ -11,7 +11,7 @@ from nodl.infer.interpreter.conditions import compare, decide, narrowed, truth, 
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.iterate import elements, values_of
 from nodl.infer.interpreter.operators import binary, f_string
-from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Call, Evaluator, Frame, Run
 from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
     ABSENT,
@@ -27,6 +27,8 @@ from nodl.infer.values import (
     Instance,
     Items,
     Key,
+    NativeMethod,
+    NativeObject,
     Sequence,
     SuperProxy,
     Unknown,
@@ -228,6 +230,9 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         if len(atom.pieces) == 1 and isinstance(piece, Input) and piece.item is None and type(index) is int:
             return (make_text((Input(piece.name, piece.owner, index, piece.edits),)),)
         return unknown("a part of a text that is not known")
+    if isinstance(atom, NativeObject):
+        call = Call(Arguments([key]), node, frame)
+        return run.call_atom(NativeMethod(atom, "__getitem__"), call)
     if isinstance(atom, Variables):
         return variable(run, atom, key, node, frame)
     if isinstance(atom, Instance):
@@ -422,7 +427,7 @@ def _await(run: Run, node: ast.Await, frame: Frame) -> Value:
 def _yield(run: Run, node: ast.Yield, frame: Frame) -> Value:
     value = NONE if node.value is None else run.evaluate(node.value, frame)
     frame.yielded = join(frame.yielded or BOTTOM, value)
-    return ANY
+    return join(NONE, ANY)
 
 
 def _yield_from(run: Run, node: ast.YieldFrom, frame: Frame) -> Value:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import ast
 import functools
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Iterator
 
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import decide, narrowed
-from nodl.infer.interpreter.iterate import elements
-from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.interpreter.iterate import elements, lose
+from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
+from nodl.infer.models.concrete import NotConcrete, is_usable, pulled
 from nodl.infer.values import (
     ABSENT,
     BOTTOM,
@@ -19,8 +21,11 @@ from nodl.infer.values import (
     Items,
     Key,
     LocalCells,
+    NativeObject,
+    Sequence,
     Value,
     join,
+    join_all,
 )
 
 MAX_UNROLLED = 64  # turns, those of the loops around multiplied
@@ -29,8 +34,109 @@ MAX_ROUNDS = 8
 WIDEN_TEXTS_FROM = 3
 
 
+def stream(run: Run, value: Value, call: Call) -> Iterator[Value]:
+    """The elements of ``value`` as a loop meets them: a list may grow meanwhile, an iterator runs. May raise ``NotConcrete``."""
+    atom = value[0] if len(value) == 1 else None
+    if isinstance(atom, NativeObject) and is_usable(run, atom):
+        for element in pulled(run, atom, call):
+            run.state.pulled += 1
+            yield element
+    elif isinstance(atom, Sequence) and atom.kind == "list":
+        yield from _growing(atom)
+    else:
+        items = elements(run, value, call.node, call.frame)
+        if items.exact is None:
+            raise NotConcrete
+        yield from items.exact
+
+
+def _growing(sequence: Sequence) -> Iterator[Value]:
+    for index in itertools.count():
+        exact = sequence.items.exact
+        if exact is None or sequence.escaped or sequence.summary:
+            raise NotConcrete
+        if index >= len(exact):
+            return
+        yield exact[index]
+
+
+def _is_streamed(run: Run, value: Value) -> bool:
+    atom = value[0] if len(value) == 1 else None
+    if isinstance(atom, NativeObject):
+        return is_usable(run, atom)
+    is_list = isinstance(atom, Sequence) and atom.kind == "list" and not atom.escaped and not atom.summary
+    return not run.repeated and is_list and isinstance(atom, Sequence) and atom.items.exact is not None
+
+
 def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
-    items = elements(run, run.evaluate(node.iter, frame), node, frame)
+    iterated = run.evaluate(node.iter, frame)
+    if _is_streamed(run, iterated):
+        return _streamed(run, node, iterated, frame)
+    return _for(run, node, elements(run, iterated, node, frame), frame)
+
+
+def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Frame) -> bool:
+    """A loop over an iterator or a list, turn by turn; the rest at once when it cannot be followed to its end."""
+    source = stream(run, iterated, Call(Arguments(), node, frame))
+    before, loop_forks = frame.unsettled, frame.loop_forks
+    frame.unsettled = False
+    frame.loop_forks = run.state.forks
+    seen: list[Value] = []
+    broken = False
+    passes, finished = True, True
+    run.state.depth += 1
+    start = run.state.mark()
+    for index in itertools.count():
+        try:
+            element = next(source, None) if run.turns > 0 else _stop()
+        except (NotConcrete, TypeError):
+            _rest(run, node, iterated, seen, frame)
+            break
+        if element is None:
+            break
+        seen.append(element)
+        run.turns -= 1
+        previous = run.enter((id(node), index))
+        mark = run.state.mark()
+        frame.jump = ""
+        passes = _turn(run, node.target, element, node.body, frame)
+        run.context = previous
+        if frame.unsettled:
+            run.state.join_seen(mark)
+            frame.unsettled = False
+            broken = passes = True
+        elif frame.jump == "continue":
+            passes = True
+        if not passes:
+            passes, finished = broken or frame.jump == "break", broken
+            break
+    run.state.depth -= 1
+    if broken:
+        run.state.join_seen(start)
+    frame.unsettled, frame.loop_forks = before, loop_forks
+    frame.jump = ""
+    if passes and finished and node.orelse:
+        return run.execute(node.orelse, frame)
+    return passes
+
+
+def _stop() -> Value:
+    raise NotConcrete
+
+
+def _rest(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, seen: list[Value], frame: Frame) -> None:
+    """The turns that cannot be followed: any of the elements, any number of times."""
+    atom = iterated[0]
+    element = join_all(seen)
+    if isinstance(atom, NativeObject):
+        element = join(element, lose(run, atom))
+    elif isinstance(atom, Sequence):
+        element = join(element, atom.items.any_element())
+    if element:
+        _fixpoint(run, frame, lambda: _turn(run, node.target, element, node.body, frame))
+
+
+def _for(run: Run, node: ast.For | ast.AsyncFor, items: Items, frame: Frame) -> bool:
     before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = False
     frame.loop_forks = run.state.forks
@@ -286,7 +392,7 @@ def _generate(
         return True
     generator = generators[index]
     items = elements(run, run.evaluate(generator.iter, frame), generator.iter, frame)
-    if items.exact is None or len(items.exact) > MAX_UNROLLED:
+    if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.turns):
         run.repeated += 1
         element = items.any_element()
         if element:
@@ -295,6 +401,7 @@ def _generate(
         run.repeated -= 1
         return False
     exact = True
+    run.turns -= 0 if run.repeated else len(items.exact)
     for turn, element in enumerate(items.exact):
         previous = run.enter((id(generator), turn))
         exact = _one(run, generators, index, frame, element, emit) and exact

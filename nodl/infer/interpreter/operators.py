@@ -8,9 +8,10 @@ import re
 import string
 from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Sequences
+from pathlib import PurePath
 
 from nodl.infer.interpreter import special
-from nodl.infer.interpreter.run import Arguments, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
 from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenate, concatenations, make_text
 from nodl.infer.values import (
     ANY,
@@ -19,6 +20,7 @@ from nodl.infer.values import (
     External,
     Instance,
     Items,
+    NativeObject,
     Sequence,
     Unknown,
     Value,
@@ -52,6 +54,8 @@ def binary_operation(
         defined = special.binary(run, left, op, right, node, frame)
         if defined:
             return defined
+    if any(isinstance(atom, NativeObject) for atom in (*left, *right)):
+        return _native_binary(run, node, left, op, right, frame)
     if isinstance(op, ast.Add):
         return _add(run, node, left, right)
     if isinstance(op, ast.Mod) and any(isinstance(atom, str | Text) for atom in left):
@@ -106,6 +110,18 @@ def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
         if _pure(left) and _pure(right)
         else concatenations([_text_side(left), _text_side(right)])
     )
+
+
+def _native_binary(
+    run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
+) -> Value:
+    """A path divided by a text, for instance."""
+    from nodl.infer.models import concrete
+
+    function = getattr(operator, special.OPERATORS[type(op)].replace("or", "or_").replace("and", "and_"), None)
+    call = Call(Arguments([left, right]), node, frame)
+    found = concrete.compute(run, function, call) if function is not None else None
+    return found if found is not None else ANY
 
 
 def _spoken_operand(run: Run, right: Value, node: ast.AST, frame: Frame) -> Value:
@@ -164,6 +180,8 @@ def _text_of_atom(atom: object) -> TextAtom:
         return make_text((Hole(atom.why),))
     if isinstance(atom, External):
         return make_text((Hole(f"{atom.path} of a library"),))
+    if isinstance(atom, NativeObject) and isinstance(atom.object, PurePath):
+        return str(atom.object)
     if isinstance(atom, Instance) and "_value_" in atom.cells:
         value = sole(atom.cells["_value_"])
         if isinstance(value, str):

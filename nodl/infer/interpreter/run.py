@@ -185,12 +185,13 @@ class Run:
         self.summaries: dict[ast.AST, Any] = {}
         self.options = OptionDefaults()
         self.environment = FieldCells()  # variables that the program sets itself
-        self.memo: dict[tuple[object, ...], tuple[tuple[int, int], Value]] = {}
+        self.memo: dict[tuple[object, ...], tuple[tuple[int, ...], Value]] = {}
         self.unstable = False  # a recursion learned something new since its outermost call asked
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
         self.turns = MAX_TURNS
+        self.callback_count = itertools.count()
         self.try_forks = 0  # undecided branches around the innermost try
         self.tries = 0  # how many try statements surround the current point
         self.risks = 0  # what may have raised an exception, counted inside of them

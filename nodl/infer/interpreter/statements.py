@@ -10,7 +10,8 @@ from nodl.infer.interpreter.assign import assign, assign_unknown, delete
 from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.define import define_class, define_function
 from nodl.infer.interpreter.operators import binary_operation
-from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Call, Executor, Frame, Run
+from nodl.infer.models.concrete import NotConcrete
 from nodl.infer.interpreter.raising import (
     Raised,
     Unwinding,
@@ -21,11 +22,13 @@ from nodl.infer.interpreter.raising import (
 )
 from nodl.infer.values import (
     ANY,
+    BOTTOM,
     NONE,
     BoundMethod,
     ClassValue,
     External,
     Instance,
+    NativeObject,
     Sequence,
     Unknown,
     Value,
@@ -311,15 +314,27 @@ def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
             result = join(result, run.call(enter, Arguments(), node, frame))
         elif isinstance(atom, Sequence) and atom.kind == "generator":
             result = join(result, atom.items.any_element())
+        elif isinstance(atom, NativeObject):
+            result = join(result, _advanced(run, atom, node, frame) or NONE)
         else:
             result = join(result, ANY)
     return result or ANY
+
+
+def _advanced(run: Run, atom: NativeObject, node: ast.AST, frame: Frame) -> Value:
+    """One step of the generator behind a ``contextlib.contextmanager``."""
+    try:
+        return next(loops.stream(run, (atom,), Call(Arguments(), node, frame)), BOTTOM)
+    except (NotConcrete, TypeError):
+        return loops.lose(run, atom)
 
 
 def _exited(run: Run, managers: list[Value], node: ast.AST, frame: Frame) -> None:
     """``__exit__`` without an exception, and perhaps with one."""
     for atom in (atom for manager in reversed(managers) for atom in manager):
         leave = special.method(atom, "__exit__") or special.method(atom, "__aexit__")
+        if isinstance(atom, NativeObject):
+            _advanced(run, atom, node, frame)
         if leave:
             run.call(leave, Arguments([NONE, NONE, NONE]), node, frame)
             run.register_callback(leave, 3)

@@ -10,7 +10,8 @@ import sys
 
 from nodl.infer.interpreter.assign import plain_store
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.models import builtin, endpoints, native, ros, stdlib
+from nodl.infer.interpreter.iterate import lose
+from nodl.infer.models import builtin, concrete, endpoints, native, pure, ros, stdlib
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
 from nodl.infer.values import (
@@ -21,6 +22,7 @@ from nodl.infer.values import (
     ForeignMethod,
     Instance,
     NativeMethod,
+    NativeObject,
     Unknown,
     Value,
     external,
@@ -50,6 +52,9 @@ _TRUSTED = frozenset(sys.stdlib_module_names) | _KEEPS_OFF
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
     path = atom.path
+    computed = _computed(run, path, call)
+    if computed is not None:
+        return computed
     model = builtin.FUNCTIONS.get(path) or stdlib.FUNCTIONS.get(path)
     if model is not None:
         return model(run, call)
@@ -69,6 +74,20 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     if ros.interface_type(path) or path.partition(".")[0] in _KEEPS_OFF:
         return external(f"{path}()" if "(" not in path else f"{path.partition('.')[0]}.()")
     return unknown(f"the result of {path}()")
+
+
+def _computed(run: Run, path: str, call: Call) -> Value | None:
+    """The result of a pure function of Python's library on known values; ``None``: not on the list, or not known."""
+    found = pure.function_at(path)
+    if found is None:
+        return None
+    result = concrete.compute(run, found[0], call, deep=found[1])
+    if result is not None:
+        run.understood.add(call.node)
+        for atom in result:
+            if isinstance(atom, NativeObject):
+                atom.sources = tuple(call.args.all_values())
+    return result
 
 
 def keeps_off(path: str) -> bool:
@@ -205,6 +224,8 @@ def _common_callback(run: Run, name: str, call: Call) -> None:
 
 def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
     receiver, name = method.receiver, method.name
+    if isinstance(receiver, NativeObject):
+        return _native_method(run, receiver, name, call)
     if isinstance(receiver, Unknown):
         if name in COMMON_CALLBACKS:
             _common_callback(run, name, call)
@@ -214,6 +235,31 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
             return ros.NODE_METHODS[name](run, record, call)
         return ANY
     return native.call_method(run, receiver, name, call)
+
+
+def _native_method(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
+    if not concrete.is_usable(run, receiver) or pure.is_io(name):
+        return lose(run, receiver) if not concrete.is_usable(run, receiver) else unknown("what a file system says")
+    run.state.pulled += 1
+    found = concrete.compute(run, getattr(receiver.object, name), call)
+    if found is None:
+        run.escape(call.args)
+        return lose(run, receiver)
+    return found
+
+
+def native_attribute(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
+    """An attribute of a real object: a method of it, or a value."""
+    if name.startswith("_") or not hasattr(receiver.object, name):
+        return unknown(f"attribute {name} of a {type(receiver.object).__name__}")
+    if callable(getattr(receiver.object, name)):
+        return (NativeMethod(receiver, name),)
+    if not concrete.is_usable(run, receiver):
+        return lose(run, receiver)
+    try:
+        return concrete.from_python(run, getattr(receiver.object, name), call, name)
+    except concrete.NotConcrete:
+        return ANY
 
 
 # --- attributes ---------------------------------------------------------------------------------------------
@@ -262,4 +308,5 @@ def hooks_of(base: object) -> frozenset[str] | None:
 
 def constant(path: str) -> Value | None:
     """Constants of foreign modules that matter for names."""
-    return stdlib.CONSTANTS.get(path)
+    known = pure.constant_at(path)
+    return stdlib.CONSTANTS.get(path) if known is None else (known,)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import collections
 from collections.abc import Callable
 
 from nodl.infer.interpreter import special
@@ -9,7 +10,8 @@ from nodl.infer.interpreter.expressions import copy_dictionary, variable
 from nodl.infer.interpreter.iterate import elements, keys_of, values_of
 from nodl.infer.interpreter.loops import store_item
 from nodl.infer.interpreter.operators import joined, str_format, text_value
-from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.models import concrete
 from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, make_text
 from nodl.infer.values import (
     ABSENT,
@@ -45,14 +47,25 @@ _SPLITS = frozenset({"split", "rsplit", "splitlines", "partition", "rpartition"}
 def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
     if isinstance(receiver, str | Text):
         return _text_method(run, receiver, name, call)
+    if isinstance(receiver, bytes):
+        found = concrete.compute(run, getattr(receiver, name, None) or _absent, call)
+        return found if found is not None else unknown(f"the result of bytes.{name}()")
     if isinstance(receiver, Dictionary):
         run.spend(len(receiver.cells))
+        if receiver.kind == "Counter" and name in _OF_COUNTERS:
+            real = concrete.to_python(run, (receiver,), call)
+            if isinstance(real, collections.Counter):
+                return concrete.compute(run, getattr(real, name), call) or ANY
         model = _DICTIONARY.get(name)
         return model(run, receiver, call) if model else _lost(run, receiver, call)
     if isinstance(receiver, Variables):
         return _variables_method(run, receiver, name, call)
     if isinstance(receiver, Sequence):
         run.spend(len(receiver.items.exact or receiver.items.rest))
+        if name not in ("append", "add"):
+            changed = _real_method(run, receiver, name, call)
+            if changed is not None:
+                return changed
         method = _SEQUENCE.get(name)
         return method(run, receiver, call) if method else _lost(run, receiver, call)
     run.escape(call.args)
@@ -82,6 +95,46 @@ def _variables_method(run: Run, receiver: Variables, name: str, call: Call) -> V
     return run.sequence(call.node, "list", items if certain else Items(None, items.any_element()))
 
 
+_OF_COUNTERS = frozenset({"most_common", "elements", "total"})
+
+
+def _absent(*_: object) -> object:
+    raise concrete.NotConcrete
+
+
+def _real_method(run: Run, owner: Sequence, name: str, call: Call) -> Value | None:
+    """A method of a list, set or tuple whose elements are known one by one, as Python does it."""
+    real = concrete.to_python(run, (owner,), call)
+    if isinstance(real, concrete.Opaque):
+        return None
+    if isinstance(real, list) and name in _OF_QUEUES:
+        real = collections.deque(real)
+    method = getattr(real, name, None)
+    if method is None or name.startswith("_"):
+        return None
+    before = list(real)
+    given = call
+    if name in ("extend", "update", "extendleft") and call.args.positional:
+        items = [elements(run, each, call.node, call.frame) for each in call.args.positional]
+        if any(each.exact is None for each in items):
+            return None
+        rows = [run.tuple_of(each.exact or ()) for each in items]
+        given = Call(Arguments(rows), call.node, call.frame)
+    found = concrete.compute(run, method, given)
+    if found is None:
+        return None
+    after = list(real)
+    if len(after) != len(before) or any(a is not b for a, b in zip(after, before, strict=True)):
+        if isinstance(real, set):
+            after = sorted(after, key=lambda each: (type(each).__name__, repr(each)))
+        parts = tuple(concrete.from_python(run, each, call) for each in after)
+        run.state.store(owner, ITEMS, (Items(parts),))
+    return found
+
+
+_OF_QUEUES = frozenset({"rotate", "appendleft", "popleft", "extendleft"})
+
+
 def _lost(run: Run, receiver: object, call: Call) -> Value:
     """A method that is not modelled: it may call what it is given and change its object."""
     run.escape(call.args)
@@ -97,6 +150,8 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
         return text_value(str_format(text, special.spoken_each(run, call.args, call.node, call.frame)))
     if name == "join":
         return text_value(joined((text,), elements(run, call.args.at(0) or ANY, call.node, call.frame)))
+    if isinstance(text, str) and name in ("translate", "expandtabs", "encode", "format_map"):
+        return _constant_method(run, text, name, (), call)
     arguments = tuple(sole(value) for value in call.args.positional)
     constant = all(isinstance(argument, str | int | type(None)) for argument in arguments)
     if not constant or call.args.keywords or call.args.more:
@@ -114,7 +169,8 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
 
 def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ...], call: Call) -> Value:
     if name not in _PURE and name not in _SPLITS:
-        return unknown(f"the result of str.{name}()")
+        found = concrete.compute(run, getattr(text, name, None) or _absent, call, owner=text)
+        return found if found is not None else unknown(f"the result of str.{name}()")
     size = len(text) + sum(len(each) if isinstance(each, str) else 0 for each in arguments)
     if size > MAX_LENGTH or any(type(each) is int and each > MAX_LENGTH for each in arguments):
         return unknown(f"the result of str.{name}() of a very long text")
@@ -133,7 +189,7 @@ def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ..
 def _append(run: Run, owner: Sequence, call: Call) -> Value:
     value = call.args.at(0) or ANY
     items = owner.items
-    if items.exact is not None and not owner.summary and len(items.exact) < 256:
+    if items.exact is not None and not owner.summary and len(items.exact) < 2048:
         run.state.store(owner, ITEMS, (Items((*items.exact, value)),))
     else:
         run.state.store(owner, ITEMS, (Items(None, join(items.any_element(), value)),))
@@ -143,7 +199,7 @@ def _append(run: Run, owner: Sequence, call: Call) -> Value:
 def _extend(run: Run, owner: Sequence, call: Call) -> Value:
     added = elements(run, call.args.at(0) or ANY, call.node, call.frame)
     items = owner.items
-    if items.exact is not None and added.exact is not None and len(items.exact + added.exact) < 256:
+    if items.exact is not None and added.exact is not None and len(items.exact + added.exact) < 2048:
         run.state.store(owner, ITEMS, (Items(items.exact + added.exact),))
     else:
         everything = join(items.any_element(), added.any_element())

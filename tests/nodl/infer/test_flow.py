@@ -44,7 +44,7 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "arguments from containers": ("x = ['a']\ny = {'name': 'b'}\nself.P(*x)\nself.P(**y)", ["a", "b"]),
     "while with break": ("i = 0\nwhile True:\n    i += 1\n    if i > 3: break\nself.P('a')", ["a"]),
     "growing text is a pattern": ("x = 'a'\nwhile sys.argv[1]:\n    x += 'b'\nself.P(x)", ["a?"]),
-    "try": ("x = 'a'\ntry:\n    x = 'b'\n    int('c')\n    x = 'd'\nexcept ValueError:\n    pass\nself.P(x)",
+    "try": ("x = 'a'\ntry:\n    x = 'b'\n    int(sys.argv[1])\n    x = 'd'\nexcept ValueError:\n    pass\nself.P(x)",
             ["a", "b", "d"]),
     "finally": ("try:\n    x = 'a'\nfinally:\n    self.P('b')\nself.P(x)", ["a", "b"]),
     "early return": ("def f():\n    if sys.argv[1]: return 'a'\n    return 'b'\nself.P(f())", ["a", "b"]),

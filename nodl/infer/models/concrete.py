@@ -1,0 +1,256 @@
+"""Known values as real Python objects and back, so that pure functions of Python's library compute on them.
+
+Only constants, containers of them and objects of a few immutable library classes become real. What is not known, and
+the program's own objects, travel as ``Opaque``: they may be moved about (``zip``, ``reversed``, ``sorted`` by a key)
+and refuse everything else. Functions of the program become callables that the interpreter runs.
+"""
+
+from __future__ import annotations
+
+import collections
+import itertools
+import re
+import string
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import PurePosixPath
+from types import GeneratorType
+from typing import Any
+
+from nodl.infer.interpreter.raising import throw
+from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.text import MAX_LENGTH
+from nodl.infer.values import (
+    ANY,
+    BoundMethod,
+    ClassMethod,
+    ClassValue,
+    Dictionary,
+    External,
+    ForeignMethod,
+    FunctionValue,
+    Items,
+    Key,
+    NativeMethod,
+    NativeObject,
+    Partial,
+    Sequence,
+    Value,
+    unknown,
+)
+
+MAX_ELEMENTS = 2_000  # of one container
+MAX_NUMBER = 1 << 16  # as an argument: widths, counts
+MAX_TEXT = 1 << 16
+_LARGE = 1 << 256  # as a result
+CONSTANTS = (str, int, float, bool, bytes, type(None))
+_CALLABLE = (FunctionValue, BoundMethod, Partial, ClassValue, ClassMethod, External, NativeMethod, ForeignMethod)
+_IMMUTABLE = (re.Pattern, re.Match, PurePosixPath, string.Template)
+_ITERATORS = (
+    GeneratorType, map, filter, zip, enumerate, reversed,
+    type(iter([])), type(iter(())), type(iter({})), type(iter(set())), type(iter("")), type(iter(range(0))),
+    type(iter({}.items())), type(iter({}.values())), type(reversed([])),
+    *(kind for kind in vars(itertools).values() if isinstance(kind, type)),
+)  # fmt: skip
+
+
+class NotConcrete(Exception):
+    """The computation needs something that is not known."""
+
+
+def _refuse(*_: object, **__: object) -> Any:
+    raise NotConcrete
+
+
+class Opaque:
+    """A value that may be passed on and nothing else."""
+
+    __slots__ = ("value",)
+
+    def __init__(self, value: Value) -> None:
+        self.value = value
+
+    __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __add__ = __radd__ = _refuse
+    __bool__ = __len__ = __iter__ = __getitem__ = __contains__ = __str__ = __repr__ = __format__ = _refuse
+    __int__ = __float__ = __index__ = __call__ = _refuse
+    __hash__ = _refuse  # type: ignore[assignment]
+
+
+class Callback:
+    """A function of the program (or of a library), called through the interpreter."""
+
+    __slots__ = ("call", "run", "value")
+
+    def __init__(self, run: Run, value: Value, call: Call) -> None:
+        self.run, self.value, self.call = run, value, call
+
+    def __call__(self, *given: object) -> Any:
+        arguments = [from_python(self.run, each, self.call, f"given {index}") for index, each in enumerate(given)]
+        previous = self.run.enter(("callback", id(self.call.node), next(self.run.callback_count)))
+        result = self.run.call(self.value, Arguments(arguments), self.call.node, self.call.frame)
+        self.run.context = previous
+        return to_python(self.run, result, self.call)
+
+
+def is_usable(run: Run, obj: NativeObject) -> bool:
+    """An object that changes is followed as long as no undecided branch lies between its making and its use."""
+    if isinstance(obj.object, _IMMUTABLE):
+        return True
+    return not obj.lost and run.state.forks == obj.forks
+
+
+def to_python(run: Run, value: Value, call: Call, deep: bool = False, level: int = 0) -> Any:
+    """The real object of ``value``; inner containers stay themselves unless ``deep``."""
+    if len(value) != 1:
+        return Opaque(value)
+    atom = value[0]
+    if isinstance(atom, CONSTANTS):
+        return atom
+    if isinstance(atom, NativeObject):
+        return atom.object if is_usable(run, atom) else Opaque(value)
+    if isinstance(atom, Sequence) and (deep or level == 0 or atom.kind == "tuple"):
+        return _real_sequence(run, atom, value, call, deep, level)
+    if isinstance(atom, Dictionary) and (deep or level == 0):
+        return _real_dictionary(run, atom, value, call, deep, level)
+    if isinstance(atom, _CALLABLE):
+        return Callback(run, value, call)
+    return Opaque(value)
+
+
+def _real_sequence(run: Run, atom: Sequence, value: Value, call: Call, deep: bool, level: int) -> Any:
+    exact = atom.items.exact
+    if exact is None or atom.escaped or atom.summary or level > 20:
+        return Opaque(value)
+    run.spend(len(exact))
+    parts = [to_python(run, part, call, deep, level + 1) for part in exact]
+    if atom.kind == "tuple":
+        return tuple(parts)
+    return set(parts) if atom.kind in ("set", "frozenset") else parts
+
+
+def _real_dictionary(run: Run, atom: Dictionary, value: Value, call: Call, deep: bool, level: int) -> Any:
+    entries = atom.entries()
+    if atom.is_open or atom.summary or level > 20 or not all(certain for _, _, certain in entries):
+        return Opaque(value)
+    run.spend(len(entries))
+    real = {key.constant: to_python(run, held, call, deep, level + 1) for key, held, _ in entries}
+    return collections.Counter(real) if atom.kind == "Counter" else real
+
+
+def from_python(run: Run, found: Any, call: Call, place: str = "") -> Value:
+    """The value of a real object. Raises ``NotConcrete`` for what has none."""
+    run.spend(1)
+    if isinstance(found, Opaque | Callback):
+        return found.value
+    if isinstance(found, CONSTANTS):
+        return _constant(found)
+    if isinstance(found, dict):
+        return _from_dictionary(run, found, call, place)
+    if isinstance(found, list | tuple | set | frozenset | collections.deque | range):
+        return _from_sequence(run, found, call, place)
+    if isinstance(found, _IMMUTABLE + _ITERATORS) or type(found).__module__ == "configparser":
+        return (NativeObject(found, run.state.forks),)
+    if type(found).__name__ in ("dict_keys", "dict_values", "dict_items"):
+        return _from_sequence(run, list(found), call, place)
+    raise NotConcrete
+
+
+def _constant(found: Any) -> Value:
+    if isinstance(found, str | bytes) and len(found) > MAX_LENGTH:
+        return unknown("a very long text")
+    if isinstance(found, int) and abs(found) > _LARGE:
+        return ANY
+    return (found,)
+
+
+def _from_sequence(run: Run, found: Any, call: Call, place: str) -> Value:
+    if len(found) > MAX_ELEMENTS:
+        raise NotConcrete
+    kind = "tuple" if isinstance(found, tuple | range) else "set" if isinstance(found, set | frozenset) else "list"
+    if kind == "set":
+        found = sorted(found, key=lambda each: (type(each).__name__, repr(each)))  # in the same order everywhere
+    parts = tuple(from_python(run, each, call, f"{place} {index}") for index, each in enumerate(found))
+    if kind == "tuple":
+        return run.tuple_of(parts)
+    obj = run.allocate(call.node, f"{kind}{place}", lambda: Sequence(kind, Items(parts)))
+    if obj.summary:
+        run.state.store(obj, "[items]", (Items(parts),))
+    return (obj,)
+
+
+def _from_dictionary(run: Run, found: dict[Any, Any], call: Call, place: str) -> Value:
+    obj = run.allocate(call.node, f"dict{place}", Dictionary)
+    assert isinstance(obj, Dictionary)
+    if isinstance(found, collections.Counter):
+        obj.kind = "Counter"
+        obj.default = (External("builtins.int"),)
+    for key, held in found.items():
+        if not isinstance(key, CONSTANTS):
+            raise NotConcrete
+        run.state.store(obj, Key(key), from_python(run, held, call, f"{place} {key!r}"))
+    return (obj,)
+
+
+# --- computing ----------------------------------------------------------------------------------------------
+
+
+def compute(run: Run, function: Callable[..., Any], call: Call, deep: bool = False, owner: Any = None) -> Value | None:
+    """``function`` of the call's arguments, or ``None`` where they are not known well enough.
+
+    An error of the function is an exception of the program.
+    """
+    args = call.args
+    if args.more or args.more_keywords:
+        return None
+    try:
+        positional = [to_python(run, value, call, deep) for value in args.positional]
+        keywords = {name: to_python(run, value, call, deep) for name, value in args.keywords.items()}
+        _check_size((*positional, *keywords.values(), owner))
+    except NotConcrete:
+        return None
+    try:
+        return from_python(run, function(*positional, **keywords), call)
+    except (NotConcrete, RecursionError, MemoryError):
+        return None
+    except (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, StopIteration, re.error) as error:
+        if _holds_opaque((*positional, *keywords.values(), owner)):
+            return None  # it may be about what is not known
+        throw(run, type(error) if type(error).__module__ == "builtins" else "ValueError", str(error))
+        return ANY
+
+
+def _holds_opaque(given: Iterable[object], level: int = 0) -> bool:
+    for each in given:
+        if isinstance(each, Opaque | Callback):
+            return True
+        if isinstance(each, dict) and _holds_opaque(each.values(), level + 1):
+            return True
+        if isinstance(each, list | tuple | collections.deque) and _holds_opaque(each, level + 1):
+            return True
+        if not isinstance(each, (*CONSTANTS, *_IMMUTABLE, dict, list, tuple, set, frozenset, range, collections.deque)):
+            return True  # an iterator, say, which may yield such
+    return False
+
+
+def _check_size(given: tuple[object, ...]) -> None:
+    for each in given:
+        if isinstance(each, str | bytes) and len(each) > MAX_TEXT:
+            raise NotConcrete
+        if isinstance(each, int) and abs(each) > MAX_NUMBER:
+            raise NotConcrete
+        if isinstance(each, float) and abs(each) > 1e300:
+            raise NotConcrete
+
+
+def pulled(run: Run, obj: NativeObject, call: Call) -> Iterator[Value]:
+    """The elements of a real iterable, one by one. Raises ``NotConcrete``."""
+    for index, each in enumerate(iter(obj.object)):
+        yield from_python(run, each, call, f"pulled {index}")
+
+
+def lose(run: Run, obj: NativeObject) -> Value:
+    """The object is used where it cannot be followed: from now on nobody knows what it gives."""
+    if not obj.lost:
+        obj.lost = True
+        run.state.learned += 1
+    run.escape(Arguments(list(obj.sources)), objects=True)
+    return unknown("an element of an iterator that is used in more than one place")

@@ -1,0 +1,202 @@
+"""The functions of Python's library that are run on known values: pure, without input or output, bounded.
+
+A reviewed list. A function is on it when its result depends on its arguments alone, it touches neither files nor
+clocks, the environment or the network, and its cost is bounded by the size of its arguments (which ``concrete``
+limits) or it gives an iterator that is consumed under a limit.
+"""
+
+from __future__ import annotations
+
+import ast
+import base64
+import builtins
+import collections
+import configparser
+import functools
+import hashlib
+import html
+import itertools
+import json
+import math
+import operator
+import posixpath
+import re
+import shlex
+import string
+import textwrap
+import urllib.parse
+from collections.abc import Callable
+from pathlib import PurePosixPath
+from typing import Any
+
+from nodl.infer.models.concrete import Callback, NotConcrete, Opaque
+
+Function = Callable[..., Any]
+
+_BUILTINS = (
+    "abs all any ascii bin bool bytes chr dict divmod enumerate filter float format frozenset hex int iter len list map "
+    "max min next oct ord pow range repr reversed round set slice sorted str sum tuple zip"
+).split()
+_METHODS = {
+    "str": str, "bytes": bytes, "int": int, "float": float, "dict": dict, "list": list, "tuple": tuple, "set": set,
+}  # fmt: skip
+_RE = "match fullmatch search findall finditer split sub subn escape compile".split()
+_ITERTOOLS = (
+    "accumulate chain combinations combinations_with_replacement compress count cycle dropwhile filterfalse groupby "
+    "islice pairwise permutations product repeat starmap takewhile tee zip_longest"
+).split()
+_PATHS = "basename commonpath commonprefix dirname isabs join normpath split splitext".split()
+_MATH = "ceil floor sqrt pow fabs gcd lcm log log2 log10 sin cos tan atan2 hypot radians degrees trunc isclose".split()
+_OPERATORS = [name for name in dir(operator) if not name.startswith("_") and name not in ("methodcaller",)]
+
+
+def _pattern(function: Function) -> Function:
+    """A function of ``re``, kept from patterns that may take for ever."""
+
+    @functools.wraps(function)
+    def run(pattern: Any, *given: Any, **named: Any) -> Any:
+        if isinstance(pattern, str) and len(pattern) > 500:
+            raise NotConcrete
+        source = pattern.pattern if isinstance(pattern, re.Pattern) else pattern
+        long = any(isinstance(each, str) and len(each) > 64 for each in given)
+        if isinstance(source, str) and long and _repeats_repetition(source):
+            raise NotConcrete
+        return function(pattern, *given, **named)
+
+    return run
+
+
+def _repeats_repetition(pattern: str) -> bool:
+    return re.search(r"[*+}][^()]*\)[*+{]", pattern) is not None
+
+
+def _chain(*columns: Any) -> Any:
+    return itertools.chain(*columns)
+
+
+def _from_iterable(columns: Any) -> Any:
+    return itertools.chain.from_iterable(columns)
+
+
+def _no_opaque(function: Function) -> Function:
+    """A function that would compare its arguments by identity."""
+
+    @functools.wraps(function)
+    def run(*given: Any, **named: Any) -> Any:
+        if any(isinstance(each, Opaque | Callback) for each in (*given, *named.values())):
+            raise NotConcrete
+        return function(*given, **named)
+
+    return run
+
+
+def _range(*bounds: Any) -> Any:
+    numbers = range(*bounds)
+    if len(numbers) > 1_000:
+        raise NotConcrete
+    return numbers
+
+
+def _tee(iterable: Any, n: int = 2) -> Any:
+    kept = list(itertools.islice(iterable, 1_000))
+    return tuple(iter(list(kept)) for _ in range(n))
+
+
+def _yaml(text: Any, *_: Any, **__: Any) -> Any:
+    import yaml
+
+    if not isinstance(text, str) or "*" in text and "&" in text:
+        raise NotConcrete
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        raise ValueError(str(error)) from error
+
+
+def _json(text: Any, **named: Any) -> Any:
+    if not isinstance(text, str) or named:
+        raise NotConcrete
+    return json.loads(text)
+
+
+def _digest(name: str) -> Function:
+    def run(data: Any = b"") -> Any:
+        if not isinstance(data, bytes):
+            raise NotConcrete
+        return getattr(hashlib, name)(data).hexdigest()
+
+    return run
+
+
+SHALLOW: dict[str, Function] = {
+    **{f"builtins.{name}": getattr(builtins, name) for name in _BUILTINS},
+    "builtins.range": _range,
+    **{f"re.{name}": _pattern(getattr(re, name)) for name in _RE},
+    **{f"itertools.{name}": getattr(itertools, name) for name in _ITERTOOLS if hasattr(itertools, name)},
+    "itertools.chain": _chain,
+    "itertools.chain.from_iterable": _from_iterable,
+    "itertools.tee": _tee,
+    **{f"{module}.{name}": getattr(posixpath, name) for module in ("os.path", "posixpath") for name in _PATHS},
+    **{f"math.{name}": getattr(math, name) for name in _MATH if hasattr(math, name)},
+    **{f"operator.{name}": _no_opaque(getattr(operator, name)) for name in _OPERATORS},
+    "functools.reduce": functools.reduce,
+    "collections.Counter": collections.Counter,
+    "collections.deque": collections.deque,
+    "collections.OrderedDict": dict,
+    "pathlib.Path": PurePosixPath,
+    "pathlib.PosixPath": PurePosixPath,
+    "pathlib.PurePath": PurePosixPath,
+    "pathlib.PurePosixPath": PurePosixPath,
+    "string.Template": string.Template,
+    "string.capwords": string.capwords,
+    "configparser.ConfigParser": configparser.ConfigParser,
+    "shlex.quote": shlex.quote,
+    "shlex.split": shlex.split,
+    "html.escape": html.escape,
+    "urllib.parse.quote": urllib.parse.quote,
+    "urllib.parse.unquote": urllib.parse.unquote,
+    "ast.literal_eval": ast.literal_eval,
+    "base64.b64encode": base64.b64encode,
+    "base64.b64decode": base64.b64decode,
+    **{f"textwrap.{name}": getattr(textwrap, name) for name in ("dedent", "indent", "shorten", "wrap", "fill")},
+}
+# These look into what containers hold.
+DEEP: dict[str, Function] = {
+    "builtins.str": str,
+    "builtins.repr": repr,
+    "builtins.ascii": ascii,
+    "json.dumps": json.dumps,
+    "json.loads": _json,
+    "yaml.safe_load": _yaml,
+    "copy.deepcopy": lambda value: value,
+}
+IMMUTABLE_ATTRIBUTES = frozenset({"pattern", "string", "lastindex", "lastgroup", "template", "delimiter"})
+_PATH_IO = frozenset(
+    {"absolute", "resolve", "expanduser", "exists", "is_file", "is_dir", "read_text", "open", "glob", "iterdir"}
+)
+
+
+def function_at(path: str) -> tuple[Function, bool] | None:
+    """The function called ``path`` and whether it looks into containers; ``None``: not on the list."""
+    if path in DEEP:
+        return DEEP[path], True
+    if path in SHALLOW:
+        return SHALLOW[path], False
+    owner, _, name = path.rpartition(".")
+    kind = _METHODS.get(owner.removeprefix("builtins."))
+    if kind is not None and owner.startswith("builtins.") and not name.startswith("_"):
+        return getattr(kind, name, None) and (_no_opaque(getattr(kind, name)), False)
+    return None
+
+
+def constant_at(path: str) -> object:
+    """A constant of a library; ``None``: not on the list."""
+    module, _, name = path.rpartition(".")
+    owner = {"string": string, "math": math, "re": re}.get(module)
+    value = getattr(owner, name, None) if owner is not None and not name.startswith("_") else None
+    return value if isinstance(value, str | int | float) else None
+
+
+def is_io(name: str) -> bool:
+    """A method of a path that asks the file system."""
+    return name in _PATH_IO
