@@ -88,8 +88,8 @@ def analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> 
 
 def _analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:
     main = run.modules.get("__main__")
-    if main is None:
-        return
+    if main is None or any(record.created and record.source.file == main.source.path for record in run.findings.nodes):
+        return  # a program, not a library: what it does not use stays unused
     missing = unknown("an argument that nothing analysed gives")
     found = False
     for cls in list(run.classes.values()):

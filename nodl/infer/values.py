@@ -328,6 +328,15 @@ class Partial:
 
 
 @dataclass(frozen=True, slots=True)
+class Getter:
+    """``operator.methodcaller``, ``attrgetter`` and ``itemgetter`` with what they were given."""
+
+    kind: str
+    positional: tuple[Value, ...]
+    keywords: tuple[tuple[str, Value], ...]
+
+
+@dataclass(frozen=True, slots=True)
 class SuperProxy:
     """``super()`` inside a method of ``owner`` for object ``receiver``."""
 

@@ -110,6 +110,10 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
     from nodl.infer.interpreter.loops import store_item
 
     owners = run.evaluate(target.value, frame)
+    if isinstance(target.slice, ast.Slice):
+        for owner in owners:
+            _store_slice(run, owner, target.slice, value, len(owners) == 1, frame)
+        return
     key = run.evaluate(target.slice, frame)
     for owner in owners:
         if isinstance(owner, Dictionary):
@@ -127,6 +131,24 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
             run.call(setter, Arguments([key, value]), target, frame)
         else:
             run.escape_value(value)
+
+
+def _store_slice(
+    run: Run, owner: object, bounds: ast.Slice, value: Value, certain: bool, frame: Frame
+) -> None:
+    from nodl.infer.interpreter.expressions import slice_of
+
+    if not isinstance(owner, Sequence):
+        run.escape_value(value)
+        return
+    added = elements(run, value, bounds, frame)
+    exact, known = owner.items.exact, slice_of(run, bounds, frame)
+    if certain and exact is not None and added.exact is not None and known is not None and known.step is None:
+        changed = list(exact)
+        changed[known] = added.exact
+        run.state.store(owner, ITEMS, (Items(tuple(changed)),))
+        return
+    run.state.store(owner, ITEMS, (Items(None, join(owner.items.any_element(), added.any_element())),))
 
 
 def _set_environment(run: Run, key: Value, value: Value, node: ast.AST, frame: Frame) -> None:

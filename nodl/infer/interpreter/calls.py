@@ -25,6 +25,7 @@ from nodl.infer.values import (
     External,
     ForeignMethod,
     FunctionValue,
+    Getter,
     Instance,
     Items,
     Key,
@@ -253,6 +254,29 @@ def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
     return run.call(partial.function, args, call.node, call.frame)
 
 
+def _call_getter(run: Run, getter: Getter, call: Call) -> Value:
+    """``operator.methodcaller('m', ...)(x)`` is ``x.m(...)``."""
+    owner = call.args.at(0) or ANY
+    found: list[Value] = []
+    for given in getter.positional[: 1 if getter.kind == "methodcaller" else None]:
+        if getter.kind == "itemgetter":
+            item = run.attribute(owner, "__getitem__", call.node, call.frame)
+            found.append(run.call(item, Arguments([given]), call.node, call.frame))
+            continue
+        text = given[0] if len(given) == 1 and isinstance(given[0], str) else None
+        if text is None:
+            run.gap(call.node, call.frame, "an attribute whose name is made at run time is used")
+            return ANY
+        value = owner
+        for step in text.split("."):
+            value = run.attribute(value, step, call.node, call.frame)
+        found.append(value)
+    if getter.kind == "methodcaller":
+        args = Arguments(list(getter.positional[1:]), dict(getter.keywords))
+        return run.call(found[0], args, call.node, call.frame)
+    return found[0] if len(found) == 1 else run.tuple_of(tuple(found))
+
+
 def _call_instance(run: Run, instance: Instance, call: Call) -> Value:
     if isinstance(instance.cls, External):
         run.escape(call.args)
@@ -382,6 +406,7 @@ CALLABLES: dict[type, Caller] = {
     FunctionValue: call_function,
     BoundMethod: _call_bound,
     Partial: _call_partial,
+    Getter: _call_getter,
     Instance: _call_instance,
     ClassMethod: _call_class_method,
     ClassValue: instantiate,

@@ -135,14 +135,14 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
             own = special.comparison(run, operator, left, right, node, frame)
             if own and len(node.ops) == 1:
                 return own
-        results.add(truth(own) if own else _compare_values(operator, left, right))
+        results.add(truth(own) if own else compare_values(operator, left, right))
         left = right
     if results == {True}:
         return (True,)
     return (False,) if False in results else (True, False)
 
 
-def _compare_values(operator: ast.cmpop, left: Value, right: Value) -> bool | None:
+def compare_values(operator: ast.cmpop, left: Value, right: Value) -> bool | None:
     if len(left) * len(right) > 16 or not left or not right:
         return None
     outcomes = {_compare_atoms(operator, a, b) for a in left for b in right}

@@ -11,6 +11,7 @@ from nodl.infer.interpreter.conditions import compare, decide, narrowed, truth, 
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.iterate import elements, values_of
 from nodl.infer.interpreter.operators import binary, f_string
+from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Arguments, Call, Evaluator, Frame, Run
 from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
@@ -203,7 +204,7 @@ def copy_dictionary(run: Run, target: Dictionary, source: Value) -> None:
 def _subscript(run: Run, node: ast.Subscript, frame: Frame) -> Value:
     owner = run.evaluate(node.value, frame)
     key = run.evaluate(node.slice, frame) if not isinstance(node.slice, ast.Slice) else ANY
-    if isinstance(node.slice, ast.Slice):
+    if isinstance(node.slice, ast.Slice) and not all(isinstance(a, str | Sequence) for a in owner):
         for bound in (node.slice.lower, node.slice.upper, node.slice.step):
             if bound is not None:
                 run.evaluate(bound, frame)
@@ -220,10 +221,10 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         return dictionary_item(run, atom, key, node, frame)
     if isinstance(atom, Sequence):
         if isinstance(node.slice, ast.Slice):
-            return _sliced(run, atom, node)
-        return _sequence_item(atom, key)
+            return _sliced(run, atom, node, frame)
+        return _sequence_item(run, atom, key)
     if isinstance(atom, str):
-        return _character(atom, key, node)
+        return _character(run, atom, key, node, frame)
     if isinstance(atom, Text):
         piece = atom.pieces[0]
         index = key[0] if len(key) == 1 else None
@@ -295,12 +296,19 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
                 old = obj.held(atom)[0]
                 run.state.write(obj.cells, Key(atom), join(old, made))
         result = join(result, made)
+    if not result and not everything and not obj.is_open and is_settled(run):
+        throw(run, KeyError)
     if obj.escaped or not result:
         result = join(result, unknown("an element of a dictionary that is filled elsewhere"))
     return result
 
 
-def _sequence_item(sequence: Sequence, key: Value) -> Value:
+def is_settled(run: Run) -> bool:
+    """Whether nothing else can have changed what is seen: no callback is waiting, nothing is repeated."""
+    return not run.callbacks and not run.repeated
+
+
+def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     items = sequence.items
     if items.exact is None or sequence.escaped:
         return join(items.any_element(), ANY) if sequence.escaped else items.any_element() or ANY
@@ -310,39 +318,35 @@ def _sequence_item(sequence: Sequence, key: Value) -> Value:
         for index in key:
             if isinstance(index, int) and -length <= index < length:
                 result = join(result, items.exact[index])
+        if not result and is_settled(run):
+            throw(run, IndexError)
         return result or ANY
     return items.any_element() or ANY
 
 
-def _sliced(run: Run, sequence: Sequence, node: ast.Subscript) -> Value:
+def _sliced(run: Run, sequence: Sequence, node: ast.Subscript, frame: Frame) -> Value:
     items = sequence.items
-    bounds = _slice(node.slice)
+    bounds = slice_of(run, node.slice, frame)
     if items.exact is not None and bounds is not None and not sequence.escaped:
         return run.sequence(node, sequence.kind, Items(items.exact[bounds]))
     return run.sequence(node, sequence.kind, Items(None, items.any_element()))
 
 
-def _slice(node: ast.expr) -> slice | None:
-    """The slice if its bounds are literal."""
+def slice_of(run: Run, node: ast.expr, frame: Frame) -> slice | None:
+    """The slice if its bounds are known."""
     assert isinstance(node, ast.Slice)
     bounds: list[int | None] = []
     for bound in (node.lower, node.upper, node.step):
-        if bound is None:
-            bounds.append(None)
-            continue
-        try:
-            literal = ast.literal_eval(bound)
-        except ValueError:
+        value = NONE if bound is None else run.evaluate(bound, frame)
+        if len(value) != 1 or not isinstance(value[0], int | None):
             return None
-        if type(literal) is not int:
-            return None
-        bounds.append(literal)
+        bounds.append(value[0])
     return slice(*bounds) if bounds[2] != 0 else None
 
 
-def _character(text: str, key: Value, node: ast.Subscript) -> Value:
+def _character(run: Run, text: str, key: Value, node: ast.Subscript, frame: Frame) -> Value:
     if isinstance(node.slice, ast.Slice):
-        bounds = _slice(node.slice)
+        bounds = slice_of(run, node.slice, frame)
         return (text[bounds],) if bounds is not None else unknown("a part of a text")
     index = key[0] if len(key) == 1 else None
     if type(index) is int and -len(text) <= index < len(text):

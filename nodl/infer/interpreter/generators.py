@@ -10,6 +10,7 @@ from __future__ import annotations
 import ast
 import functools
 from collections.abc import Generator
+from types import GeneratorType
 from typing import Any
 
 from nodl.infer.interpreter import loops
@@ -18,7 +19,7 @@ from nodl.infer.interpreter.conditions import decide
 from nodl.infer.interpreter.raising import Raised
 from nodl.infer.interpreter.run import Call, Frame, Run
 from nodl.infer.models.concrete import NotConcrete, from_python, to_python
-from nodl.infer.values import NONE, FunctionValue, LocalCells, Value
+from nodl.infer.values import NONE, FunctionValue, LocalCells, NativeObject, Value
 
 Steps = Generator[Any, Any, bool]
 
@@ -108,6 +109,10 @@ def _value(run: Run, node: ast.expr | None, frame: Frame, call: Call) -> Generat
         return from_python(run, sent, call)
     if isinstance(node, ast.YieldFrom):
         iterated = run.evaluate(node.value, frame)
+        atom = iterated[0] if len(iterated) == 1 else None
+        if isinstance(atom, NativeObject) and isinstance(atom.object, GeneratorType):
+            yield from atom.object
+            return NONE
         for element in loops.stream(run, iterated, Call(call.args, node, frame)):
             yield to_python(run, element, call, level=1)
         return NONE

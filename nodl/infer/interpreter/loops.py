@@ -168,9 +168,10 @@ def _limit(run: Run, exact: tuple[Value, ...], node: ast.For | ast.AsyncFor) -> 
 
 
 @functools.lru_cache(maxsize=4096)
-def _may_name(node: ast.For | ast.AsyncFor) -> bool:
+def _may_name(node: ast.For | ast.AsyncFor | ast.While) -> bool:
     """Whether the loop's number can become part of a text: one stands in the body, or the number is passed on."""
-    numbers = {name.id for name in ast.walk(node.target) if isinstance(name, ast.Name)}
+    counting = node.test if isinstance(node, ast.While) else node.target
+    numbers = {name.id for name in ast.walk(counting) if isinstance(name, ast.Name)}
     for part in (inner for statement in node.body for inner in ast.walk(statement)):
         if isinstance(part, ast.JoinedStr) or (
             isinstance(part, ast.Constant) and isinstance(part.value, str)
@@ -242,14 +243,15 @@ def _while(run: Run, node: ast.While, frame: Frame) -> tuple[bool, bool]:
         if outcome is False:
             run.state.depth -= 1
             return True, True
-        if outcome is None or not _fuel(run, turn):
+        if outcome is None or not _fuel(run, node, turn):
             break
         turn += 1
         version, mark = run.state.version(), run.state.mark()
-        previous = run.enter((id(node), turn))
+        previous, unrolled = run.enter((id(node), turn)), run.unrolled
+        run.unrolled *= MAX_UNROLLED_NUMBERS if run.repeated else 1
         frame.jump = ""
         passes = run.execute(node.body, frame)
-        run.context = previous
+        run.context, run.unrolled = previous, unrolled
         if frame.unsettled:
             run.state.join_seen(mark)
             frame.unsettled = False
@@ -267,9 +269,9 @@ def _while(run: Run, node: ast.While, frame: Frame) -> tuple[bool, bool]:
     return passes, finished
 
 
-def _fuel(run: Run, turn: int) -> bool:
+def _fuel(run: Run, node: ast.While, turn: int) -> bool:
     if run.repeated:
-        return turn < MAX_UNROLLED_NUMBERS
+        return turn * run.unrolled < MAX_UNROLLED_NUMBERS and _may_name(node)
     run.turns -= 1
     return run.turns > 0
 

@@ -11,6 +11,7 @@ from collections.abc import Sequence as Sequences
 from pathlib import PurePath
 
 from nodl.infer.interpreter import special
+from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
 from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenate, concatenations, make_text
 from nodl.infer.values import (
@@ -36,6 +37,9 @@ _ARITHMETIC: dict[type, Callable[[object, object], object]] = {
     ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
+    ast.BitOr: operator.or_,
+    ast.BitAnd: operator.and_,
+    ast.BitXor: operator.xor,
 }
 _NUMBERS = (int, float)
 _LARGE = 1 << 40
@@ -56,6 +60,11 @@ def binary_operation(
             return defined
     if any(isinstance(atom, NativeObject) for atom in (*left, *right)):
         return _native_binary(run, node, left, op, right, frame)
+    containers = (Sequence, Dictionary)
+    if len(left) == len(right) == 1 and isinstance(left[0], containers) and isinstance(right[0], containers):
+        found = _container_operation(run, node, left, op, right, frame)
+        if found is not None:
+            return found
     if isinstance(op, ast.Add):
         return _add(run, node, left, right)
     if isinstance(op, ast.Mod) and any(isinstance(atom, str | Text) for atom in left):
@@ -89,7 +98,10 @@ def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: o
         return (b,) if isinstance(b, Unknown) else (a,) if isinstance(a, Unknown) else ANY
     try:
         result = _ARITHMETIC[type(op)](a, b)
-    except (ArithmeticError, ValueError):
+    except (ArithmeticError, ValueError) as error:
+        throw(run, type(error))
+        return ANY
+    except TypeError:
         return ANY
     return (result,) if isinstance(result, _NUMBERS) and abs(result) < _LARGE else ANY
 
@@ -110,6 +122,25 @@ def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
         if _pure(left) and _pure(right)
         else concatenations([_text_side(left), _text_side(right)])
     )
+
+
+def _container_operation(
+    run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
+) -> Value | None:
+    """Union, difference ... of sets, and ``|`` of dictionaries."""
+    from nodl.infer.interpreter.expressions import copy_dictionary
+    from nodl.infer.models import concrete
+
+    if isinstance(left[0], Dictionary) and isinstance(op, ast.BitOr):
+        merged = run.allocate(node, "merged", Dictionary)
+        assert isinstance(merged, Dictionary)
+        copy_dictionary(run, merged, left)
+        copy_dictionary(run, merged, right)
+        return (merged,)
+    function = {ast.BitOr: operator.or_, ast.BitAnd: operator.and_, ast.BitXor: operator.xor, ast.Sub: operator.sub}
+    chosen = function.get(type(op))
+    call = Call(Arguments([left, right]), node, frame)
+    return concrete.compute(run, chosen, call) if chosen is not None else None
 
 
 def _native_binary(

@@ -147,6 +147,7 @@ class Tables:
     statements: dict[type, Executor]
     callables: dict[type, Caller]
     attributes: dict[type, AttributeReader]
+    may_fail: Callable[[object], bool]  # whether the call that gave this object of a library may have raised
     keeps_off: Callable[[str], bool]  # whether a library leaves the program's classes and objects alone
     creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
 
@@ -218,7 +219,7 @@ class Run:
         kind = type(atom)
         if kind is Unknown or kind is Text or (len(value) != 1):
             self.risks += 1
-        elif type(node) is ast.Call and (kind is External or (kind is Instance and type(atom.cls) is External)):  # type: ignore[union-attr]
+        elif type(node) is ast.Call and (kind is External or self.tables.may_fail(atom)):
             self.risks += 1
         return value
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 from typing import Any
 
-from nodl.infer.interpreter import imports, loops, special
+from nodl.infer.interpreter import imports, loops, patterns, special
 from nodl.infer.interpreter.assign import assign, assign_unknown, delete
 from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.define import define_class, define_function
@@ -340,23 +340,24 @@ def _exited(run: Run, managers: list[Value], node: ast.AST, frame: Frame) -> Non
             run.register_callback(leave, 3)
 
 
-def _match(run: Run, node: Any, frame: Frame) -> bool:
-    subject = run.evaluate(node.subject, frame)
+def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
+    return _cases(run, node.cases, run.evaluate(node.subject, frame), frame)
 
-    def case_of(case: Any) -> Any:
-        def run_case() -> bool:
-            for pattern in ast.walk(case.pattern):
-                name = getattr(pattern, "name", None) or getattr(pattern, "rest", None)
-                if isinstance(name, str):
-                    whole = pattern is case.pattern
-                    run.assign_name(name, subject if whole else ANY, frame)
-            if case.guard is not None:
-                run.evaluate(case.guard, frame)
+
+def _cases(run: Run, cases: list[ast.match_case], subject: Value, frame: Frame) -> bool:
+    """The first case that fits; from the first one of which that is not known on, any of them."""
+    for index, case in enumerate(cases):
+        outcome = patterns.matches(run, case.pattern, subject, frame)
+        if outcome is not False and case.guard is not None:
+            outcome = patterns.both(outcome, decide(run, case.guard, frame))
+        if outcome:
             return run.execute(case.body, frame)
-
-        return run_case
-
-    return run.state.branches([*(case_of(case) for case in node.cases), lambda: True])
+        if outcome is None:
+            rest = cases[index + 1 :]
+            return run.state.branches(
+                (lambda case=case: run.execute(case.body, frame), lambda: _cases(run, rest, subject, frame))
+            )
+    return True
 
 
 def _global(run: Run, node: ast.Global, frame: Frame) -> bool:

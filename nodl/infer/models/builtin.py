@@ -6,7 +6,7 @@ import ast
 import builtins
 from collections.abc import Callable
 
-from nodl.infer.interpreter import special
+from nodl.infer.interpreter import patterns, special
 from nodl.infer.interpreter.assign import store_attribute
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.define import complete_class, linearized
@@ -14,6 +14,7 @@ from nodl.infer.interpreter.expressions import copy_dictionary
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.iterate import elements, keys_of
 from nodl.infer.interpreter.operators import as_texts, formatted, text_value
+from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.text import Text
 from nodl.infer.values import (
@@ -40,6 +41,7 @@ from nodl.infer.values import (
     Variables,
     constant_strings,
     join,
+    present,
     sole,
     unknown,
 )
@@ -215,6 +217,14 @@ def _store_pairs(run: Run, obj: object, items: Items, call: Call) -> None:
 
 def _getattr(run: Run, call: Call) -> Value:
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
+    there = has_attribute(run, sole(owner), sole(names))
+    if there is False:
+        default = call.args.at(2)
+        if default is not None:
+            return default
+        throw(run, AttributeError)
+    elif there:
+        return run.attribute(owner, str(sole(names)), call.node, call.frame)
     found: Value = BOTTOM
     for name in constant_strings(names):
         found = join(found, run.attribute(owner, name, call.node, call.frame))
@@ -269,17 +279,36 @@ def _setattr(run: Run, call: Call) -> Value:
 
 
 def _hasattr(run: Run, call: Call) -> Value:
-    return BOOLEAN
+    outcome = has_attribute(run, sole(call.args.at(0)), sole(call.args.at(1)))
+    return BOOLEAN if outcome is None else (outcome,)
+
+
+def has_attribute(run: Run, owner: object, name: object) -> bool | None:
+    """Whether the attribute is there. Once callbacks are registered, they may still set what is missing."""
+    if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
+        return None
+    held = owner.cells.get(name)
+    if held:
+        return True if present(held) is held and not owner.summary else None
+    if isinstance(owner, ModuleValue):
+        return None
+    cls = owner.cls if isinstance(owner, Instance) else owner
+    if not isinstance(cls, ClassValue):
+        return None
+    order = linearized(cls)
+    if any(isinstance(base, ClassValue) and base.cells.get(name) for base in order):
+        return True
+    plain = all(
+        isinstance(base, ClassValue) and "__getattr__" not in base.cells and "__getattribute__" not in base.cells
+        for base in order
+    )
+    known = plain and not run.callbacks and not run.repeated and not owner.summary and not name.startswith("__")
+    return False if known else None
 
 
 def _isinstance(run: Run, call: Call) -> Value:
-    """Certain only for constants against built-in types."""
-    atom, kind = sole(call.args.at(0)), sole(call.args.at(1))
-    if isinstance(kind, External) and isinstance(atom, str | int | float | type(None)):
-        expected = getattr(builtins, kind.path.removeprefix("builtins."), None)
-        if isinstance(expected, type):
-            return (isinstance(atom, expected),)
-    return BOOLEAN
+    outcome = patterns.is_instance(call.args.at(0) or ANY, call.args.at(1) or ANY)
+    return BOOLEAN if outcome is None else (outcome,)
 
 
 def _type(run: Run, call: Call) -> Value:

@@ -28,6 +28,7 @@ from nodl.infer.values import (
     External,
     ForeignMethod,
     FunctionValue,
+    Getter,
     Items,
     Key,
     NativeMethod,
@@ -43,7 +44,7 @@ MAX_NUMBER = 1 << 16  # as an argument: widths, counts
 MAX_TEXT = 1 << 16
 _LARGE = 1 << 256  # as a result
 CONSTANTS = (str, int, float, bool, bytes, type(None))
-_CALLABLE = (FunctionValue, BoundMethod, Partial, ClassValue, ClassMethod, External, NativeMethod, ForeignMethod)
+_CALLABLE = (FunctionValue, BoundMethod, Partial, Getter, ClassValue, ClassMethod, External, NativeMethod, ForeignMethod)
 _IMMUTABLE = (re.Pattern, re.Match, PurePosixPath, string.Template)
 _ITERATORS = (
     GeneratorType, map, filter, zip, enumerate, reversed,

@@ -90,6 +90,14 @@ def _computed(run: Run, path: str, call: Call) -> Value | None:
     return result
 
 
+def may_fail(atom: object) -> bool:
+    """Whether the call that gave ``atom`` may have raised: not one that made an endpoint with a known name."""
+    if not isinstance(atom, Instance) or not isinstance(atom.cls, External):
+        return False
+    names = atom.cells.get("name", ())
+    return atom.cls.path not in endpoints.CLASSES or not all(isinstance(name, str) for name in names)
+
+
 def keeps_off(path: str) -> bool:
     """Whether the library of ``path`` leaves the program's classes and objects alone."""
     return path.partition(".")[0] in _KEEPS_OFF

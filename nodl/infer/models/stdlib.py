@@ -20,7 +20,9 @@ from nodl.infer.values import (
     External,
     Instance,
     Items,
+    Getter,
     Partial,
+    PartialMethod,
     Sequence,
     Value,
     constant_strings,
@@ -149,6 +151,23 @@ def _partial(run: Run, call: Call) -> Value:
     return (Partial(function, tuple(call.args.positional[1:]), keywords),)
 
 
+def _partial_method(run: Run, call: Call) -> Value:
+    made = _partial(run, call)[0]
+    return (PartialMethod(made),) if isinstance(made, Partial) else ANY
+
+
+def _method_caller(run: Run, call: Call) -> Value:
+    return (Getter("methodcaller", tuple(call.args.positional), tuple(call.args.keywords.items())),)
+
+
+def _attribute_getter(run: Run, call: Call) -> Value:
+    return (Getter("attrgetter", tuple(call.args.positional), ()),)
+
+
+def _item_getter(run: Run, call: Call) -> Value:
+    return (Getter("itemgetter", tuple(call.args.positional), ()),)
+
+
 def _thread(run: Run, call: Call) -> Value:
     """``Thread(target=f, args=(...))``: calls ``f`` with these arguments, some time later."""
     target = call.args.at(1, "target") or NONE
@@ -270,6 +289,10 @@ FUNCTIONS: dict[str, Model] = {
     "os.path.join": _path_join,
     "os.path.basename": _base_name,
     "functools.partial": _partial,
+    "functools.partialmethod": _partial_method,
+    "operator.methodcaller": _method_caller,
+    "operator.attrgetter": _attribute_getter,
+    "operator.itemgetter": _item_getter,
     "functools.reduce": _reduce,
     "threading.Thread": _thread,
     "threading.Timer": _timer,
