@@ -138,9 +138,10 @@ def counts(system: InferredSystem) -> tuple[int, ...]:
 
 
 def channel(node: NodeInterface, endpoint: Endpoint) -> object:
-    if not endpoint.name.is_literal:
-        return endpoint.source, str(endpoint.name)
-    return expand_name(endpoint.name.text, namespace=node.namespace or "/", node=node.name or "node")
+    name_template = endpoint.name.unconditional
+    if not name_template.is_literal:
+        return endpoint.source, str(name_template)
+    return expand_name(name_template.text, namespace=node.namespace or "/", node=node.name or "node")
 
 
 if __name__ == "__main__":

@@ -7,7 +7,7 @@ the name is then the parameter ``t``, to be filled in with what the launch file 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import NamedTuple
 
 from nodl.names import InvalidNameError, expand_name
@@ -18,6 +18,15 @@ Edit = tuple[str, tuple[str, ...]]
 EDITS = frozenset(
     {"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"}
 )
+
+
+CONDITIONS: dict[str, Callable[..., bool]] = {
+    "only if equal": lambda text, other: text == other,
+    "only if different": lambda text, other: text != other,
+    "only if true": lambda text: text.lower() == "true",
+    "only if false": lambda text: text.lower() != "true",
+}
+"""Edits that keep a name where they hold and drop it elsewhere."""
 
 
 class ParameterPart(NamedTuple):
@@ -41,12 +50,27 @@ class ParameterPart(NamedTuple):
         given = self._given(parameters)
         if given:
             values = [value for each in given for value in self._items(each)]
-        return tuple(self._edited(str(value)) for value in values)
+        if not values and self.is_condition:
+            return ("",)  # what is not known may hold
+        return tuple(dict.fromkeys(text for value in values for text in self._edited(str(value))))
+
+    @property
+    def is_condition(self) -> bool:
+        """It adds nothing to the name, which only exists where the parameter has a certain value."""
+        return bool(self.edits) and self.edits[-1][0] in CONDITIONS
+
+    def may_be_none(self, parameters: Mapping[str, object]) -> bool:
+        """It certainly stands for no text at all: an empty list, a condition that does not hold."""
+        listed = self.item == "each" or any(method in ("split", "range") for method, _ in self.edits)
+        known = self.name in parameters or self.default is not None
+        return self.is_condition or self.name.endswith(".**") or (listed and known)
 
     def _given(self, parameters: Mapping[str, object]) -> list[object]:
         if "*" not in self.name:
             return [parameters[self.name]] if self.name in parameters else []
-        pattern = re.escape(self.name).replace(r"\*", "[^.]+")
+        pattern = re.escape(self.name).replace(r"\*\*", ".+").replace(r"\*", "[^.]+")
+        if self.edits and self.edits[0][0] == "key":
+            return [name for name in sorted(parameters) if re.fullmatch(pattern, name)]
         return [parameters[name] for name in sorted(parameters) if re.fullmatch(pattern, name)]
 
     def _items(self, value: object) -> Sequence[object]:
@@ -60,13 +84,28 @@ class ParameterPart(NamedTuple):
             )
         return tuple(value)
 
-    def _edited(self, text: str) -> str:
+    def _edited(self, text: str) -> list[str]:
+        texts = [text]
         for method, arguments in self.edits:
-            if method in EDITS:
-                text = getattr(text, method)(*arguments)
-            elif method == "remapped":
-                text = _remapped(text, *arguments)
-        return text
+            texts = [result for each in texts for result in _edit(each, method, arguments)]
+        return texts
+
+
+def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
+    """One edit: normally one text, several from ``split`` and ``range``, perhaps none from a condition."""
+    if method in EDITS:
+        return (getattr(text, method)(*arguments),)
+    if method == "split":
+        return text.split(arguments[0] if arguments else None)
+    if method == "range":
+        first = int(arguments[0]) if arguments else 0
+        is_number = text.removeprefix("-").isdigit() and len(text) < 6
+        return [str(number) for number in range(first, int(text))] if is_number else ()
+    if method == "key":
+        return (text.removeprefix(arguments[0]),)
+    if method in CONDITIONS:
+        return ("",) if CONDITIONS[method](text, *arguments) else ()
+    return (_remapped(text, *arguments),) if method == "remapped" else (text,)
 
 
 def _remapped(text: str, namespace: str, node: str, *pairs: str) -> str:
@@ -103,6 +142,12 @@ class NameTemplate(NamedTuple):
     def is_literal(self) -> bool:
         return all(isinstance(part, str) for part in self.parts)
 
+    @property
+    def unconditional(self) -> NameTemplate:
+        """The same name whether or not the conditions on it hold."""
+        kept = tuple(p for p in self.parts if not (isinstance(p, ParameterPart) and p.is_condition))
+        return self if len(kept) == len(self.parts) else NameTemplate(kept)
+
     def fill(self, parameters: Mapping[str, object]) -> NameTemplate:
         """Replace parameter parts by the given values (else by their defaults, else unknown).
 
@@ -120,7 +165,7 @@ class NameTemplate(NamedTuple):
             choices: tuple[Part, ...] = (part,)
             if isinstance(part, ParameterPart):
                 choices = part.texts(parameters)
-                if not choices and not (part.item == "each" and part.name in parameters):
+                if not choices and not part.may_be_none(parameters):
                     choices = (UnknownPart(f"parameter {part.name!r} has no value"),)
             results = [_appended(result, choice) for result in results for choice in choices]
         return tuple(NameTemplate(result) for result in results)
@@ -143,5 +188,5 @@ def _appended(parts: tuple[Part, ...], part: Part) -> tuple[Part, ...]:
 
 def _shown(part: Part) -> str:
     if isinstance(part, ParameterPart):
-        return f"param:{part.name}"
+        return "" if part.is_condition else f"param:{part.name}"
     return part if isinstance(part, str) else "?"

@@ -16,9 +16,10 @@ from collections.abc import Callable, Iterable
 from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.imports import execute_module
 from nodl.infer.interpreter.raising import Raised
-from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Frame, Run
+from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Decisions, Frame, Run
 from nodl.infer.interpreter.tables import new_run
 from nodl.infer.models.foreign import is_node_class
+from nodl.infer.paths import refine
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.values import (
     ANY,
@@ -45,8 +46,16 @@ _CREATING = re.compile(
 
 def start(program: Program, main: SourceModule, functions: Iterable[str] = ()) -> Run:
     """Run ``main`` as a script, then ``functions`` of it (``main`` if the script itself starts nothing)."""
-    run = new_run(program, main)
-    _guarded(run, lambda: _start(run, main, tuple(functions)))
+    named = tuple(functions)
+
+    def follow(decisions: Decisions | None) -> Run:
+        run = new_run(program, main)
+        run.decisions = decisions
+        _guarded(run, lambda: _start(run, main, named))
+        return run
+
+    run = follow(None)
+    refine(run, follow)
     return run
 
 
@@ -62,8 +71,19 @@ def _start(run: Run, main: SourceModule, functions: tuple[str, ...]) -> None:
 
 def start_function(program: Program, module: SourceModule, path: list[str]) -> Run:
     """Import ``module`` and call ``path`` in it (``main``, ``Class.method``), as an entry point does."""
-    run = new_run(program, module)
 
+    def follow(decisions: Decisions | None) -> Run:
+        run = new_run(program, module)
+        run.decisions = decisions
+        _guarded(run, lambda: _start_function(run, module, path))
+        return run
+
+    run = follow(None)
+    refine(run, follow)
+    return run
+
+
+def _start_function(run: Run, module: SourceModule, path: list[str]) -> None:
     def body() -> None:
         _completed(run, lambda: execute_module(run, module, module.name))
         imported = run.modules[module.name]
@@ -77,8 +97,7 @@ def start_function(program: Program, module: SourceModule, path: list[str]) -> R
             _call(run, imported, atom, Arguments())
         settle(run)
 
-    _guarded(run, body)
-    return run
+    body()
 
 
 def analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:
@@ -88,7 +107,9 @@ def analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> 
 
 def _analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:
     main = run.modules.get("__main__")
-    if main is None or any(record.created and record.source.file == main.source.path for record in run.findings.nodes):
+    if main is None or any(
+        record.created and record.source.file == main.source.path for record in run.findings.nodes
+    ):
         return  # a program, not a library: what it does not use stays unused
     missing = unknown("an argument that nothing analysed gives")
     found = False
@@ -159,12 +180,12 @@ def _creating_lines(module: SourceModule) -> list[int]:
     return [number for number, line in enumerate(module.text.split("\n"), 1) if _CREATING.search(line)]
 
 
-def settle(run: Run) -> None:
-    """Call all callbacks until neither state nor findings change."""
+def settle(run: Run, at_end: bool = True) -> None:
+    """Call all callbacks until neither state nor findings change; ``at_end``: the program itself has ended."""
     run.repeated += 1
-    in_vain: dict[
-        tuple[object, int | None], tuple[int, int]
-    ] = {}  # the version that a callback left as it was
+    outermost = run.settle is not _no_settling
+    run.settle = _no_settling
+    in_vain = run.in_vain
     expected: set[object] = set()
     for turn in range(MAX_ROUNDS):
         _expect_escaped(run, expected)
@@ -173,7 +194,8 @@ def settle(run: Run) -> None:
             version = run.state.version()
             if in_vain.get((callback, arity)) == version:
                 continue
-            run.state.forget()
+            if at_end:
+                run.state.forget()
             run.state.repeatedly(_called_back(run, callback, arity), turn >= WIDEN_TEXTS_FROM)
             if run.state.version() == version:
                 in_vain[callback, arity] = version
@@ -182,6 +204,15 @@ def settle(run: Run) -> None:
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
     run.repeated -= 1
+    run.settle = _settle_meanwhile if outermost else _no_settling
+
+
+def _settle_meanwhile(run: Run) -> None:
+    settle(run, at_end=False)
+
+
+def _no_settling(run: Run) -> None:
+    """Callbacks are running already."""
 
 
 def _called_back(run: Run, callback: object, arity: int | None) -> Callable[[], bool]:
@@ -225,11 +256,13 @@ def _completed(run: Run, body: Callable[[], object]) -> None:
 
 
 def _guarded(run: Run, body: Callable[[], None]) -> None:
+    run.settle = _settle_meanwhile
     limit = sys.getrecursionlimit()
     sys.setrecursionlimit(max(limit, MAX_NESTING))
     try:
         body()
     except BudgetExceeded as error:
+        run.gave_up = True
         run.findings.gap(SourceRef(run.main.path), f"the analysis was given up: {error}")
     except RecursionError:
         run.findings.gap(SourceRef(run.main.path), "the analysis was given up: nested too deep")

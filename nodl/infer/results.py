@@ -34,7 +34,24 @@ def interfaces_of(findings: Findings, origin: Origin) -> list[NodeInterface]:
     for record in findings.nodes:
         if record.created or record.endpoints:
             interfaces.extend(_interfaces_of_node(record, findings, origin))
-    return interfaces
+    return _united(interfaces) if findings.by_path else interfaces
+
+
+def _united(interfaces: list[NodeInterface]) -> list[NodeInterface]:
+    """One interface for what is the same node on several paths."""
+    united: dict[object, NodeInterface] = {}
+    for each in interfaces:
+        key = each._replace(endpoints=(), gaps=(), parameters=())
+        known = united.get(key)
+        if known is None:
+            united[key] = each
+            continue
+        united[key] = known._replace(
+            endpoints=tuple(dict.fromkeys((*known.endpoints, *each.endpoints))),
+            gaps=tuple(dict.fromkeys((*known.gaps, *each.gaps))),
+            parameters=tuple(sorted({*known.parameters, *each.parameters})),
+        )
+    return list(united.values())
 
 
 def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) -> list[NodeInterface]:
@@ -118,7 +135,8 @@ def certainty_of(template: NameTemplate) -> Certainty:
     open_parts = [
         part
         for part in template.parts
-        if isinstance(part, UnknownPart) or (isinstance(part, ParameterPart) and part.default is None)
+        if isinstance(part, UnknownPart)
+        or (isinstance(part, ParameterPart) and part.default is None and not part.name.endswith(".**"))
     ]
     if not open_parts:
         return Certainty.FROM_DEFAULT

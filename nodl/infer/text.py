@@ -180,7 +180,20 @@ def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | No
     return None
 
 
+def input_of(text: object) -> Input | None:
+    """The input that ``text`` is as a whole."""
+    if not isinstance(text, Text) or len(text.pieces) != 1:
+        return None
+    piece = text.pieces[0]
+    return piece if isinstance(piece, Input) else None
+
+
+def with_edit(piece: Input, method: str, arguments: tuple[str, ...]) -> Text:
+    """The input after one more edit."""
+    return make_text((Input(piece.name, piece.owner, piece.item, (*piece.edits, (method, arguments))),))
+
+
 def _edited_input(piece: Piece, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
-    if isinstance(piece, Input) and len(piece.edits) < 6:
+    if isinstance(piece, Input) and len(piece.edits) < 8:
         return make_text((Input(piece.name, piece.owner, piece.item, (*piece.edits, (method, arguments))),))
     return None

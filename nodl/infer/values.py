@@ -390,7 +390,18 @@ class Variables:
 
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
 _COMPARED_IN_C = frozenset(
-    {str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue, NativeObject}
+    {
+        str,
+        Text,
+        External,
+        Instance,
+        Sequence,
+        Dictionary,
+        FunctionValue,
+        ClassValue,
+        ModuleValue,
+        NativeObject,
+    }
 )
 
 

@@ -41,6 +41,7 @@ from nodl.infer.values import (
 )
 
 MAX_ROUNDS = 8
+MAX_RECURSION = 24  # calls of a function inside itself that are followed one by one
 _OF_EXECUTORS = frozenset({"add_node", "remove_node", "wake"})  # of rclpy, whichever object it is
 _CHANGES = frozenset({"append", "extend", "insert", "remove", "pop", "clear"})
 _MISSING = unknown("an argument that the caller does not give")
@@ -100,7 +101,10 @@ def _decided_recursion(run: Run, node: ast.AST) -> bool:
     if run.entries.get(node) != (run.state.forks, run.repeated) or node in run.summaries:
         return False
     run.turns -= 1
-    return run.turns > 0 and len(run.stack) < MAX_DEPTH - 8
+    level = run.stack.count(node)
+    if level > MAX_RECURSION:
+        run.entries[node] = (-1, -1)  # it may never end: from here on its calls are joined
+    return run.turns > 0 and level <= MAX_RECURSION and len(run.stack) < MAX_DEPTH - 8
 
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
@@ -131,7 +135,8 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame.function = function
     frame.forks = frame.loop_forks = run.state.forks
     entry = run.entries.get(function.node)
-    run.entries[function.node] = (run.state.forks, run.repeated)
+    if entry is None or entry[0] >= 0:
+        run.entries[function.node] = (run.state.forks, run.repeated)
     run.stack.append(function.node)
     mark = run.state.mark()
     node = function.node
@@ -148,7 +153,7 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     else:
         cells.dead = True
     run.stack.pop()
-    if entry is not None:
+    if entry is not None and entry[0] >= 0:
         run.entries[function.node] = entry
     run.context = previous
     if frame.yielded is not None:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.run import Frame, Run
-from nodl.infer.text import Text
+from nodl.infer.text import Input, Text, input_of
 from nodl.infer.values import (
     BOTTOM,
     ITEMS,
@@ -66,6 +66,58 @@ def truth(value: Value) -> bool | None:
 def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
     """Evaluate ``test`` once, for its effects and its truth."""
     return truth(special.tested(run, run.evaluate(test, frame), test, frame))
+
+
+def forked(run: Run, test: ast.expr, frame: Frame) -> bool | None:
+    """The outcome of an undecided test on the path that is followed; ``None``: both, joined."""
+    if run.state.forks or run.repeated:
+        return None
+    condition = _condition(run, test, frame)
+    run.undecided += 1
+    run.conditional = run.conditional or condition is not None
+    if run.decisions is None:
+        return None
+    outcome = run.decisions.next(condition)
+    narrowed(run, test, outcome, frame)
+    return outcome
+
+
+def _condition(run: Run, test: ast.expr, frame: Frame) -> tuple[Input, str, tuple[str, ...]] | None:
+    """What ``test`` asks of a parameter: the input, and the edits that keep a name where it holds or does not."""
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        found = _condition(run, test.operand, frame)
+        return None if found is None else (found[0], OPPOSITE[found[1]], found[2])
+    left, edit = test, "only if true"
+    given: tuple[str, ...] = ()
+    if isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.ops[0], ast.Eq | ast.NotEq):
+        other = test.comparators[0]
+        if not isinstance(other, ast.Constant) or type(other.value) not in (str, int):
+            return None
+        left, given = test.left, (str(other.value),)
+        edit = "only if equal" if isinstance(test.ops[0], ast.Eq) else "only if different"
+    if not _only_reads(left):
+        return None
+    value = run.evaluate(left, frame)
+    asked = input_of(value[0]) if len(value) == 1 else None
+    if asked is None or asked.edits or asked.item is not None or asked.name.startswith(("-", "<", "$")):
+        return None
+    defaults = getattr(asked.owner, "parameters", {}).get(asked.name, ())
+    wanted = bool if edit == "only if true" else (str, int)
+    plain = all(isinstance(default, wanted) for default in defaults) and bool(defaults)
+    return (asked, edit, given) if plain else None
+
+
+OPPOSITE = {
+    "only if true": "only if false", "only if false": "only if true",
+    "only if equal": "only if different", "only if different": "only if equal",
+}  # fmt: skip
+_READS = frozenset({"get_parameter", "get_parameter_value", "declare_parameter"})
+
+
+def _only_reads(node: ast.expr) -> bool:
+    """Evaluating it once more changes nothing."""
+    calls = (part for part in ast.walk(node) if isinstance(part, ast.Call))
+    return all(isinstance(call.func, ast.Attribute) and call.func.attr in _READS for call in calls)
 
 
 def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:

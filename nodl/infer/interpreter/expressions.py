@@ -7,7 +7,7 @@ import builtins
 
 from nodl.infer.interpreter import loops, special
 from nodl.infer.interpreter.assign import assign
-from nodl.infer.interpreter.conditions import compare, decide, narrowed, truth, truth_of
+from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, truth, truth_of
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.iterate import elements, values_of
 from nodl.infer.interpreter.operators import binary, f_string
@@ -356,6 +356,8 @@ def _character(run: Run, text: str, key: Value, node: ast.Subscript, frame: Fram
 
 def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
     outcome = decide(run, node.test, frame)
+    if outcome is None:
+        outcome = forked(run, node.test, frame)
     if outcome is not None:
         return run.evaluate(node.body if outcome else node.orelse, frame)
     results: list[Value] = []

@@ -35,7 +35,10 @@ WIDEN_TEXTS_FROM = 3
 
 
 def stream(run: Run, value: Value, call: Call) -> Iterator[Value]:
-    """The elements of ``value`` as a loop meets them: a list may grow meanwhile, an iterator runs. May raise ``NotConcrete``."""
+    """The elements of ``value`` as a loop meets them: a list may grow meanwhile, an iterator runs.
+
+    Raises ``NotConcrete`` where that cannot be followed.
+    """
     atom = value[0] if len(value) == 1 else None
     if isinstance(atom, NativeObject) and is_usable(run, atom):
         for element in pulled(run, atom, call):
@@ -86,9 +89,13 @@ def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Fr
     passes, finished = True, True
     run.state.depth += 1
     start = run.state.mark()
+    certain = not run.repeated and not run.state.forks
+    limit = run.turns if certain else max(1, MAX_UNROLLED // run.unrolled)
+    unrolled = run.unrolled
     for index in itertools.count():
+        run.unrolled = unrolled if certain else unrolled * (index + 1)
         try:
-            element = next(source, None) if run.turns > 0 else _stop()
+            element = next(source, None) if index < limit else _stop()
         except (NotConcrete, TypeError):
             _rest(run, node, iterated, seen, frame)
             break
@@ -111,6 +118,7 @@ def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Fr
             passes, finished = broken or frame.jump == "break", broken
             break
     run.state.depth -= 1
+    run.unrolled = unrolled
     if broken:
         run.state.join_seen(start)
     frame.unsettled, frame.loop_forks = before, loop_forks
@@ -159,7 +167,9 @@ def _for(run: Run, node: ast.For | ast.AsyncFor, items: Items, frame: Frame) -> 
 
 def _limit(run: Run, exact: tuple[Value, ...], node: ast.For | ast.AsyncFor) -> int:
     numbers = all(len(element) == 1 and type(element[0]) is int for element in exact)
-    if not run.repeated:
+    if run.state.forks and not run.repeated:
+        return MAX_UNROLLED
+    if not run.repeated and not run.state.forks:
         followed = not numbers or len(exact) <= MAX_UNROLLED or _may_name(node)
         return run.turns if followed else MAX_UNROLLED
     if not numbers:

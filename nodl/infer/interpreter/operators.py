@@ -137,7 +137,12 @@ def _container_operation(
         copy_dictionary(run, merged, left)
         copy_dictionary(run, merged, right)
         return (merged,)
-    function = {ast.BitOr: operator.or_, ast.BitAnd: operator.and_, ast.BitXor: operator.xor, ast.Sub: operator.sub}
+    function = {
+        ast.BitOr: operator.or_,
+        ast.BitAnd: operator.and_,
+        ast.BitXor: operator.xor,
+        ast.Sub: operator.sub,
+    }
     chosen = function.get(type(op))
     call = Call(Arguments([left, right]), node, frame)
     return concrete.compute(run, chosen, call) if chosen is not None else None
@@ -149,7 +154,9 @@ def _native_binary(
     """A path divided by a text, for instance."""
     from nodl.infer.models import concrete
 
-    function = getattr(operator, special.OPERATORS[type(op)].replace("or", "or_").replace("and", "and_"), None)
+    function = getattr(
+        operator, special.OPERATORS[type(op)].replace("or", "or_").replace("and", "and_"), None
+    )
     call = Call(Arguments([left, right]), node, frame)
     found = concrete.compute(run, function, call) if function is not None else None
     return found if found is not None else ANY

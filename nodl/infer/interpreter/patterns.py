@@ -84,7 +84,7 @@ def _same_constant(atom: object, constant: object) -> Outcome:
 def _sequence(run: Run, pattern: ast.MatchSequence, value: Value, frame: Frame) -> Outcome:
     atom = value[0] if len(value) == 1 else None
     star = next((i for i, each in enumerate(pattern.patterns) if isinstance(each, ast.MatchStar)), None)
-    if isinstance(atom, CONSTANTS) or isinstance(atom, Dictionary):
+    if isinstance(atom, (*CONSTANTS, Dictionary)):
         return False
     exact = atom.items.exact if isinstance(atom, Sequence) and not atom.escaped else None
     if exact is None:
@@ -110,7 +110,7 @@ def _sequence(run: Run, pattern: ast.MatchSequence, value: Value, frame: Frame) 
 
 def _mapping(run: Run, pattern: ast.MatchMapping, value: Value, frame: Frame) -> Outcome:
     atom = value[0] if len(value) == 1 else None
-    if isinstance(atom, CONSTANTS) or isinstance(atom, Sequence):
+    if isinstance(atom, (*CONSTANTS, Sequence)):
         return False
     if not isinstance(atom, Dictionary) or atom.is_open:
         _bind_all(run, pattern, frame)
@@ -219,8 +219,11 @@ def _of_class(atom: object, cls: object) -> Outcome:
     name = cls.path.removeprefix("builtins.") if isinstance(cls, External) and "builtins." in cls.path else ""
     if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
         order = linearized(atom.cls)
-        if any(base is cls or (isinstance(base, External) and isinstance(cls, External) and base.path == cls.path)
-               for base in order):
+        if any(
+            base is cls
+            or (isinstance(base, External) and isinstance(cls, External) and base.path == cls.path)
+            for base in order
+        ):
             return True
         if name == "object":
             return True
@@ -235,9 +238,11 @@ def _of_class(atom: object, cls: object) -> Outcome:
         expected = _KINDS.get(name)
         return isinstance(atom, expected) if expected else False if name in (*_CONTAINERS, "dict") else None
     if isinstance(atom, Sequence):
-        return name == atom.kind if name in (*_CONTAINERS, *_KINDS, "dict") and atom.kind != "generator" else None
+        return (
+            name == atom.kind
+            if name in (*_CONTAINERS, *_KINDS, "dict") and atom.kind != "generator"
+            else None
+        )
     if isinstance(atom, Dictionary):
         return name == "dict" if name in (*_CONTAINERS, *_KINDS, "dict") else None
     return None
-
-

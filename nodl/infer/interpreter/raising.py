@@ -104,7 +104,14 @@ class Unwinding:
 
     def __init__(self, run: Run, frame: Frame) -> None:
         state = run.state
-        self._numbers = (len(run.stack), run.context, state.depth, run.unrolled, run.try_forks, frame.loop_forks)
+        self._numbers = (
+            len(run.stack),
+            run.context,
+            state.depth,
+            run.unrolled,
+            run.try_forks,
+            frame.loop_forks,
+        )
 
     def restore(self, run: Run, frame: Frame) -> None:
         size, run.context, run.state.depth, run.unrolled, run.try_forks, frame.loop_forks = self._numbers

@@ -46,6 +46,7 @@ from nodl.source_ref import SourceRef
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
 MAX_STEPS = 800_000
 MAX_DEPTH = 120  # analysed calls inside calls
+MAX_FORKS = 4  # undecided tests of which each outcome is followed by itself
 MAX_TURNS = 3_000  # of loops that are followed turn by turn, in one run
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
@@ -58,8 +59,23 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "forks", "jump", "loop_forks", "raised", "closure", "depth", "early", "function", "globals", "is_class", "module",
-        "nonlocals", "returned", "unsettled", "yielded",
+        "again",
+        "cells",
+        "closure",
+        "depth",
+        "early",
+        "forks",
+        "function",
+        "globals",
+        "is_class",
+        "jump",
+        "loop_forks",
+        "module",
+        "nonlocals",
+        "raised",
+        "returned",
+        "unsettled",
+        "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -152,6 +168,30 @@ class Tables:
     creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
 
 
+class TooManyPaths(Exception):
+    """The program has more undecided tests in a row than are followed one by one."""
+
+
+@dataclass(slots=True)
+class Decisions:
+    """Outcomes of the undecided tests on one path through the program, in their order."""
+
+    outcomes: list[bool]
+    conditions: list[object] = field(default_factory=list)  # what the test asks of a parameter, or None
+    taken: int = 0
+
+    def next(self, condition: object) -> bool:
+        """The outcome of the next test. Raises ``TooManyPaths``."""
+        if self.taken == MAX_FORKS:
+            raise TooManyPaths
+        if self.taken == len(self.outcomes):
+            self.outcomes.append(True)
+        outcome = self.outcomes[self.taken]
+        self.conditions.append(condition)
+        self.taken += 1
+        return outcome
+
+
 class Run:
     """One analysis from one entry point: state, findings and what is still to be called."""
 
@@ -185,18 +225,28 @@ class Run:
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.summaries: dict[ast.AST, Any] = {}
         self.options = OptionDefaults()
+        self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
+        self.decisions: Decisions | None = None
         self.environment = FieldCells()  # variables that the program sets itself
         self.memo: dict[tuple[object, ...], tuple[tuple[int, ...], Value]] = {}
         self.unstable = False  # a recursion learned something new since its outermost call asked
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
+        self.gave_up = False
+        self.in_vain: dict[
+            tuple[object, int | None], tuple[int, int]
+        ] = {}  # versions that callbacks left as they were
         self.turns = MAX_TURNS
+        self.undecided = 0  # tests outside of any undecided branch or repetition
+        self.conditional = False  # one of them asks for the value of a parameter
         self.callback_count = itertools.count()
         self.try_forks = 0  # undecided branches around the innermost try
         self.tries = 0  # how many try statements surround the current point
         self.risks = 0  # what may have raised an exception, counted inside of them
-        self.entries: dict[ast.AST, tuple[int, int]] = {}  # forks and repetition when a function was last entered
+        self.entries: dict[
+            ast.AST, tuple[int, int]
+        ] = {}  # forks and repetition when a function was last entered
         self.context = 0
         self._contexts: dict[tuple[int, object], int] = {}
         self._context_ids = itertools.count(1)
@@ -217,9 +267,12 @@ class Run:
         """Count what could have failed: an unknown or symbolic value, or the call of a library."""
         atom = value[0] if len(value) == 1 else None
         kind = type(atom)
-        if kind is Unknown or kind is Text or (len(value) != 1):
-            self.risks += 1
-        elif type(node) is ast.Call and (kind is External or self.tables.may_fail(atom)):
+        if (
+            kind is Unknown
+            or kind is Text
+            or (len(value) != 1)
+            or (type(node) is ast.Call and (kind is External or self.tables.may_fail(atom)))
+        ):
             self.risks += 1
         return value
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable
 from typing import Any
 
 from nodl.infer.interpreter import imports, loops, patterns, special
 from nodl.infer.interpreter.assign import assign, assign_unknown, delete
-from nodl.infer.interpreter.conditions import decide, narrowed
+from nodl.infer.interpreter.conditions import decide, forked, narrowed
 from nodl.infer.interpreter.define import define_class, define_function
+from nodl.infer.interpreter.iterate import lose
 from nodl.infer.interpreter.operators import binary_operation
-from nodl.infer.interpreter.run import Arguments, Call, Executor, Frame, Run
-from nodl.infer.models.concrete import NotConcrete
 from nodl.infer.interpreter.raising import (
     Raised,
     Unwinding,
@@ -20,6 +20,8 @@ from nodl.infer.interpreter.raising import (
     throw,
     throw_value,
 )
+from nodl.infer.interpreter.run import Arguments, Call, Executor, Frame, Run
+from nodl.infer.models.concrete import NotConcrete
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -102,6 +104,8 @@ def _as_load(target: ast.expr) -> ast.expr:
 
 def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     outcome = decide(run, node.test, frame)
+    if outcome is None:
+        outcome = forked(run, node.test, frame)
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
 
@@ -204,9 +208,11 @@ def _handled(run: Run, handlers: list[ast.ExceptHandler], raised: Raised, frame:
             return _run_handler(run, handler, raised.value, frame)
     else:
         raise raised
-    return run.state.branches(
-        [lambda handler=handler: _run_handler(run, handler, raised.value, frame) for handler in handlers]
-    )
+    return run.state.branches([_handler_of(run, handler, raised.value, frame) for handler in handlers])
+
+
+def _handler_of(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> Callable[[], bool]:
+    return lambda: _run_handler(run, handler, value, frame)
 
 
 def _run_handler(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> bool:
@@ -326,7 +332,7 @@ def _advanced(run: Run, atom: NativeObject, node: ast.AST, frame: Frame) -> Valu
     try:
         return next(loops.stream(run, (atom,), Call(Arguments(), node, frame)), BOTTOM)
     except (NotConcrete, TypeError):
-        return loops.lose(run, atom)
+        return lose(run, atom)
 
 
 def _exited(run: Run, managers: list[Value], node: ast.AST, frame: Frame) -> None:
@@ -353,11 +359,18 @@ def _cases(run: Run, cases: list[ast.match_case], subject: Value, frame: Frame) 
         if outcome:
             return run.execute(case.body, frame)
         if outcome is None:
-            rest = cases[index + 1 :]
             return run.state.branches(
-                (lambda case=case: run.execute(case.body, frame), lambda: _cases(run, rest, subject, frame))
+                (_body_of(run, case.body, frame), _cases_of(run, cases[index + 1 :], subject, frame))
             )
     return True
+
+
+def _body_of(run: Run, body: list[ast.stmt], frame: Frame) -> Callable[[], bool]:
+    return lambda: run.execute(body, frame)
+
+
+def _cases_of(run: Run, cases: list[ast.match_case], subject: Value, frame: Frame) -> Callable[[], bool]:
+    return lambda: _cases(run, cases, subject, frame)
 
 
 def _global(run: Run, node: ast.Global, frame: Frame) -> bool:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import builtins
 from collections.abc import Callable
 
 from nodl.infer.interpreter import patterns, special
@@ -16,7 +15,7 @@ from nodl.infer.interpreter.iterate import elements, keys_of
 from nodl.infer.interpreter.operators import as_texts, formatted, text_value
 from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Arguments, Call, Run
-from nodl.infer.text import Text
+from nodl.infer.text import Text, input_of, with_edit
 from nodl.infer.values import (
     ANY,
     BOOLEAN,
@@ -104,6 +103,10 @@ def _range(run: Run, call: Call) -> Value:
         numbers = range(*integers)
         if len(numbers) <= MAX_RANGE:
             return run.sequence(call.node, "tuple", Items(tuple((number,) for number in numbers)))
+    counted = input_of(bounds[-1]) if len(bounds) < 3 else None
+    if counted is not None and counted.item is None and (len(bounds) == 1 or isinstance(bounds[0], int)):
+        first = (str(bounds[0]),) if len(bounds) == 2 else ()
+        return run.sequence(call.node, "tuple", Items(None, (with_edit(counted, "range", first),)))
     return run.sequence(call.node, "tuple", Items(None, unknown("a number of a loop")))
 
 
@@ -299,10 +302,14 @@ def has_attribute(run: Run, owner: object, name: object) -> bool | None:
     if any(isinstance(base, ClassValue) and base.cells.get(name) for base in order):
         return True
     plain = all(
-        isinstance(base, ClassValue) and "__getattr__" not in base.cells and "__getattribute__" not in base.cells
+        isinstance(base, ClassValue)
+        and "__getattr__" not in base.cells
+        and "__getattribute__" not in base.cells
         for base in order
     )
-    known = plain and not run.callbacks and not run.repeated and not owner.summary and not name.startswith("__")
+    known = (
+        plain and not run.callbacks and not run.repeated and not owner.summary and not name.startswith("__")
+    )
     return False if known else None
 
 

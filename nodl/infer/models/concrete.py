@@ -40,13 +40,23 @@ from nodl.infer.values import (
 )
 
 MAX_ELEMENTS = 2_000  # of one container
-MAX_NUMBER = 1 << 16  # as an argument: widths, counts
-MAX_TEXT = 1 << 16
+MAX_NUMBER = 1 << 12  # as an argument: widths, counts
+MAX_TEXT = 1 << 14
 _LARGE = 1 << 256  # as a result
 CONSTANTS = (str, int, float, bool, bytes, type(None))
-_CALLABLE = (FunctionValue, BoundMethod, Partial, Getter, ClassValue, ClassMethod, External, NativeMethod, ForeignMethod)
+_CALLABLE = (
+    FunctionValue,
+    BoundMethod,
+    Partial,
+    Getter,
+    ClassValue,
+    ClassMethod,
+    External,
+    NativeMethod,
+    ForeignMethod,
+)
 _IMMUTABLE = (re.Pattern, re.Match, PurePosixPath, string.Template)
-_ITERATORS = (
+_ITERATORS: tuple[type, ...] = (
     GeneratorType, map, filter, zip, enumerate, reversed,
     type(iter([])), type(iter(())), type(iter({})), type(iter(set())), type(iter("")), type(iter(range(0))),
     type(iter({}.items())), type(iter({}.values())), type(reversed([])),
@@ -73,7 +83,7 @@ class Opaque:
     __eq__ = __ne__ = __lt__ = __le__ = __gt__ = __ge__ = __add__ = __radd__ = _refuse
     __bool__ = __len__ = __iter__ = __getitem__ = __contains__ = __str__ = __repr__ = __format__ = _refuse
     __int__ = __float__ = __index__ = __call__ = _refuse
-    __hash__ = _refuse  # type: ignore[assignment]
+    __hash__ = _refuse
 
 
 class Callback:
@@ -85,7 +95,9 @@ class Callback:
         self.run, self.value, self.call = run, value, call
 
     def __call__(self, *given: object) -> Any:
-        arguments = [from_python(self.run, each, self.call, f"given {index}") for index, each in enumerate(given)]
+        arguments = [
+            from_python(self.run, each, self.call, f"given {index}") for index, each in enumerate(given)
+        ]
         previous = self.run.enter(("callback", id(self.call.node), next(self.run.callback_count)))
         result = self.run.call(self.value, Arguments(arguments), self.call.node, self.call.frame)
         self.run.context = previous
@@ -107,7 +119,9 @@ def to_python(run: Run, value: Value, call: Call, deep: bool = False, level: int
     if isinstance(atom, CONSTANTS):
         return atom
     if isinstance(atom, NativeObject):
-        return atom.object if is_usable(run, atom) else Opaque(value)
+        if not is_usable(run, atom):
+            return Opaque(value)
+        return _bounded(atom.object) if isinstance(atom.object, _ITERATORS) else atom.object
     if isinstance(atom, Sequence) and (deep or level == 0 or atom.kind == "tuple"):
         return _real_sequence(run, atom, value, call, deep, level)
     if isinstance(atom, Dictionary) and (deep or level == 0):
@@ -115,6 +129,14 @@ def to_python(run: Run, value: Value, call: Call, deep: bool = False, level: int
     if isinstance(atom, _CALLABLE):
         return Callback(run, value, call)
     return Opaque(value)
+
+
+def _bounded(iterator: Any) -> Iterator[Any]:
+    """The iterator for someone who may ask it for everything."""
+    for index, each in enumerate(iterator):
+        if index > MAX_ELEMENTS:
+            raise NotConcrete
+        yield each
 
 
 def _real_sequence(run: Run, atom: Sequence, value: Value, call: Call, deep: bool, level: int) -> Any:
@@ -166,9 +188,17 @@ def _constant(found: Any) -> Value:
 def _from_sequence(run: Run, found: Any, call: Call, place: str) -> Value:
     if len(found) > MAX_ELEMENTS:
         raise NotConcrete
-    kind = "tuple" if isinstance(found, tuple | range) else "set" if isinstance(found, set | frozenset) else "list"
+    kind = (
+        "tuple"
+        if isinstance(found, tuple | range)
+        else "set"
+        if isinstance(found, set | frozenset)
+        else "list"
+    )
     if kind == "set":
-        found = sorted(found, key=lambda each: (type(each).__name__, repr(each)))  # in the same order everywhere
+        found = sorted(
+            found, key=lambda each: (type(each).__name__, repr(each))
+        )  # in the same order everywhere
     parts = tuple(from_python(run, each, call, f"{place} {index}") for index, each in enumerate(found))
     if kind == "tuple":
         return run.tuple_of(parts)
@@ -194,7 +224,14 @@ def _from_dictionary(run: Run, found: dict[Any, Any], call: Call, place: str) ->
 # --- computing ----------------------------------------------------------------------------------------------
 
 
-def compute(run: Run, function: Callable[..., Any], call: Call, deep: bool = False, owner: Any = None) -> Value | None:
+def compute(
+    run: Run,
+    function: Callable[..., Any],
+    call: Call,
+    deep: bool = False,
+    owner: Any = None,
+    any_size: bool = False,
+) -> Value | None:
     """``function`` of the call's arguments, or ``None`` where they are not known well enough.
 
     An error of the function is an exception of the program.
@@ -205,14 +242,23 @@ def compute(run: Run, function: Callable[..., Any], call: Call, deep: bool = Fal
     try:
         positional = [to_python(run, value, call, deep) for value in args.positional]
         keywords = {name: to_python(run, value, call, deep) for name, value in args.keywords.items()}
-        _check_size((*positional, *keywords.values(), owner))
+        if not any_size:
+            _check_size((*positional, *keywords.values(), owner))
     except NotConcrete:
         return None
     try:
         return from_python(run, function(*positional, **keywords), call)
     except (NotConcrete, RecursionError, MemoryError):
         return None
-    except (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, StopIteration, re.error) as error:
+    except (
+        ValueError,
+        TypeError,
+        LookupError,
+        ArithmeticError,
+        AttributeError,
+        StopIteration,
+        re.error,
+    ) as error:
         if _holds_opaque((*positional, *keywords.values(), owner)):
             return None  # it may be about what is not known
         throw(run, type(error) if type(error).__module__ == "builtins" else "ValueError", str(error))
@@ -227,7 +273,9 @@ def _holds_opaque(given: Iterable[object], level: int = 0) -> bool:
             return True
         if isinstance(each, list | tuple | collections.deque) and _holds_opaque(each, level + 1):
             return True
-        if not isinstance(each, (*CONSTANTS, *_IMMUTABLE, dict, list, tuple, set, frozenset, range, collections.deque)):
+        if not isinstance(
+            each, (*CONSTANTS, *_IMMUTABLE, dict, list, tuple, set, frozenset, range, collections.deque)
+        ):
             return True  # an iterator, say, which may yield such
     return False
 
@@ -244,7 +292,8 @@ def _check_size(given: tuple[object, ...]) -> None:
 
 def pulled(run: Run, obj: NativeObject, call: Call) -> Iterator[Value]:
     """The elements of a real iterable, one by one. Raises ``NotConcrete``."""
-    for index, each in enumerate(iter(obj.object)):
+    iterable: Any = obj.object
+    for index, each in enumerate(iter(iterable)):
         yield from_python(run, each, call, f"pulled {index}")
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 import sys
 
 from nodl.infer.interpreter.assign import plain_store
-from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.interpreter.iterate import lose
+from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import builtin, concrete, endpoints, native, pure, ros, stdlib
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
@@ -50,6 +50,19 @@ _KEEPS_OFF = frozenset({
 _TRUSTED = frozenset(sys.stdlib_module_names) | _KEEPS_OFF
 
 
+# While these run, callbacks do.
+_WAITS = frozenset(
+    {
+        "spin",
+        "spin_once",
+        "spin_until_future_complete",
+        "spin_once_until_future_complete",
+        "sleep",
+        "wait_for_message",
+    }
+)
+
+
 def call_external(run: Run, atom: External, call: Call) -> Value:
     path = atom.path
     computed = _computed(run, path, call)
@@ -70,6 +83,8 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         run.understood.add(
             call.node
         )  # a function of a library that does not make interfaces, whatever its name
+    if name in _WAITS and run.callbacks:
+        run.settle(run)
     _hand_over(run, path, call)
     if ros.interface_type(path) or path.partition(".")[0] in _KEEPS_OFF:
         return external(f"{path}()" if "(" not in path else f"{path.partition('.')[0]}.()")
@@ -81,7 +96,7 @@ def _computed(run: Run, path: str, call: Call) -> Value | None:
     found = pure.function_at(path)
     if found is None:
         return None
-    result = concrete.compute(run, found[0], call, deep=found[1])
+    result = concrete.compute(run, found[0], call, deep=found[1], any_size=path in pure.ANY_SIZE)
     if result is not None:
         run.understood.add(call.node)
         for atom in result:
@@ -247,7 +262,11 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
 
 def _native_method(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
     if not concrete.is_usable(run, receiver) or pure.is_io(name):
-        return lose(run, receiver) if not concrete.is_usable(run, receiver) else unknown("what a file system says")
+        return (
+            lose(run, receiver)
+            if not concrete.is_usable(run, receiver)
+            else unknown("what a file system says")
+        )
     run.state.pulled += 1
     found = concrete.compute(run, getattr(receiver.object, name), call)
     if found is None:

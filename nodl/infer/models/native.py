@@ -12,7 +12,7 @@ from nodl.infer.interpreter.loops import store_item
 from nodl.infer.interpreter.operators import joined, str_format, text_value
 from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.models import concrete
-from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, make_text
+from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, input_of, make_text, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -160,6 +160,10 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
         return _constant_method(run, text, name, arguments, call)
     if name in ("startswith", "endswith", "isdigit", "isalpha"):
         return BOOLEAN
+    divided = input_of(text)
+    if name == "split" and divided is not None and all(isinstance(each, str) for each in arguments):
+        part = with_edit(divided, "split", tuple(str(each) for each in arguments))
+        return run.sequence(call.node, "list", Items(None, (part,)))
     symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
     if symbolic is not None:
         return (symbolic,)

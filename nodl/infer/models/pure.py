@@ -33,20 +33,35 @@ from nodl.infer.models.concrete import Callback, NotConcrete, Opaque
 
 Function = Callable[..., Any]
 
-_BUILTINS = (
-    "abs all any ascii bin bool bytes chr dict divmod enumerate filter float format frozenset hex int iter len list map "
-    "max min next oct ord pow range repr reversed round set slice sorted str sum tuple zip"
-).split()
+_BUILTINS = [
+    "abs", "all", "any", "ascii", "bin", "bool", "bytes", "chr", "dict", "divmod", "enumerate", "filter", "float",
+    "format", "frozenset", "hex", "int", "iter", "len", "list", "map", "max", "min", "next", "oct", "ord", "pow",
+    "range", "repr", "reversed", "round", "set", "slice", "sorted", "str", "sum", "tuple", "zip",
+]  # fmt: skip
 _METHODS = {
     "str": str, "bytes": bytes, "int": int, "float": float, "dict": dict, "list": list, "tuple": tuple, "set": set,
 }  # fmt: skip
-_RE = "match fullmatch search findall finditer split sub subn escape compile".split()
-_ITERTOOLS = (
-    "accumulate chain combinations combinations_with_replacement compress count cycle dropwhile filterfalse groupby "
-    "islice pairwise permutations product repeat starmap takewhile tee zip_longest"
-).split()
-_PATHS = "basename commonpath commonprefix dirname isabs join normpath split splitext".split()
-_MATH = "ceil floor sqrt pow fabs gcd lcm log log2 log10 sin cos tan atan2 hypot radians degrees trunc isclose".split()
+_RE = ["match", "fullmatch", "search", "findall", "finditer", "split", "sub", "subn", "escape", "compile"]
+_ITERTOOLS = [
+    "accumulate", "combinations", "combinations_with_replacement", "compress", "count", "cycle", "dropwhile",
+    "filterfalse", "groupby", "islice", "pairwise", "permutations", "product", "repeat", "starmap", "takewhile",
+    "zip_longest",
+]  # fmt: skip
+_PATHS = [
+    "basename",
+    "commonpath",
+    "commonprefix",
+    "dirname",
+    "isabs",
+    "join",
+    "normpath",
+    "split",
+    "splitext",
+]
+_MATH = [
+    "ceil", "floor", "sqrt", "pow", "fabs", "gcd", "lcm", "log", "log2", "log10", "sin", "cos", "tan", "atan2", "hypot",
+    "radians", "degrees", "trunc", "isclose",
+]  # fmt: skip
 _OPERATORS = [name for name in dir(operator) if not name.startswith("_") and name not in ("methodcaller",)]
 
 
@@ -58,7 +73,7 @@ def _pattern(function: Function) -> Function:
         if isinstance(pattern, str) and len(pattern) > 500:
             raise NotConcrete
         source = pattern.pattern if isinstance(pattern, re.Pattern) else pattern
-        long = any(isinstance(each, str) and len(each) > 64 for each in given)
+        long = any(isinstance(each, str) and len(each) > 20 for each in given)
         if isinstance(source, str) and long and _repeats_repetition(source):
             raise NotConcrete
         return function(pattern, *given, **named)
@@ -85,6 +100,9 @@ def _no_opaque(function: Function) -> Function:
     def run(*given: Any, **named: Any) -> Any:
         if any(isinstance(each, Opaque | Callback) for each in (*given, *named.values())):
             raise NotConcrete
+        repeating = "mul" in function.__name__ and not all(isinstance(each, int | float) for each in given)
+        if repeating or "shift" in function.__name__:
+            raise NotConcrete  # of any size
         return function(*given, **named)
 
     return run
@@ -105,7 +123,7 @@ def _tee(iterable: Any, n: int = 2) -> Any:
 def _yaml(text: Any, *_: Any, **__: Any) -> Any:
     import yaml
 
-    if not isinstance(text, str) or "*" in text and "&" in text:
+    if not isinstance(text, str) or ("*" in text and "&" in text):
         raise NotConcrete
     try:
         return yaml.safe_load(text)
@@ -136,7 +154,9 @@ SHALLOW: dict[str, Function] = {
     "itertools.chain": _chain,
     "itertools.chain.from_iterable": _from_iterable,
     "itertools.tee": _tee,
-    **{f"{module}.{name}": getattr(posixpath, name) for module in ("os.path", "posixpath") for name in _PATHS},
+    **{
+        f"{module}.{name}": getattr(posixpath, name) for module in ("os.path", "posixpath") for name in _PATHS
+    },
     **{f"math.{name}": getattr(math, name) for name in _MATH if hasattr(math, name)},
     **{f"operator.{name}": _no_opaque(getattr(operator, name)) for name in _OPERATORS},
     "functools.reduce": functools.reduce,
@@ -158,7 +178,10 @@ SHALLOW: dict[str, Function] = {
     "ast.literal_eval": ast.literal_eval,
     "base64.b64encode": base64.b64encode,
     "base64.b64decode": base64.b64decode,
-    **{f"textwrap.{name}": getattr(textwrap, name) for name in ("dedent", "indent", "shorten", "wrap", "fill")},
+    **{
+        f"textwrap.{name}": getattr(textwrap, name)
+        for name in ("dedent", "indent", "shorten", "wrap", "fill")
+    },
 }
 # These look into what containers hold.
 DEEP: dict[str, Function] = {
@@ -172,8 +195,27 @@ DEEP: dict[str, Function] = {
 }
 IMMUTABLE_ATTRIBUTES = frozenset({"pattern", "string", "lastindex", "lastgroup", "template", "delimiter"})
 _PATH_IO = frozenset(
-    {"absolute", "resolve", "expanduser", "exists", "is_file", "is_dir", "read_text", "open", "glob", "iterdir"}
+    {
+        "absolute",
+        "resolve",
+        "expanduser",
+        "exists",
+        "is_file",
+        "is_dir",
+        "read_text",
+        "open",
+        "glob",
+        "iterdir",
+    }
 )
+
+
+# The size of a number makes no difference to their cost.
+ANY_SIZE = frozenset(
+    f"builtins.{name}" for name in (
+        "abs", "bin", "bool", "divmod", "float", "hex", "int", "max", "min", "oct", "round", "str", "repr", "sum",
+    )
+)  # fmt: skip
 
 
 def function_at(path: str) -> tuple[Function, bool] | None:

@@ -22,15 +22,19 @@ from nodl.infer.models.signatures import (
     FixedEndpoint,
     Helper,
 )
-from nodl.infer.text import Input, NodePart, Text, concatenate, make_text
+from nodl.infer.text import Input, NodePart, Text, concatenate, make_text, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
     NONE,
+    OTHER,
+    OTHER_KEYS,
+    Dictionary,
     External,
     Instance,
     Items,
+    Key,
     Unknown,
     Value,
     constant_strings,
@@ -345,6 +349,24 @@ def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
     return run.sequence(call.node, "list", Items(found))
 
 
+def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value:
+    """A dictionary of the parameters below a prefix, under the rest of their names."""
+    found = run.allocate(call.node, "by prefix", Dictionary)
+    assert isinstance(found, Dictionary)
+    for prefix in constant_strings(call.args.at(0, "prefix") or ANY):
+        start = f"{prefix}." if prefix else ""
+        everything = Input(f"{start}**", record)
+        value = parameter_object(run, call, (make_text((everything,)),), f"below {prefix}")
+        keys: Value = (with_edit(everything, "key", (start,)),)
+        run.state.store(found, OTHER, join(found.cells.get(OTHER, BOTTOM), value))
+        run.state.store(found, OTHER_KEYS, join(found.cells.get(OTHER_KEYS, BOTTOM), keys))
+        for name in record.parameters:
+            if name.startswith(start):
+                held = parameter_object(run, call, _inputs(run, record, [name]), name)
+                run.state.store(found, Key(name.removeprefix(start)), held)
+    return (found,) if OTHER in found.cells else unknown("parameters below a prefix that is not known")
+
+
 def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
     names = _names_or_gap(run, call)
     other = call.args.at(1, "alternative_value") or BOTTOM
@@ -408,6 +430,7 @@ NODE_METHODS: dict[str, NodeMethod] = {
     "get_parameter": _get_parameter,
     "get_parameters": _get_parameters,
     "get_parameter_or": _get_parameter_or,
+    "get_parameters_by_prefix": _get_parameters_by_prefix,
     "waitUntilNav2Active": _wait_until_active,
     "lifecycleStartup": _manage_lifecycle,
     "lifecycleShutdown": _manage_lifecycle,

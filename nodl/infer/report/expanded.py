@@ -82,7 +82,7 @@ def expand(system: InferredSystem) -> ExpandedSystem:
 def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[Interface | None, str]]:
     """The interface of each name that ``endpoint`` has by default, and what is open about it."""
     kind = endpoint.kind.value.replace("_", " ")
-    filled = endpoint.name.fill_each({})
+    filled = endpoint.name.unconditional.fill_each({})
     if not filled:
         yield None, ""
     for template in filled:

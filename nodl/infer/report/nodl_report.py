@@ -104,7 +104,7 @@ def _split(node: NodeInterface) -> tuple[dict[tuple[EndpointKind, str], str], li
     said: dict[tuple[EndpointKind, str], str] = {}
     unsaid: list[Endpoint] = []
     for endpoint in node.endpoints:
-        for template in endpoint.name.fill_each({}):
+        for template in endpoint.name.unconditional.fill_each({}):
             if template.is_literal and endpoint.type:
                 said.setdefault((endpoint.kind, template.text), endpoint.type)
             else:

@@ -110,25 +110,7 @@ def judge(program: Program, folder: Path) -> Verdict:
     return Verdict(sorted(missing), sorted(false), exact)
 
 
-NOT_YET = {  # claims too much, or (the lazy generator) the wrong thing
-    "control_flow: max and min choose", "control_flow: sorted by a key",
-    "control_flow: a loop ends with a decided break", "control_flow: a loop goes on with a decided continue",
-    "control_flow: a generator is lazy", "control_flow: a generator creates while it is consumed",
-    "control_flow: no exception, no handler", "control_flow: hasattr decides",
-    "control_flow: swallowed exceptions", "control_flow: any and all decide",
-    "control_flow: a dictionary is filled, merged and turned round",
-    "control_flow: a coin decides once for both names",
-    "control_flow: a coin decides and two variables go together",
-    "control_flow: with a return inside, what follows is not reached",
-    "handed_over: a function that nobody calls stays without effect",
-    "handed_over: a subclass that nobody makes stays without effect", "libraries: a parameter decides",
-}  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    "title",
-    [pytest.param(t, marks=pytest.mark.xfail(strict=True) if t in NOT_YET else ()) for t in PROGRAMS],
-)
+@pytest.mark.parametrize("title", PROGRAMS)
 def test_nothing_is_missing_silently_and_nothing_exact_is_false(title: str, tmp_path: Path) -> None:
     verdict = judge(PROGRAMS[title], tmp_path)
     assert not verdict.missing
