@@ -25,7 +25,7 @@ from enclave_launch.security_environment import (
 )
 from enclave_launch.served_domains import places, with_domains
 from keystore.errors import KeystoreError
-from keystore.formats.governance import NoGovernanceRule
+from keystore.formats.governance import NoGovernanceRuleError
 from keystore.formats.policy import EnclavePolicy
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
@@ -60,7 +60,7 @@ def provision_policies(
     policies = plan.derived.policy.enclaves if only is None else (only,)
     try:
         return provision(settings.keystore, policies, options=options)
-    except NoGovernanceRule as error:
+    except NoGovernanceRuleError as error:
         raise ProvisionError(f"{error} ({places(plan, error.domains)})") from error
     except KeystoreError as error:
         raise ProvisionError(str(error)) from error

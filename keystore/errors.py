@@ -1,14 +1,14 @@
 """All errors a user of the keystore can meet, cut by who must act.
 
     KeystoreError
-    ├── InvalidEnclaveName      the author of a launch file, policy or command: a name that is no enclave name
-    ├── InvalidInput            the author of a YAML, policy, certificate or option value
-    ├── NotAKeystore            the caller: the path is something else
-    ├── UnsafeKeystore          the owner of the files: links, owners or modes that let others in
-    ├── DamagedKeystore         the operator: a file is missing, unreadable or not what it should be
-    ├── SigningUnavailable      the holder of the CA key: no key here, no passphrase, a token that refuses
-    ├── KeystoreBusy            another run holds the lock
-    └── StorageError            the system: disk full, read-only, no permission
+    ├── InvalidEnclaveNameError      the author of a launch file, policy or command: a name that is no enclave name
+    ├── InvalidInputError            the author of a YAML, policy, certificate or option value
+    ├── NotAKeystoreError            the caller: the path is something else
+    ├── UnsafeKeystoreError          the owner of the files: links, owners or modes that let others in
+    ├── DamagedKeystoreError         the operator: a file is missing, unreadable or not what it should be
+    ├── SigningUnavailableError      the holder of the CA key: no key here, no passphrase, a token that refuses
+    ├── KeystoreBusyError            another run holds the lock
+    └── StorageError                 the system: disk full, read-only, no permission
 
 ``str(error)`` is one message: what, where, what to do next. Key material, passphrases and PINs never
 enter a message. Errors of the operating system, cryptography, lxml and yaml are translated where they enter.
@@ -27,7 +27,7 @@ class KeystoreError(Exception):
     exit_status = 1
 
 
-class InvalidEnclaveName(KeystoreError, ValueError):
+class InvalidEnclaveNameError(KeystoreError, ValueError):
     """``reason`` alone, for callers that know better where the name was written."""
 
     exit_status = 2
@@ -38,31 +38,31 @@ class InvalidEnclaveName(KeystoreError, ValueError):
         super().__init__(f"{printable(name)} is not an enclave name: {reason}")
 
 
-class EnclaveTooDeep(InvalidEnclaveName):
+class EnclaveTooDeep(InvalidEnclaveNameError):
     """A name that rcl accepts and Cyclone DDS cannot carry in a certificate."""
 
 
-class InvalidInput(KeystoreError, ValueError):
+class InvalidInputError(KeystoreError, ValueError):
     exit_status = 2
 
 
-class NotAKeystore(KeystoreError):
+class NotAKeystoreError(KeystoreError):
     pass
 
 
-class UnsafeKeystore(KeystoreError):
+class UnsafeKeystoreError(KeystoreError):
     pass
 
 
-class DamagedKeystore(KeystoreError):
+class DamagedKeystoreError(KeystoreError):
     pass
 
 
-class SigningUnavailable(KeystoreError):
+class SigningUnavailableError(KeystoreError):
     pass
 
 
-class KeystoreBusy(KeystoreError):
+class KeystoreBusyError(KeystoreError):
     exit_status = 75  # EX_TEMPFAIL of sysexits.h: trying again may help
 
 

@@ -26,7 +26,7 @@ from enclave_launch.process import (
     EnclaveRequest,
     ResolvedProcess,
 )
-from keystore.errors import EnclaveTooDeep, InvalidEnclaveName
+from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError
 from keystore.formats.enclave_name import validate_enclave_name
 
 
@@ -84,7 +84,7 @@ def assign_enclave(
         validate_enclave_name(assignment.path)
     except EnclaveTooDeep as error:
         return assignment._replace(too_deep=str(error))
-    except InvalidEnclaveName as error:
+    except InvalidEnclaveNameError as error:
         raise LaunchFileError(
             f"enclave {assignment.path!r} ({assignment.reason.value}): {error}",
             process.location,

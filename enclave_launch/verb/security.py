@@ -9,7 +9,7 @@ from datetime import timedelta
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.options import SecurityOptions
 from enclave_launch.secured import ProvisionedLaunch
-from keystore.errors import InvalidInput, KeystoreError
+from keystore.errors import InvalidInputError, KeystoreError
 from keystore.formats.domains import Domains
 from keystore.formats.validity import later, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
@@ -23,7 +23,7 @@ def security_options(options: argparse.Namespace) -> SecurityOptions:
     try:
         parse_duration(options.warn_expiry)  # used after provisioning, refused before
         return SecurityOptions(strategy=options.strategy, keystore=_provision_options(options))
-    except InvalidInput as error:
+    except InvalidInputError as error:
         raise UsageError(str(error)) from error
 
 
@@ -50,7 +50,7 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
 
 def domains(options: argparse.Namespace) -> Domains | None:
     """``--domain-id``; None: those that the plan finds in the environments of the processes. Raises
-    ``InvalidInput``."""
+    ``InvalidInputError``."""
     return Domains.parse(options.domain_id) if options.domain_id else None
 
 
@@ -83,7 +83,7 @@ def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
     enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]
     try:
         due = expires_soon(keystore, within, enclaves=enclaves, known=known)
-    except InvalidInput as error:
+    except InvalidInputError as error:
         raise UsageError(str(error)) from error
     except KeystoreError as error:
         raise ProvisionError(str(error)) from error

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from keystore.disk import layout
 from keystore.disk.view import KeystoreView
-from keystore.errors import UnsafeKeystore, printable
+from keystore.errors import UnsafeKeystoreError, printable
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -23,9 +23,9 @@ def foreign_authorities(view: KeystoreView, register: Register | None) -> list[t
 
 
 def refuse_foreign_authorities(view: KeystoreView, register: Register | None) -> None:
-    """Raises UnsafeKeystore: whoever holds the key of such a CA can make enclaves that Fast DDS lets in."""
+    """Raises UnsafeKeystoreError: whoever holds the key of such a CA can make enclaves that Fast DDS lets in."""
     for role, ca in foreign_authorities(view, register):
-        raise UnsafeKeystore(
+        raise UnsafeKeystoreError(
             f"{printable(view.root / layout.ca_cert(role))} holds a CA that this keystore did not make: "
             f"{describe(ca)}. Find out who put it there; to remove it: secure-keystore renew "
             f"{printable(view.root)}"

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, printable
+from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats import der
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -21,16 +21,16 @@ _EXTENSIONS = 0xA0
 
 
 def crl_validity(view: KeystoreView) -> Validity:
-    """thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystore."""
+    """thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystoreError."""
     try:
         times = [part for part in _fields(view) if part.tag in (der.UTC_TIME, der.GENERALIZED_TIME)]
         return Validity(der.time_value(times[0]), der.time_value(times[1]))
     except (IndexError, der.DerError):
-        raise DamagedKeystore(f"{printable(view.root / layout.CRL)} is not a CRL with an end") from None
+        raise DamagedKeystoreError(f"{printable(view.root / layout.CRL)} is not a CRL with an end") from None
 
 
 def crl_number(view: KeystoreView) -> int:
-    """CRLNumber (RFC 5280 section 5.2.3), 0 without one. The signature is not checked. Raises DamagedKeystore."""
+    """CRLNumber (RFC 5280 section 5.2.3), 0 without one. The signature is not checked. Raises DamagedKeystoreError."""
     try:
         holder = next((part for part in _fields(view) if part.tag == _EXTENSIONS), None)
         extensions = holder.children()[0].children() if holder is not None else []
@@ -40,7 +40,7 @@ def crl_number(view: KeystoreView) -> int:
                 return int.from_bytes(der.parse(value.content).content, "big")
         return 0
     except (IndexError, ValueError):
-        raise DamagedKeystore(f"{printable(view.root / layout.CRL)} is not a readable CRL") from None
+        raise DamagedKeystoreError(f"{printable(view.root / layout.CRL)} is not a readable CRL") from None
 
 
 def _fields(view: KeystoreView) -> list[der.Element]:
@@ -65,7 +65,7 @@ def crl_problem(view: KeystoreView, register: Register | None, now: datetime) ->
             return "the CRL has ended"  # every participant would be refused
         if register is not None and crl_number(view) != register.crl_number:
             return "the CRL is not the one published last"
-    except DamagedKeystore:
+    except DamagedKeystoreError:
         return "the CRL cannot be read"
     return None
 
@@ -86,7 +86,7 @@ def _revoked_at(entry: x509.RevokedCertificate) -> datetime:
 
 
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
-    """Raises DamagedKeystore when it is unreadable or not signed by the identity CA."""
+    """Raises DamagedKeystoreError when it is unreadable or not signed by the identity CA."""
     from cryptography import x509
     from cryptography.exceptions import UnsupportedAlgorithm
 
@@ -96,7 +96,7 @@ def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
         key = x509.load_der_x509_certificate(view.ca(Role.IDENTITY).der).public_key()
         valid = crl.is_signature_valid(key)  # type: ignore[arg-type]
     except (ValueError, TypeError, UnsupportedAlgorithm):
-        raise DamagedKeystore(f"{place} is not a readable CRL; remove it and revoke again") from None
+        raise DamagedKeystoreError(f"{place} is not a readable CRL; remove it and revoke again") from None
     if not valid:
-        raise DamagedKeystore(f"{place} is not signed by the identity CA; remove it and revoke again")
+        raise DamagedKeystoreError(f"{place} is not signed by the identity CA; remove it and revoke again")
     return crl

@@ -6,7 +6,7 @@ import re
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, printable
+from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -22,14 +22,14 @@ def signed_governance(view: KeystoreView) -> smime.SignedDocument:
 
 
 def governance_domains(view: KeystoreView) -> Domains:
-    """The domains the governance in force lists, read cheaply; raises DamagedKeystore when there are none."""
+    """The domains the governance in force lists, read cheaply; raises DamagedKeystoreError when there are none."""
     return _listed_domains(signed_governance(view), view)
 
 
 def _listed_domains(signed: smime.SignedDocument, view: KeystoreView) -> Domains:
     found = _IDS.findall(signed.document)
     if not found:
-        raise DamagedKeystore(f"{printable(view.root / layout.GOVERNANCE)} lists no domain")
+        raise DamagedKeystoreError(f"{printable(view.root / layout.GOVERNANCE)} lists no domain")
     return Domains(tuple((int(one or low), int(one or high)) for one, low, high in found))
 
 

@@ -60,7 +60,7 @@ def ca_key_uri(role: Role) -> str:
 
 
 def enclave_directory(enclave: str) -> str:
-    """``enclaves/a/b``; raises InvalidEnclaveName, so that no path is ever built from an unchecked name."""
+    """``enclaves/a/b``; raises InvalidEnclaveNameError, so that no path is ever built from an unchecked name."""
     return "/".join((ENCLAVES, *segments(validate_enclave_name(enclave))))
 
 

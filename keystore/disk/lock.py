@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from keystore.disk import layout
-from keystore.errors import KeystoreBusy, StorageError, UnsafeKeystore, printable
+from keystore.errors import KeystoreBusyError, StorageError, UnsafeKeystoreError, printable
 from keystore.formats.validity import iso, utc_now
 
 DEFAULT_TIMEOUT = 30.0
@@ -26,7 +26,7 @@ _POLL = 0.02
 
 @contextmanager
 def exclusive(root: Path, timeout: float = DEFAULT_TIMEOUT) -> Iterator[None]:
-    """Hold the keystore's lock; raises KeystoreBusy with the holder after ``timeout`` seconds.
+    """Hold the keystore's lock; raises KeystoreBusyError with the holder after ``timeout`` seconds.
 
     ``root`` must exist. Raises StorageError when the lock cannot be opened (read-only, no permission).
     """
@@ -62,7 +62,7 @@ def _locked(root: Path, timeout: float, deadline: float) -> int | None:
 def _refuse_strange(path: Path, info: os.stat_result) -> None:
     """We write in it: a hard link would make that another file of ours."""
     if not stat.S_ISREG(info.st_mode) or info.st_nlink > 1:
-        raise UnsafeKeystore(
+        raise UnsafeKeystoreError(
             f"{printable(path)} is not a file of its own, but a device or a hard link; "
             f"remove it: rm {shlex.quote(str(path))}"
         )
@@ -90,9 +90,9 @@ def _wait(descriptor: int, root: Path, timeout: float, deadline: float) -> None:
         time.sleep(_POLL)
 
 
-def _busy(descriptor: int, root: Path, timeout: float) -> KeystoreBusy:
+def _busy(descriptor: int, root: Path, timeout: float) -> KeystoreBusyError:
     holder = os.pread(descriptor, 256, 0).decode("utf-8", "replace").strip() or "another process"
-    return KeystoreBusy(
+    return KeystoreBusyError(
         f"{printable(root)} is in use by {printable(holder)}; waited {timeout:g} s. Try again when it is done"
     )
 

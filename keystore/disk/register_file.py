@@ -15,7 +15,8 @@ from keystore.formats.role import Role
 def read_register(root: Path) -> Register | None:
     """None where there is none: a bundle without ``private/``, a keystore of SROS2 or of an earlier version.
 
-    Raises DamagedKeystore for what is not a register and UnsafeKeystore for one that others could have written.
+    Raises DamagedKeystoreError for what is not a register, UnsafeKeystoreError for one that others could have
+    written.
     """
     if not os.path.lexists(f"{root}/{layout.REGISTER}"):
         return None

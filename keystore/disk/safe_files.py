@@ -13,7 +13,13 @@ import stat
 from pathlib import Path
 
 from keystore.disk import layout
-from keystore.errors import DamagedKeystore, NotAKeystore, StorageError, UnsafeKeystore, printable
+from keystore.errors import (
+    DamagedKeystoreError,
+    NotAKeystoreError,
+    StorageError,
+    UnsafeKeystoreError,
+    printable,
+)
 
 _MAX_FILE = 8_000_000
 _MAX_REGISTER = 200_000_000
@@ -21,20 +27,20 @@ _WRITABLE_BY_OTHERS = 0o022
 
 
 def resolve_root(keystore: Path | str) -> Path:
-    """Raises NotAKeystore for what can be no path."""
+    """Raises NotAKeystoreError for what can be no path."""
     try:
         return Path(os.path.realpath(keystore))
     except ValueError:
-        raise NotAKeystore(f"{printable(keystore)} is no path") from None
+        raise NotAKeystoreError(f"{printable(keystore)} is no path") from None
 
 
 def read(root: Path, relative: str) -> bytes:
-    """The content of a keystore file; raises DamagedKeystore when it is missing, UnsafeKeystore for a strange
+    """The content of a keystore file; raises DamagedKeystoreError when it is missing, UnsafeKeystoreError for a strange
     link, StorageError otherwise."""
     try:
         return _read(root, relative)
     except FileNotFoundError:
-        raise DamagedKeystore(f"{printable(root / relative)} is missing") from None
+        raise DamagedKeystoreError(f"{printable(root / relative)} is missing") from None
     except OSError as error:
         raise StorageError.of(error, "reading the keystore") from None
 
@@ -61,13 +67,13 @@ def _read(root: Path, relative: str) -> bytes:
     try:
         info = os.fstat(descriptor)
         if not stat.S_ISREG(info.st_mode):
-            raise UnsafeKeystore(f"{printable(root / relative)} is not a regular file; remove it")
+            raise UnsafeKeystoreError(f"{printable(root / relative)} is not a regular file; remove it")
         limit = _MAX_REGISTER if relative == layout.REGISTER else _MAX_FILE
         if info.st_size > limit:
-            raise DamagedKeystore(f"{printable(root / relative)} is larger than {limit} bytes")
+            raise DamagedKeystoreError(f"{printable(root / relative)} is larger than {limit} bytes")
         content = os.read(descriptor, info.st_size + 1)
         if len(content) != info.st_size:
-            raise DamagedKeystore(f"{printable(root / relative)} changed while it was read; try again")
+            raise DamagedKeystoreError(f"{printable(root / relative)} changed while it was read; try again")
         return content
     finally:
         os.close(descriptor)
@@ -87,9 +93,9 @@ def _open(root: Path, relative: str) -> int:
     return os.open(f"{root}/{relative}", flags)
 
 
-def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystore:
+def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystoreError:
     path = root / relative
-    return UnsafeKeystore(
+    return UnsafeKeystoreError(
         f"{printable(path)} is a link to {printable(target)}, which no keystore has there; "
         f"look at it and remove it: rm {shlex.quote(str(path))}"
     )
@@ -124,7 +130,7 @@ def refuse_unsafe_private(root: Path, relative: str) -> None:
         return  # missing: the read that follows says so
     for place, info in found:
         if problem := private_problem(place, info):
-            raise UnsafeKeystore(problem)
+            raise UnsafeKeystoreError(problem)
 
 
 def refuse_unsafe_private_directories(root: Path) -> None:
@@ -136,7 +142,7 @@ def refuse_unsafe_private_directories(root: Path) -> None:
         refuse_unsafe_directory(path)
         info = os.lstat(path)
         if info.st_mode & _WRITABLE_BY_OTHERS:
-            raise UnsafeKeystore(
+            raise UnsafeKeystoreError(
                 f"{printable(path)} can be written by others (mode {mode_text(info)}); for the whole keystore: "
                 f"{close_to_others(root)}"
             )
@@ -176,11 +182,11 @@ def refuse_unsafe_directory(path: Path) -> None:
         raise StorageError.of(error, "looking at the directory") from None
     quoted = shlex.quote(str(path))
     if stat.S_ISLNK(info.st_mode) or not stat.S_ISDIR(info.st_mode):
-        raise UnsafeKeystore(f"{printable(path)} is not a directory (a link?); remove it: rm {quoted}")
+        raise UnsafeKeystoreError(f"{printable(path)} is not a directory (a link?); remove it: rm {quoted}")
     if info.st_uid != os.geteuid():
-        raise UnsafeKeystore(private_problem(path, info) or "")
+        raise UnsafeKeystoreError(private_problem(path, info) or "")
     if info.st_mode & stat.S_IWOTH:
-        raise UnsafeKeystore(
+        raise UnsafeKeystoreError(
             f"everybody can write in {printable(path)} (mode {mode_text(info)}): chmod o-w {quoted}"
         )
 
@@ -189,7 +195,7 @@ def refuse_unsafe_parent(root: Path) -> None:
     """Whoever can rename the keystore can replace it: its parent must not be open without the sticky bit."""
     info = os.stat(root.parent)
     if info.st_mode & stat.S_IWOTH and not info.st_mode & stat.S_ISVTX:
-        raise UnsafeKeystore(
+        raise UnsafeKeystoreError(
             f"everybody can rename what is in {printable(root.parent)}: "
             f"chmod o-w {shlex.quote(str(root.parent))}, or put the keystore elsewhere"
         )

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
 
-from keystore.errors import DamagedKeystore
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME
 from keystore.signing.authority import Curve
@@ -39,19 +39,19 @@ class Settings:
 
     @classmethod
     def from_json(cls, text: bytes, place: str) -> Settings:
-        """Raises DamagedKeystore for anything but what ``to_json`` writes."""
+        """Raises DamagedKeystoreError for anything but what ``to_json`` writes."""
         import json
 
         try:
             content: Any = json.loads(text)
             if content["version"] != _VERSION:
-                raise DamagedKeystore(f"{place} was written by a newer version; update secure-keystore")
+                raise DamagedKeystoreError(f"{place} was written by a newer version; update secure-keystore")
             return cls(
                 SubjectScheme(content["subjects"]),
                 Curve(content["curve"]),
                 timedelta(seconds=int(content["lifetime_seconds"])),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
-            raise DamagedKeystore(
+            raise DamagedKeystoreError(
                 f"{place} is not the settings file of a keystore; restore or remove it"
             ) from None

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.errors import UnsafeKeystore, printable
+from keystore.errors import UnsafeKeystoreError, printable
 from keystore.formats.shares import Share, parse_shares
 
 
@@ -24,7 +24,7 @@ def read_shares(root: Path, enclave: str) -> tuple[Share, ...]:
     if text is None:
         return ()
     if problem := safe_files.private_problem(f"{root}/{relative}", os.stat(f"{root}/{relative}")):
-        raise UnsafeKeystore(problem)  # what it asks for would be signed
+        raise UnsafeKeystoreError(problem)  # what it asks for would be signed
     return parse_shares(text, printable(root / relative))
 
 

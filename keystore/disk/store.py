@@ -235,7 +235,7 @@ class Batch:
 def opened(root: Path, *, timeout: float = lock.DEFAULT_TIMEOUT, durable: bool = True) -> Iterator[Store]:
     """Lock an existing keystore directory for writing.
 
-    Raises KeystoreBusy, UnsafeKeystore (its directory or the one above is open to others) or StorageError.
+    Raises KeystoreBusyError, UnsafeKeystoreError (its directory or the one above is open to others) or StorageError.
     ``durable`` False skips every fsync: for tests and for keystores that can be thrown away.
     """
     try:

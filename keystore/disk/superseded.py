@@ -15,7 +15,7 @@ from typing import Any
 from keystore.disk import layout, safe_files
 from keystore.disk.store import PRIVATE_MODE, Batch
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, printable
+from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.validity import iso, parse_moment
 
@@ -30,7 +30,7 @@ class Superseded:
 
 
 def superseded(view: KeystoreView) -> tuple[Superseded, ...]:
-    """All that is remembered; raises DamagedKeystore when the file is not ours."""
+    """All that is remembered; raises DamagedKeystoreError when the file is not ours."""
     if safe_files.read_if_there(view.root, layout.SUPERSEDED) is None:
         return ()
     text = safe_files.read_private(view.root, layout.SUPERSEDED)
@@ -40,13 +40,13 @@ def superseded(view: KeystoreView) -> tuple[Superseded, ...]:
             raise KeyError("version")
         return tuple(_entry(entry) for entry in content["certificates"])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise DamagedKeystore(
+        raise DamagedKeystoreError(
             f"{printable(view.root / layout.SUPERSEDED)} is no list of replaced certificates; restore it from a backup"
         ) from None
 
 
 def _entry(entry: dict[str, str]) -> Superseded:
-    """InvalidInput and InvalidEnclaveName are ValueErrors."""
+    """InvalidInputError and InvalidEnclaveNameError are ValueErrors."""
     return Superseded(
         validate_enclave_name(entry["enclave"]), int(entry["serial"], 16), parse_moment(entry["not_after"])
     )

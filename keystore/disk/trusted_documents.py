@@ -18,7 +18,7 @@ from keystore.signing import smime
 
 
 def trusted_document(view: KeystoreView, relative: str) -> bytes:
-    """The XML inside a ``.p7s``; raises DamagedKeystore when none of this keystore's CAs signed it."""
+    """The XML inside a ``.p7s``; raises DamagedKeystoreError when none of this keystore's CAs signed it."""
     place = printable(view.root / relative)
     signed = smime.read(safe_files.read(view.root, relative), place)
     smime.check(signed, list(own_permissions_cas(view)), place)

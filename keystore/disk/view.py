@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files
 from keystore.errors import (
-    DamagedKeystore,
-    InvalidEnclaveName,
-    NotAKeystore,
-    SigningUnavailable,
+    DamagedKeystoreError,
+    InvalidEnclaveNameError,
+    NotAKeystoreError,
+    SigningUnavailableError,
     StorageError,
     printable,
 )
@@ -59,12 +59,12 @@ class KeystoreView:
 
     def require_complete(self) -> None:
         if not self.root.is_dir():
-            raise NotAKeystore(
+            raise NotAKeystoreError(
                 f"there is no keystore at {printable(self.root)}; to make one: "
                 f"secure-keystore create {shlex.quote(str(self.root))}"
             )
         if not self.is_complete:
-            raise NotAKeystore(
+            raise NotAKeystoreError(
                 f"{printable(self.root)} is not a complete keystore (public/, enclaves/governance.p7s); "
                 f"to make or complete it: secure-keystore create {shlex.quote(str(self.root))}"
             )
@@ -90,7 +90,7 @@ class KeystoreView:
             name = layout.ca_cert(role)
             bundles[role] = read_certificates(safe_files.read(self.root, name), printable(self.root / name))
             if not bundles[role]:
-                raise DamagedKeystore(f"{printable(self.root / name)} holds no certificate")
+                raise DamagedKeystoreError(f"{printable(self.root / name)} holds no certificate")
         return bundles
 
     @property
@@ -103,13 +103,13 @@ class KeystoreView:
         return next((name for name in candidates if os.path.lexists(self.root / name)), None)
 
     def authority(self, role: Role, access: CaAccess) -> Authority:
-        """The CA ready to sign; raises SigningUnavailable where its key is not, or does not open."""
+        """The CA ready to sign; raises SigningUnavailableError where its key is not, or does not open."""
         from keystore.signing.authority import authority_of
         from keystore.signing.signer import open_signer
 
         name = self.key_file(role)
         if name is None:
-            raise SigningUnavailable(
+            raise SigningUnavailableError(
                 f"{printable(self.root / layout.ca_key(role))} is not here, so nothing can be signed; "
                 "run this where the CA key is"
             )
@@ -143,6 +143,6 @@ def _collect(directory: Path | str, prefix: str, found: list[str]) -> None:
             continue
         try:
             validate_enclave_name(f"{prefix}/{entry.name}")
-        except InvalidEnclaveName:
+        except InvalidEnclaveNameError:
             continue  # a stray, which verify reports
         _collect(entry.path, f"{prefix}/{entry.name}", found)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import NamedTuple
 
-from keystore.errors import DamagedKeystore
+from keystore.errors import DamagedKeystoreError
 from keystore.formats import der
 from keystore.formats.validity import Validity
 
@@ -103,11 +103,11 @@ def read_der(data: bytes) -> CertificateFacts:
 
 
 def read_certificate(pem: bytes, place: str) -> CertificateFacts:
-    """The first certificate of a PEM file; raises DamagedKeystore naming ``place``."""
+    """The first certificate of a PEM file; raises DamagedKeystoreError naming ``place``."""
     try:
         return read_pem(pem)
     except der.DerError as error:
-        raise DamagedKeystore(f"{place} is no usable certificate: {error}") from None
+        raise DamagedKeystoreError(f"{place} is no usable certificate: {error}") from None
 
 
 def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
@@ -115,7 +115,7 @@ def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
     try:
         return [read_der(block) for block in pem_blocks(pem)]
     except der.DerError as error:
-        raise DamagedKeystore(f"{place} is no usable certificate: {error}") from None
+        raise DamagedKeystoreError(f"{place} is no usable certificate: {error}") from None
 
 
 def _read(data: bytes) -> CertificateFacts:

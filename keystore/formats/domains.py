@@ -10,7 +10,7 @@ import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 
 LOWEST_ID = 0
 HIGHEST_ID = 230
@@ -23,7 +23,7 @@ class _Ranges(NamedTuple):
 class Domains(_Ranges):
     """``ranges``: pairs (first, last), both included, sorted, neither touching nor overlapping.
 
-    Raises InvalidInput for what are no domain ids.
+    Raises InvalidInputError for what are no domain ids.
     """
 
     __slots__ = ()
@@ -31,10 +31,10 @@ class Domains(_Ranges):
     def __new__(cls, ranges: Iterable[tuple[int, int]]) -> Domains:
         given = tuple(ranges)
         if not given:
-            raise InvalidInput("at least one ROS domain id is needed")
+            raise InvalidInputError("at least one ROS domain id is needed")
         for first, last in given:
             if not LOWEST_ID <= first <= last <= HIGHEST_ID:
-                raise InvalidInput(
+                raise InvalidInputError(
                     f"domain ids {_text(first, last)} are no range within {LOWEST_ID}..{HIGHEST_ID}"
                 )
         return super().__new__(cls, tuple(_merged(given)))
@@ -49,14 +49,14 @@ class Domains(_Ranges):
 
     @classmethod
     def parse(cls, text: str) -> Domains:
-        """``0``, ``0-10``, ``0,5,7-9`` or ``all``. Raises ``InvalidInput``."""
+        """``0``, ``0-10``, ``0,5,7-9`` or ``all``. Raises ``InvalidInputError``."""
         if text.strip() == "all":
             return cls.every()
         ranges = []
         for part in text.split(","):
             match = re.fullmatch(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", part.strip())
             if match is None:
-                raise InvalidInput(f"{printable(text)} are no domain ids; write 0, 0-10 or 0,5,7-9")
+                raise InvalidInputError(f"{printable(text)} are no domain ids; write 0, 0-10 or 0,5,7-9")
             ranges.append((int(match[1]), int(match[2] or match[1])))
         return cls(tuple(ranges))
 

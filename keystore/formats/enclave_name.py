@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-from keystore.errors import EnclaveTooDeep, InvalidEnclaveName, printable
+from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError, printable
 
 # RMW_TOPIC_MAX_NAME_LENGTH (247) minus two, where SROS2's namespace check stops; rcl itself allows 255.
 MAX_LENGTH = 245
@@ -21,16 +21,18 @@ _ENCLAVE = re.compile(r"(?:/|(?:/[A-Za-z_][A-Za-z0-9_]*)+)\Z")
 
 
 def validate_enclave_name(name: str) -> str:
-    """Return ``name`` unchanged if it is an enclave name, else raise ``InvalidEnclaveName``.
+    """Return ``name`` unchanged if it is an enclave name, else raise ``InvalidEnclaveNameError``.
 
     Nothing is normalised: ``/a/``, ``//a`` and ``/a/../b`` are refused, so a name has one spelling and its
     directory lies below ``enclaves``. Segments cannot collide with the keystore's own file names, which all
     contain a dot.
     """
     if len(name) > MAX_LENGTH:
-        raise InvalidEnclaveName(name, f"it has {len(name)} characters, at most {MAX_LENGTH} are allowed")
+        raise InvalidEnclaveNameError(
+            name, f"it has {len(name)} characters, at most {MAX_LENGTH} are allowed"
+        )
     if not _ENCLAVE.match(name):
-        raise InvalidEnclaveName(name, _differences(name))
+        raise InvalidEnclaveNameError(name, _differences(name))
     if name.count("/") > MAX_SEGMENTS:
         count = name.count("/")
         raise EnclaveTooDeep(name, f"it has {count} segments, Cyclone DDS carries at most {MAX_SEGMENTS}")
@@ -68,7 +70,7 @@ def check_distinct(names: Iterable[str]) -> None:
         for prefix in _prefixes(name):
             other = seen.setdefault(prefix.lower(), prefix)
             if other != prefix:
-                raise InvalidEnclaveName(name, f"it differs from {printable(other)} only in case")
+                raise InvalidEnclaveNameError(name, f"it differs from {printable(other)} only in case")
 
 
 def _prefixes(name: str) -> Iterable[str]:

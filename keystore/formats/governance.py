@@ -12,7 +12,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 from keystore.formats.domains import Domains
 
 if TYPE_CHECKING:
@@ -47,9 +47,11 @@ class TopicRule:
     def __post_init__(self) -> None:
         expression = self.topic_expression
         if not expression or not expression.isascii() or not expression.isprintable() or " " in expression:
-            raise InvalidInput(f"governance: topic_expression {printable(expression)} is empty or has blanks")
+            raise InvalidInputError(
+                f"governance: topic_expression {printable(expression)} is empty or has blanks"
+            )
         if self.data_protection_kind not in _DATA_KINDS:
-            raise InvalidInput("governance: data_protection_kind is NONE, SIGN or ENCRYPT")
+            raise InvalidInputError("governance: data_protection_kind is NONE, SIGN or ENCRYPT")
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,13 +71,13 @@ class DomainRule:
         if not self.topic_rules or self.topic_rules[-1].topic_expression != "*":
             object.__setattr__(self, "topic_rules", (*self.topic_rules, TopicRule()))
         if self.allow_unauthenticated_participants and self.rtps_protection_kind is not Protection.NONE:
-            raise InvalidInput(
+            raise InvalidInputError(
                 "governance: allow_unauthenticated_participants needs rtps_protection_kind NONE; "
                 "Fast DDS refuses the document otherwise, and no such participant could be heard"
             )
 
 
-class NoGovernanceRule(InvalidInput):
+class NoGovernanceRuleError(InvalidInputError):
     """``domains`` are not among the several rules of the governance."""
 
     def __init__(self, domains: Domains, message: str) -> None:
@@ -89,7 +91,7 @@ class Governance:
 
     def __post_init__(self) -> None:
         if not self.domain_rules:
-            raise InvalidInput("governance: at least one domain rule is needed")
+            raise InvalidInputError("governance: at least one domain rule is needed")
 
     @classmethod
     def for_domains(cls, domains: Domains) -> Governance:
@@ -101,9 +103,9 @@ class Governance:
         return Domains(tuple(part for rule in self.domain_rules for part in rule.domains.ranges))
 
     def extended_to(self, domains: Domains) -> Governance:
-        """The same rules for more domains; only unambiguous with a single rule, else raises NoGovernanceRule."""
+        """The same rules for more domains; only unambiguous with a single rule, else raises NoGovernanceRuleError."""
         if len(self.domain_rules) != 1:
-            raise NoGovernanceRule(
+            raise NoGovernanceRuleError(
                 domains,
                 f"the governance has no rule for domains {domains} and several to choose from; "
                 "add the domains to its YAML file and run: secure-keystore governance KEYSTORE FILE.yaml",
@@ -162,14 +164,14 @@ _TOPIC_LEAVES = (
 
 
 def check_governance_schema(document: bytes, where: str) -> None:
-    """Raises InvalidInput with file:line for what the schema (and so Fast DDS) would refuse."""
+    """Raises InvalidInputError with file:line for what the schema (and so Fast DDS) would refuse."""
     from keystore.formats.safe_xml import check_schema, parse_xml
 
     check_schema(parse_xml(document, where), "governance.xsd", where, "DDS governance document")
 
 
 def parse_governance(document: bytes, where: str) -> Governance:
-    """A governance document, ours or SROS2's, as values. Raises InvalidInput with file:line."""
+    """A governance document, ours or SROS2's, as values. Raises InvalidInputError with file:line."""
     from keystore.formats.safe_xml import check_schema, parse_xml
 
     root = parse_xml(document, where)

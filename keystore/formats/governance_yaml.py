@@ -30,7 +30,7 @@ import yaml
 from pydantic import BaseModel, Field, StrictBool, StrictInt, StrictStr, ValidationError
 
 from enclave_launch.boundary.files import read_bytes
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, parse_governance
 
@@ -68,48 +68,48 @@ class _Document(_Strict):
 
 
 def load_governance_yaml(path: Path) -> Governance:
-    """Raises InvalidInput naming the file and the line or the entry."""
+    """Raises InvalidInputError naming the file and the line or the entry."""
     try:
         text = read_bytes(path, _MAX_BYTES)
     except OSError as error:
-        raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
+        raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
     return parse_governance_yaml(text, str(path))
 
 
 def governance_of(path: Path) -> Governance:
-    """A governance as a person keeps it: our YAML, or the XML that is signed. Raises InvalidInput."""
+    """A governance as a person keeps it: our YAML, or the XML that is signed. Raises InvalidInputError."""
     if path.suffix == ".xml":
         try:
             return parse_governance(read_bytes(path, _MAX_BYTES), str(path))
         except OSError as error:
-            raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
+            raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
     return load_governance_yaml(path)
 
 
 def parse_governance_yaml(text: bytes, where: str) -> Governance:
     if len(text) > _MAX_BYTES:
-        raise InvalidInput(f"{where}: larger than {_MAX_BYTES} bytes")
+        raise InvalidInputError(f"{where}: larger than {_MAX_BYTES} bytes")
     try:
         content = yaml.load(text, _SafeLoader)
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise InvalidInput(f"{where}{line}: {error.problem or 'not YAML'}") from None
+        raise InvalidInputError(f"{where}{line}: {error.problem or 'not YAML'}") from None
     except (yaml.YAMLError, ValueError, RecursionError):  # numbers, dates, nesting that Python refuses
-        raise InvalidInput(f"{where}: not YAML text") from None
+        raise InvalidInputError(f"{where}: not YAML text") from None
     try:
         document = _Document(**_mapping(content, where))
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "document"
-        raise InvalidInput(f"{where}: {place}: {first['msg']}") from None
+        raise InvalidInputError(f"{where}: {place}: {first['msg']}") from None
     if document.version != 1:
-        raise InvalidInput(f"{where}: version: {document.version} is not known, only 1 is")
+        raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
     if not document.domain_rules:
-        raise InvalidInput(f"{where}: domain_rules: at least one rule is needed")
+        raise InvalidInputError(f"{where}: domain_rules: at least one rule is needed")
     try:
         return Governance(tuple(_domain_rule(rule) for rule in document.domain_rules))
-    except InvalidInput as error:
-        raise InvalidInput(f"{where}: {error}") from None
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{where}: {error}") from None
 
 
 def _domain_rule(rule: _Domain) -> DomainRule:
@@ -121,7 +121,7 @@ def _domain_rule(rule: _Domain) -> DomainRule:
 
 def _mapping(content: Any, where: str) -> dict[str, Any]:
     if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
-        raise InvalidInput(f"{where}: document: not a mapping with the keys version and domain_rules")
+        raise InvalidInputError(f"{where}: document: not a mapping with the keys version and domain_rules")
     return content
 
 

@@ -25,7 +25,7 @@ class Permitted(NamedTuple):
 
 
 def grant_for(document: bytes, subject: str, place: str) -> Grant | None:
-    """The grant that DDS uses for ``subject``: the first. Raises InvalidInput for what is no permissions document."""
+    """The grant that DDS uses for ``subject``: the first. Raises InvalidInputError for another kind of document."""
     grants = parse_permissions(document, place)
     return next((grant for grant in grants if grant.subject_name.strip() == subject), None)
 

@@ -9,7 +9,7 @@ from collections.abc import Collection
 
 from lxml import etree
 
-from keystore.errors import DamagedKeystore
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.permissions_read import check_permissions_schema
 from keystore.formats.validity import Validity
 
@@ -22,14 +22,14 @@ def redated(
     """``document`` with the grant of one of ``old_subjects`` given to ``subject`` for ``validity``.
 
     Only the first such grant stays: of several for one subject the implementations use only that one, and
-    foreign grants have no place in a document every peer gets to see. Raises InvalidInput for what is no
-    permissions document and DamagedKeystore when no grant fits.
+    foreign grants have no place in a document every peer gets to see. Raises InvalidInputError for what is no
+    permissions document and DamagedKeystoreError when no grant fits.
     """
     root = check_permissions_schema(document, place)
     grants = list(root.iter("grant"))
     mine = next((grant for grant in grants if _subject(grant) in old_subjects), None)
     if mine is None:
-        raise DamagedKeystore(f"{place} has no grant for {subject}")
+        raise DamagedKeystoreError(f"{place} has no grant for {subject}")
     for grant in grants:
         parent = grant.getparent()
         if grant is not mine and parent is not None:

@@ -54,13 +54,13 @@ class Grant:
 
 
 def parse_permissions(document: bytes, where: str = "permissions.xml") -> tuple[Grant, ...]:
-    """All grants of the document. Raises ``InvalidInput`` (with file:line) for what DDS would not read."""
+    """All grants of the document. Raises ``InvalidInputError`` (with file:line) for what DDS would not read."""
     root = check_permissions_schema(document, where)
     return tuple(_grant(element) for element in root.iter("grant"))
 
 
 def check_permissions_schema(document: bytes, where: str = "permissions.xml") -> etree._Element:
-    """Parse and compare with the bundled schema. Raises ``InvalidInput`` with file:line."""
+    """Parse and compare with the bundled schema. Raises ``InvalidInputError`` with file:line."""
     root = parse_xml(document, where)
     check_schema(root, "permissions.xsd", where, "DDS permissions document")
     return root

@@ -10,10 +10,10 @@ from collections.abc import Iterator
 from enum import Enum
 from typing import NamedTuple
 
-from keystore.errors import InvalidInput
+from keystore.errors import InvalidInputError
 
 
-class PolicyError(InvalidInput):
+class PolicyError(InvalidInputError):
     """A policy, or a name in one, that must not become permissions. The text says what and where."""
 
 

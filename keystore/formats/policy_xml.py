@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_bytes
-from keystore.errors import InvalidEnclaveName, InvalidInput, printable
+from keystore.errors import InvalidEnclaveNameError, InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.permissions_names import full_name, has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
@@ -55,7 +55,7 @@ class PolicyDocument:
 def read_policy(path: str | Path) -> PolicyDocument:
     """The policy of a file, its includes restricted to the file's own folder.
 
-    Raises ``PolicyError`` (an ``InvalidInput``) with file:line.
+    Raises ``PolicyError`` (an ``InvalidInputError``) with file:line.
     """
     file = Path(path)
     try:
@@ -100,7 +100,7 @@ class _PolicyReader:
         path = element.get("path", "")
         try:
             validate_enclave_name(path)
-        except InvalidEnclaveName as error:
+        except InvalidEnclaveNameError as error:
             raise PolicyError(f"{place.at(element)}: {error}") from None
         if path in self._enclaves:
             self._warnings.append(f"{place.at(element)}: enclave {path} is defined again; both are merged")
@@ -223,10 +223,10 @@ def policy_xml(policy: Policy) -> bytes:
     """The policy as UTF-8 text, valid against the schema, the same for the same policy.
 
     An enclave without profiles (its process may join and nothing else) gets one without rules, which
-    the schema asks for. Raises ``InvalidInput`` for a policy without enclaves.
+    the schema asks for. Raises ``InvalidInputError`` for a policy without enclaves.
     """
     if not policy.enclaves:
-        raise InvalidInput("a policy needs at least one enclave")
+        raise InvalidInputError("a policy needs at least one enclave")
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', f'<policy version="{VERSION}">', "  <enclaves>"]
     for enclave in sorted(policy.enclaves):
         lines.append(f'    <enclave path="{escape(enclave.path)}">')

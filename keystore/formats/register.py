@@ -20,7 +20,7 @@ from enum import Enum
 from functools import cached_property
 from typing import Any, NamedTuple
 
-from keystore.errors import DamagedKeystore
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import iso, parse_moment
@@ -203,11 +203,11 @@ def _certificate_row(one: IssuedCertificate) -> list[Any]:
 
 
 def parse_register(text: bytes, place: str) -> Register:
-    """Raises DamagedKeystore for anything but what ``register_json`` writes."""
+    """Raises DamagedKeystoreError for anything but what ``register_json`` writes."""
     try:
         content: Any = json.loads(text)
         if content["version"] != _VERSION:
-            raise DamagedKeystore(f"{place} was written by a newer version; update secure-keystore")
+            raise DamagedKeystoreError(f"{place} was written by a newer version; update secure-keystore")
         return Register(
             dict(_authorities(content["authorities"])),
             {one.serial: one for one in map(_certificate, content["certificates"])},
@@ -217,7 +217,7 @@ def parse_register(text: bytes, place: str) -> Register:
             bool(content["crl_published"]),
         )
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError):
-        raise DamagedKeystore(
+        raise DamagedKeystoreError(
             f"{place} is not a register that secure-keystore wrote; restore it from a backup"
         ) from None
 

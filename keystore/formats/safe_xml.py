@@ -11,7 +11,7 @@ from functools import cache
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
-from keystore.errors import InvalidInput
+from keystore.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -20,11 +20,11 @@ MAX_BYTES = 4_000_000
 
 
 def parse_xml(document: bytes, where: str, max_bytes: int = MAX_BYTES) -> etree._Element:
-    """The root element. ``where`` names the document in errors; raises ``InvalidInput`` with file:line."""
+    """The root element. ``where`` names the document in errors; raises ``InvalidInputError`` with file:line."""
     from lxml import etree
 
     if len(document) > max_bytes:
-        raise InvalidInput(f"{where}: larger than the allowed {max_bytes} bytes")
+        raise InvalidInputError(f"{where}: larger than the allowed {max_bytes} bytes")
     _refuse_doctype(b"<!DOCTYPE" in document, where)
     parser = etree.XMLParser(
         resolve_entities=False,
@@ -37,13 +37,13 @@ def parse_xml(document: bytes, where: str, max_bytes: int = MAX_BYTES) -> etree.
     try:
         root = etree.fromstring(document, parser)
     except etree.XMLSyntaxError as error:
-        raise InvalidInput(f"{where}:{error.lineno}: not well-formed XML: {error.msg}") from None
+        raise InvalidInputError(f"{where}:{error.lineno}: not well-formed XML: {error.msg}") from None
     _refuse_doctype(root.getroottree().docinfo.internalDTD is not None, where)  # other encodings
     return root
 
 
 def check_schema(root: etree._Element, schema_name: str, where: str, what: str) -> None:
-    """Compare with a bundled schema. Raises ``InvalidInput`` with file:line for the first difference."""
+    """Compare with a bundled schema. Raises ``InvalidInputError`` with file:line for the first difference."""
     from lxml import etree
 
     try:
@@ -51,12 +51,12 @@ def check_schema(root: etree._Element, schema_name: str, where: str, what: str) 
     except etree.DocumentInvalid as error:
         problem = re.match(r"(.*?)(?:, line (\d+))?$", str(error), re.DOTALL)
         message, line = problem.groups() if problem else (str(error), None)
-        raise InvalidInput(f"{where}:{line or 1}: not a valid {what}: {message}") from None
+        raise InvalidInputError(f"{where}:{line or 1}: not a valid {what}: {message}") from None
 
 
 def _refuse_doctype(present: bool, where: str) -> None:
     if present:
-        raise InvalidInput(f"{where}: a DOCTYPE is not allowed; remove it and write entities out")
+        raise InvalidInputError(f"{where}: a DOCTYPE is not allowed; remove it and write entities out")
 
 
 @cache

@@ -12,7 +12,7 @@ from functools import lru_cache
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from keystore.errors import DamagedKeystore, InvalidInput, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import TopicSets, dds_rules
 from keystore.formats.permissions_patterns import can_meet, covers
@@ -30,7 +30,7 @@ class Share(NamedTuple):
 
 
 def united(enclave: str, shares: Iterable[Share]) -> EnclavePolicy:
-    """All shares together. Raises InvalidInput where a denial of one takes away what another allows."""
+    """All shares together. Raises InvalidInputError where a denial of one takes away what another allows."""
     found = tuple(shares)
     profiles = sorted({profile for share in found for profile in share.profiles})
     together = EnclavePolicy(enclave, merged_profiles(profiles))
@@ -69,7 +69,7 @@ def _refuse_losses(enclave: str, shares: tuple[Share, ...], together: EnclavePol
             lost += [topic for topic in own for one in refused if one not in denied and can_meet(one, topic)]
             if lost:
                 others = ", ".join(printable(other.owner) for other in shares if other is not share)
-                raise InvalidInput(
+                raise InvalidInputError(
                     f"enclave {enclave} is shared by {printable(share.owner)} and {others}, and what one of them "
                     f"denies the other needs ({lost[0]}): give them enclaves of their own"
                 )
@@ -99,11 +99,11 @@ def shares_json(shares: Iterable[Share]) -> bytes:
 
 
 def parse_shares(text: bytes, place: str) -> tuple[Share, ...]:
-    """Raises DamagedKeystore for anything but what ``shares_json`` writes."""
+    """Raises DamagedKeystoreError for anything but what ``shares_json`` writes."""
     try:
         content: Any = json.loads(text)
         if content["version"] != _VERSION:
-            raise DamagedKeystore(f"{place} was written by a newer version; update secure-keystore")
+            raise DamagedKeystoreError(f"{place} was written by a newer version; update secure-keystore")
         return tuple(
             Share(
                 str(share["owner"]),
@@ -113,7 +113,7 @@ def parse_shares(text: bytes, place: str) -> tuple[Share, ...]:
             for share in content["shares"]
         )
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise DamagedKeystore(
+        raise DamagedKeystoreError(
             f"{place} does not hold the shares of an enclave; restore it from a backup, or remove it: the next start "
             "of each launch records its own again"
         ) from None

@@ -11,7 +11,7 @@ import re
 from datetime import datetime, timedelta, timezone
 from typing import NamedTuple
 
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 
 # Clocks behind ours, and Connext 5.3.1, make SROS2 back-date by a day; Fast DDS needs at least 14 h.
 DEFAULT_BACKDATE = timedelta(days=1)
@@ -33,7 +33,7 @@ class _Ends(NamedTuple):
 class Validity(_Ends):
     """Both ends in UTC, whole seconds (X.509 has no fractions), ``not_after`` capped to 2262-04-11.
 
-    Raises InvalidInput when it would end before it begins.
+    Raises InvalidInputError when it would end before it begins.
     """
 
     __slots__ = ()
@@ -41,7 +41,7 @@ class Validity(_Ends):
     def __new__(cls, not_before: datetime, not_after: datetime) -> Validity:
         begin, end = _whole("not_before", not_before), _whole("not_after", not_after)
         if end <= begin:
-            raise InvalidInput(f"a validity ends ({iso(end)}) before it begins ({iso(begin)})")
+            raise InvalidInputError(f"a validity ends ({iso(end)}) before it begins ({iso(begin)})")
         return super().__new__(cls, begin, end)
 
     @classmethod
@@ -55,15 +55,15 @@ class Validity(_Ends):
     ) -> Validity:
         """Valid from ``now`` minus ``backdate`` for ``lifetime``, or to the absolute date ``until``.
 
-        Raises InvalidInput when ``until`` is past, or ``backdate`` under 14 hours or over 10 years.
+        Raises InvalidInputError when ``until`` is past, or ``backdate`` under 14 hours or over 10 years.
         """
         if backdate < MIN_BACKDATE:
-            raise InvalidInput("back-dating under 14 h makes Fast DDS start late west of UTC; use more")
+            raise InvalidInputError("back-dating under 14 h makes Fast DDS start late west of UTC; use more")
         end = until if until is not None else later(now, lifetime)
         if end <= now:
-            raise InvalidInput(f"the validity would already have ended ({iso(end)})")
+            raise InvalidInputError(f"the validity would already have ended ({iso(end)})")
         if backdate > MAX_BACKDATE:
-            raise InvalidInput("back-dating by more than 10 years helps no clock; use less")
+            raise InvalidInputError("back-dating by more than 10 years helps no clock; use less")
         return cls(now - backdate, end)
 
     def within(self, outer: Validity) -> Validity:
@@ -89,24 +89,26 @@ def later(now: datetime, span: timedelta) -> datetime:
 
 
 def parse_duration(text: str) -> timedelta:
-    """``90d``, ``12h``, ``10y`` (a year is 365 days), ``45m``, ``30s``, ``2w``; raises InvalidInput."""
+    """``90d``, ``12h``, ``10y`` (a year is 365 days), ``45m``, ``30s``, ``2w``; raises InvalidInputError."""
     match = _DURATION.match(text.strip())
     if not match:
-        raise InvalidInput(f"{printable(text)} is not a duration; write for example 90d, 12h or 10y")
+        raise InvalidInputError(f"{printable(text)} is not a duration; write for example 90d, 12h or 10y")
     count, unit = int(match[1]), match[2]
     return timedelta(days=365 * count) if unit == "y" else timedelta(**{_UNITS[unit]: count})
 
 
 def parse_moment(text: str) -> datetime:
-    """An ISO date or date-time; without a zone it is UTC, a bare date is its first second; InvalidInput."""
+    """An ISO date or date-time; without a zone it is UTC, a bare date is its first second; InvalidInputError."""
     try:
         moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
     except ValueError:
-        raise InvalidInput(f"{printable(text)} is not an ISO date; write for example 2030-12-31") from None
+        raise InvalidInputError(
+            f"{printable(text)} is not an ISO date; write for example 2030-12-31"
+        ) from None
     try:
         return moment.astimezone(timezone.utc) if moment.tzinfo else moment.replace(tzinfo=timezone.utc)
     except OverflowError:
-        raise InvalidInput(f"{printable(text)} is a date before the year 1 or after 9999") from None
+        raise InvalidInputError(f"{printable(text)} is a date before the year 1 or after 9999") from None
 
 
 def parse_end(text: str, now: datetime) -> datetime:
@@ -115,8 +117,8 @@ def parse_end(text: str, now: datetime) -> datetime:
         return later(now, parse_duration(text))
     try:
         return parse_moment(text)
-    except InvalidInput as error:
-        raise InvalidInput(f"{error}, or a duration such as 90d") from None
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{error}, or a duration such as 90d") from None
 
 
 def utc_now() -> datetime:

@@ -14,7 +14,7 @@ from datetime import datetime, timezone
 from enum import Enum
 from typing import TYPE_CHECKING
 
-from keystore.errors import InvalidInput, SigningUnavailable
+from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.role import Role
@@ -49,10 +49,10 @@ class Authority:
 
 
 def authority_of(cert_pem: bytes, signer: Signer, place: str) -> Authority:
-    """Bind a certificate to its signer; raises SigningUnavailable when the key is another one's."""
+    """Bind a certificate to its signer; raises SigningUnavailableError when the key is another one's."""
     facts = read_certificate(cert_pem, place)
     if spki(signer.public_key()) != facts.public_key:
-        raise SigningUnavailable(f"{place} and the private key beside it do not belong together")
+        raise SigningUnavailableError(f"{place} and the private key beside it do not belong together")
     return Authority(facts, signer)
 
 
@@ -95,7 +95,7 @@ def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) ->
     """A CA certificate for the key of ``signer``: CA:TRUE, pathlen 0, key usage after the role.
 
     keyCertSign + cRLSign for identities; the permissions CA also needs digitalSignature, without which both
-    implementations refuse its documents. Raises InvalidInput for a name that is empty or over 64 bytes.
+    implementations refuse its documents. Raises InvalidInputError for a name that is empty or over 64 bytes.
     """
     from cryptography import x509
 
@@ -111,10 +111,10 @@ def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) ->
 
 
 def refuse_ca_name(name: str) -> None:
-    """Raises InvalidInput for what X.509 cannot carry, or DDS implementations read as more than one piece."""
+    """Raises InvalidInputError for what X.509 cannot carry, or DDS implementations read as more than one piece."""
     fits = name.strip() and name.isprintable() and len(name.encode()) <= 64
     if not fits or any(char in name for char in ',+"\\=/|<>;#'):
-        raise InvalidInput('a CA name has 1 to 64 bytes of UTF-8 and none of , + " \\ = / | < > ; #')
+        raise InvalidInputError('a CA name has 1 to 64 bytes of UTF-8 and none of , + " \\ = / | < > ; #')
 
 
 def _key_usage(role: Role) -> x509.KeyUsage:
@@ -218,7 +218,7 @@ def _issuer_key(ca: x509.Certificate) -> PublicKey:
 
     key = ca.public_key()
     if not isinstance(key, (ec.EllipticCurvePublicKey, rsa.RSAPublicKey)):
-        raise SigningUnavailable("the CA key is neither EC nor RSA; DDS-Security knows only these")
+        raise SigningUnavailableError("the CA key is neither EC nor RSA; DDS-Security knows only these")
     return key
 
 
@@ -254,26 +254,26 @@ def _signing_key(signer: Signer) -> PrivateKey:
 
 
 def check_can_serve(certificate_der: bytes, role: Role, now: datetime, place: str) -> None:
-    """Raises InvalidInput when DDS implementations would refuse what this CA signs."""
+    """Raises InvalidInputError when DDS implementations would refuse what this CA signs."""
     from cryptography import x509
 
     try:
         cert = x509.load_der_x509_certificate(certificate_der)
         extensions = cert.extensions
     except (ValueError, x509.UnsupportedGeneralNameType, x509.DuplicateExtension):
-        raise InvalidInput(f"{place} is no usable certificate") from None
+        raise InvalidInputError(f"{place} is no usable certificate") from None
     facts = read_certificate(pem_certificate(certificate_der), place)
     if not facts.validity.covers(now):
-        raise InvalidInput(f"{place} is not valid now")
+        raise InvalidInputError(f"{place} is not valid now")
     try:
         if not extensions.get_extension_for_class(x509.BasicConstraints).value.ca:
-            raise InvalidInput(f"{place} is not a CA certificate (basicConstraints CA:FALSE)")
+            raise InvalidInputError(f"{place} is not a CA certificate (basicConstraints CA:FALSE)")
         usage = extensions.get_extension_for_class(x509.KeyUsage).value
     except x509.ExtensionNotFound as error:
         if error.oid == x509.OID_BASIC_CONSTRAINTS:
-            raise InvalidInput(f"{place} is not a CA certificate (no basicConstraints)") from None
+            raise InvalidInputError(f"{place} is not a CA certificate (no basicConstraints)") from None
         return
     if role is Role.IDENTITY and not usage.key_cert_sign:
-        raise InvalidInput(f"{place} may not sign certificates (key usage lacks keyCertSign)")
+        raise InvalidInputError(f"{place} may not sign certificates (key usage lacks keyCertSign)")
     if role is Role.PERMISSIONS and not usage.digital_signature:
-        raise InvalidInput(f"{place} may not sign documents (key usage lacks digitalSignature)")
+        raise InvalidInputError(f"{place} may not sign documents (key usage lacks digitalSignature)")

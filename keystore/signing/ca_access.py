@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 
 _MAX_SECRET = 1023  # what OpenSSL takes for an encrypted key
 
@@ -37,7 +37,7 @@ class Secret:
         return (self.file, self.descriptor, self.variable) != (None, None, None)
 
     def value(self) -> bytes:
-        """The secret without its trailing newline, read once; raises InvalidInput."""
+        """The secret without its trailing newline, read once; raises InvalidInputError."""
         if self._read is None:
             self._read = self._fetch()
         return self._read
@@ -53,10 +53,10 @@ class Secret:
                 content = os.fsencode(os.environ[self.variable or ""])
         except (OSError, KeyError, ValueError, OverflowError) as error:
             reason = error.strerror if isinstance(error, OSError) else "not set"
-            raise InvalidInput(f"cannot read the passphrase from {self._place()}: {reason}") from None
+            raise InvalidInputError(f"cannot read the passphrase from {self._place()}: {reason}") from None
         content = content.removesuffix(b"\n").removesuffix(b"\r")
         if not content or len(content) > _MAX_SECRET:
-            raise InvalidInput(f"the passphrase in {self._place()} is empty or over {_MAX_SECRET} bytes")
+            raise InvalidInputError(f"the passphrase in {self._place()} is empty or over {_MAX_SECRET} bytes")
         return content
 
     def _place(self) -> str:

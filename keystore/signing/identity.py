@@ -47,5 +47,5 @@ def certify(
 
 
 def public_half(pem: bytes, place: str) -> PublicKey:
-    """The public key of an enclave's ``key.pem``; raises SigningUnavailable without showing any of it."""
+    """The public key of an enclave's ``key.pem``; raises SigningUnavailableError without showing any of it."""
     return FileSigner(load_private_key(pem, None, place)).public_key()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import binascii
 
-from keystore.errors import SigningUnavailable
+from keystore.errors import SigningUnavailableError
 from keystore.formats.certificate import CertificateFacts
 
 
@@ -29,5 +29,5 @@ def _key_matches_slowly(key_pem: bytes, facts: CertificateFacts) -> bool:
 
     try:
         return spki(public_half(key_pem, "the enclave's key")) == facts.public_key
-    except SigningUnavailable:
+    except SigningUnavailableError:
         return False

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
-from keystore.errors import InvalidInput, SigningUnavailable
+from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.signing.ca_access import Secret
 
 if TYPE_CHECKING:
@@ -22,20 +22,22 @@ MODULE_VARIABLE = "PKCS11_MODULE_PATH"
 
 
 def parse_uri(uri: str) -> dict[str, str]:
-    """Attributes of a ``pkcs11:`` URI, percent-decoded; raises InvalidInput without showing the URI."""
+    """Attributes of a ``pkcs11:`` URI, percent-decoded; raises InvalidInputError without showing the URI."""
     body = uri.removeprefix("pkcs11:")
     path, _, query = body.partition("?")
     attributes: dict[str, str] = {}
     for part in (*path.split(";"), *query.split("&")):
         name, found, value = part.partition("=")
         if part and (not found or name in attributes):
-            raise InvalidInput("a pkcs11: URI consists of different name=value pairs (RFC 7512)")
+            raise InvalidInputError("a pkcs11: URI consists of different name=value pairs (RFC 7512)")
         if part:
             attributes[name] = unquote(value)
     if "pin-value" in attributes:
-        raise InvalidInput("pin-value in a pkcs11: URI stores the PIN in clear; use pin-source or --pin-file")
+        raise InvalidInputError(
+            "pin-value in a pkcs11: URI stores the PIN in clear; use pin-source or --pin-file"
+        )
     if not {"object", "id"} & attributes.keys():
-        raise InvalidInput("a pkcs11: URI must name the key with object= or id=")
+        raise InvalidInputError("a pkcs11: URI must name the key with object= or id=")
     return attributes
 
 
@@ -50,21 +52,21 @@ class Pkcs11Signer:
 
     @classmethod
     def open(cls, uri: str, pin: Secret | None, environment: Mapping[str, str]) -> Pkcs11Signer:
-        """Raises SigningUnavailable when module, token, PIN or key is not there."""
+        """Raises SigningUnavailableError when module, token, PIN or key is not there."""
         attributes = parse_uri(uri)
         try:
             import pkcs11
             import pkcs11.exceptions
         except ImportError:
-            raise SigningUnavailable(
+            raise SigningUnavailableError(
                 "a key in a PKCS#11 token needs python-pkcs11: pip install 'enclave-launch[pkcs11]'"
             ) from None
         try:
             key, public = _find(pkcs11, attributes, _module(attributes, environment), _pin(attributes, pin))
         except pkcs11.exceptions.PKCS11Error as error:
-            raise SigningUnavailable(f"the PKCS#11 token refused: {type(error).__name__}") from None
+            raise SigningUnavailableError(f"the PKCS#11 token refused: {type(error).__name__}") from None
         except RuntimeError:
-            raise SigningUnavailable("the PKCS#11 module cannot be loaded; check module-path") from None
+            raise SigningUnavailableError("the PKCS#11 module cannot be loaded; check module-path") from None
         return cls(key, public)
 
     def public_key(self) -> PublicKey:
@@ -79,7 +81,9 @@ class Pkcs11Signer:
                 return bytes(self._key.sign(data, mechanism=pkcs11.Mechanism.SHA256_RSA_PKCS))
             return _sign_ecdsa(pkcs11, self._key, data)
         except pkcs11.exceptions.PKCS11Error as error:
-            raise SigningUnavailable(f"the PKCS#11 token refused to sign: {type(error).__name__}") from None
+            raise SigningUnavailableError(
+                f"the PKCS#11 token refused to sign: {type(error).__name__}"
+            ) from None
 
 
 def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
@@ -96,7 +100,9 @@ def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
 def _module(attributes: Mapping[str, str], environment: Mapping[str, str]) -> str:
     module = attributes.get("module-path") or environment.get(MODULE_VARIABLE)
     if not module:
-        raise SigningUnavailable(f"name the PKCS#11 module: module-path= in the URI or {MODULE_VARIABLE}")
+        raise SigningUnavailableError(
+            f"name the PKCS#11 module: module-path= in the URI or {MODULE_VARIABLE}"
+        )
     return module
 
 
@@ -138,7 +144,7 @@ def _serial(attributes: Mapping[str, str]) -> bytes | None:
 def _single(session: Any, kind: Any, wanted: Mapping[Any, Any], pkcs11: Any) -> Any:
     found = list(session.get_objects({pkcs11.Attribute.CLASS: kind, **wanted}))
     if len(found) != 1:
-        raise SigningUnavailable(
+        raise SigningUnavailableError(
             f"the token holds {len(found)} objects of kind {kind.name} with that object/id, one is needed"
         )
     return found[0]
@@ -158,5 +164,5 @@ def _public_key(pkcs11: Any, key: Any) -> PublicKey:
 
         loaded = load_der_public_key(encode_ec_public_key(key))
     if not isinstance(loaded, (ec.EllipticCurvePublicKey, rsa.RSAPublicKey)):
-        raise SigningUnavailable("the token's key is neither EC nor RSA")
+        raise SigningUnavailableError("the token's key is neither EC nor RSA")
     return loaded

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from keystore.errors import DamagedKeystore
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_change import grant_for, rules_text
 from keystore.formats.permissions_read import Grant
@@ -25,10 +25,12 @@ def certificate_record(enclave: str, facts: CertificateFacts, issuer: Certificat
 
 
 def permissions_record(enclave: str, common_name: str, document: bytes) -> SignedPermissions:
-    """Raises DamagedKeystore when the document grants nothing to this subject, InvalidInput when it is none."""
+    """Raises DamagedKeystoreError when no grant is for this subject, InvalidInputError for another kind of document."""
     grant = grant_for(document, subject_name(common_name), f"the permissions of {enclave}")
     if grant is None:
-        raise DamagedKeystore(f"the permissions of {enclave} have no grant for {subject_name(common_name)}")
+        raise DamagedKeystoreError(
+            f"the permissions of {enclave} have no grant for {subject_name(common_name)}"
+        )
     return SignedPermissions(
         enclave, common_name, fingerprint(document), rules_digest(grant), parse_moment(grant.not_after)
     )

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from keystore.errors import SigningUnavailable
+from keystore.errors import SigningUnavailableError
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric import ec, rsa
@@ -27,7 +27,7 @@ class Signer(Protocol):
     def public_key(self) -> PublicKey: ...
 
     def sign(self, data: bytes) -> bytes:
-        """The signature over ``data``; raises SigningUnavailable."""
+        """The signature over ``data``; raises SigningUnavailableError."""
 
 
 class FileSigner:
@@ -68,7 +68,7 @@ def _sign_rsa(key: rsa.RSAPrivateKey, data: bytes) -> bytes:
 def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> PrivateKey:
     """The EC or RSA key of a PEM file (PKCS#8 or SEC1), encrypted or not.
 
-    Raises SigningUnavailable with ``place`` and without any of the content.
+    Raises SigningUnavailableError with ``place`` and without any of the content.
     """
     from cryptography.exceptions import UnsupportedAlgorithm
     from cryptography.hazmat.primitives import serialization
@@ -76,7 +76,7 @@ def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> Priva
 
     encrypted = b"ENCRYPTED" in pem
     if encrypted and passphrase is None:
-        raise SigningUnavailable(
+        raise SigningUnavailableError(
             f"{place} is encrypted; give its passphrase with --passphrase-file, -fd or -env"
         )
     try:
@@ -87,9 +87,11 @@ def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> Priva
         wrong = (
             "cannot be decrypted; is the passphrase right?" if encrypted else "holds no usable private key"
         )
-        raise SigningUnavailable(f"{place} {wrong}") from None
+        raise SigningUnavailableError(f"{place} {wrong}") from None
     if not isinstance(key, (ec.EllipticCurvePrivateKey, rsa.RSAPrivateKey)):
-        raise SigningUnavailable(f"{place} is neither an EC nor an RSA key; DDS-Security knows only these")
+        raise SigningUnavailableError(
+            f"{place} is neither an EC nor an RSA key; DDS-Security knows only these"
+        )
     return key
 
 

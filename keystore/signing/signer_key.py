@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from cryptography.hazmat.primitives.asymmetric.utils import Prehashed
 
-from keystore.errors import SigningUnavailable
+from keystore.errors import SigningUnavailableError
 
 if TYPE_CHECKING:
     from keystore.signing.signer import Signer
@@ -31,13 +31,13 @@ class _TokenKey:
 
     def sign(self, data: Any, *parameters: Any) -> bytes:
         if not any(isinstance(getattr(part, "algorithm", part), hashes.SHA256) for part in parameters):
-            raise SigningUnavailable("a token signs with SHA-256 only")
+            raise SigningUnavailableError("a token signs with SHA-256 only")
         if any(isinstance(part, Prehashed) for part in parameters):
-            raise SigningUnavailable("a token is given data, not digests")
+            raise SigningUnavailableError("a token is given data, not digests")
         return self._signer.sign(bytes(data))
 
     def _refuse(self, *_arguments: Any, **_named: Any) -> NoReturn:
-        raise SigningUnavailable("a key in a token can sign, nothing else")
+        raise SigningUnavailableError("a key in a token can sign, nothing else")
 
     exchange = decrypt = private_numbers = private_bytes = _refuse
 

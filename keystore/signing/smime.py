@@ -17,7 +17,7 @@ import binascii
 from datetime import datetime
 from typing import TYPE_CHECKING, NamedTuple
 
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats import der
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ _CONSTRUCTED_0 = 0xA0
 def sign(document: bytes, certificate: CertificateFacts, signer: Signer, now: datetime) -> bytes:
     """The ``.p7s`` file of ``document``, signed by ``certificate``'s key.
 
-    Raises InvalidInput when the document holds a bare CR or a NUL, which verifiers read differently.
+    Raises InvalidInputError when the document holds a bare CR or a NUL, which verifiers read differently.
     """
     content = _TEXT_HEADER + _with_crlf(document)
     pkcs7 = _signed_data(content, certificate, signer, now)
@@ -50,7 +50,7 @@ def sign(document: bytes, certificate: CertificateFacts, signer: Signer, now: da
 def _with_crlf(document: bytes) -> bytes:
     lines = document.replace(b"\r\n", b"\n")
     if b"\r" in lines or b"\0" in lines:
-        raise InvalidInput("a document to be signed must not contain a bare carriage return or a NUL")
+        raise InvalidInputError("a document to be signed must not contain a bare carriage return or a NUL")
     return lines.replace(b"\n", b"\r\n")
 
 
@@ -138,7 +138,7 @@ class SignedDocument(NamedTuple):
 
 
 def read(p7s: bytes, place: str) -> SignedDocument:
-    """Take a multipart/signed file apart; raises DamagedKeystore naming ``place``.
+    """Take a multipart/signed file apart; raises DamagedKeystoreError naming ``place``.
 
     The outer header may carry any boundary (ours, ``cryptography``'s, ``openssl smime``'s).
     """
@@ -147,14 +147,14 @@ def read(p7s: bytes, place: str) -> SignedDocument:
     boundary = _boundary(header) if b"multipart/signed" in header else b""
     parts = lines.split(b"\n--" + boundary) if boundary else []
     if len(parts) < 3 or not parts[1].startswith(b"\n"):
-        raise DamagedKeystore(f"{place} is not a detached S/MIME message (multipart/signed)")
+        raise DamagedKeystoreError(f"{place} is not a detached S/MIME message (multipart/signed)")
     head, _, encoded = parts[2].partition(b"\n\n")
     if b"pkcs7-signature" not in head:  # where OpenSSL looks
-        raise DamagedKeystore(f"{place} carries no PKCS#7 signature")
+        raise DamagedKeystoreError(f"{place} carries no PKCS#7 signature")
     try:
         pkcs7 = der.from_base64(encoded)
     except der.DerError:
-        raise DamagedKeystore(f"{place}: its signature is not base64") from None
+        raise DamagedKeystoreError(f"{place}: its signature is not base64") from None
     return SignedDocument(parts[1][1:], pkcs7)
 
 
@@ -166,22 +166,26 @@ def _boundary(header: bytes) -> bytes:
 
 
 def check(signed: SignedDocument, authorities: list[CertificateFacts], place: str) -> CertificateFacts:
-    """The authority whose key signed ``signed``; raises DamagedKeystore saying what is wrong.
+    """The authority whose key signed ``signed``; raises DamagedKeystoreError saying what is wrong.
 
     Strict as the fixed releases are (Cyclone DDS 11, Fast DDS 2.6.5): the signer must *be* one of
     ``authorities``. Certificates carried in the message are not trusted, and no chain is built.
     """
     if not signed.text.startswith(_LF_HEADER):
-        raise DamagedKeystore(f"{place}: the signed part is not text/plain, DDS implementations refuse it")
+        raise DamagedKeystoreError(
+            f"{place}: the signed part is not text/plain, DDS implementations refuse it"
+        )
     try:
         info = _signer_info(signed.pkcs7)
     except (der.DerError, IndexError, ValueError):
-        raise DamagedKeystore(f"{place}: its signature is not PKCS#7 SignedData with one signer") from None
+        raise DamagedKeystoreError(
+            f"{place}: its signature is not PKCS#7 SignedData with one signer"
+        ) from None
     for authority in authorities:
         if info.issuer == authority.issuer and info.serial == authority.serial:
             _check_signature(info, signed, authority, place)
             return authority
-    raise DamagedKeystore(f"{place}: signed by someone who is not the permissions CA of this keystore")
+    raise DamagedKeystoreError(f"{place}: signed by someone who is not the permissions CA of this keystore")
 
 
 class _SignerInfo(NamedTuple):
@@ -220,6 +224,6 @@ def _check_signature(
     from keystore.signing.public_key import signature_is_valid
 
     if info.digest != _sha256(signed.content):
-        raise DamagedKeystore(f"{place}: its content was changed after signing")
+        raise DamagedKeystoreError(f"{place}: its content was changed after signing")
     if not signature_is_valid(authority.public_key, info.signature, info.attributes):
-        raise DamagedKeystore(f"{place}: its signature is not by the permissions CA of this keystore")
+        raise DamagedKeystoreError(f"{place}: its signature is not by the permissions CA of this keystore")

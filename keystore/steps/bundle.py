@@ -21,7 +21,7 @@ from pathlib import Path
 from keystore.disk import layout, safe_files, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput, StorageError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
 from keystore.formats.validity import utc_now
 from keystore.verification import Finding, Severity, verify
 
@@ -57,7 +57,7 @@ def export(
     """Write the bundle of all enclaves that match one of ``patterns`` (``/robot1/*``); returns their names.
 
     ``output`` ending in ``.tar`` or ``.tar.gz`` becomes an archive with the same bytes for the same keystore,
-    otherwise a new directory. Raises InvalidInput when nothing matches or ``output`` exists, DamagedKeystore
+    otherwise a new directory. Raises InvalidInputError when nothing matches or ``output`` exists, DamagedKeystoreError
     for whatever ``verify`` calls an error of these enclaves or of the keystore, and for exposures unless they are
     accepted.
     """
@@ -68,9 +68,9 @@ def export(
     files = list(_files(view, names, public))
     target = Path(output)
     if target.exists() or target.is_symlink():
-        raise InvalidInput(f"{printable(target)} exists already; choose a new name or remove it")
+        raise InvalidInputError(f"{printable(target)} exists already; choose a new name or remove it")
     if Path(os.path.realpath(target)).is_relative_to(view.root):
-        raise InvalidInput(f"{printable(target)} lies in the keystore; choose another place")
+        raise InvalidInputError(f"{printable(target)} lies in the keystore; choose another place")
     try:
         _write(target, files)
     except OSError as error:
@@ -81,7 +81,9 @@ def export(
 def _matching(names: list[str], patterns: list[str]) -> list[str]:
     for pattern in patterns:
         if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
-            raise InvalidInput(f"no enclave matches {printable(pattern)}; secure-keystore list shows all")
+            raise InvalidInputError(
+                f"no enclave matches {printable(pattern)}; secure-keystore list shows all"
+            )
     return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
@@ -91,7 +93,7 @@ def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_ex
         directory = layout.enclave_directory(name)
         for file in layout.RUNTIME_FILES:
             if safe_files.read_if_there(view.root, f"{directory}/{file}") is None:
-                raise DamagedKeystore(
+                raise DamagedKeystoreError(
                     f"enclave {name} is incomplete ({file}); secure-keystore renew completes it"
                 )
     owners = {layout.enclave_directory(name): f"enclave {name}" for name in names}
@@ -112,13 +114,13 @@ def _concerned(place: str, owners: Mapping[str, str]) -> str | None:
 
 
 def _refuse(what: str, finding: Finding, accept_exposures: bool) -> None:
-    """Raises DamagedKeystore."""
+    """Raises DamagedKeystoreError."""
     found = f"{finding.place}: {finding.message} [{finding.code}]; repair: {finding.repair}"
     # Fast DDS alone cannot carry large permissions: the user's choice of DDS.
     if finding.severity is Severity.ERROR and finding.code != "too-large":
-        raise DamagedKeystore(f"{what} is not fit for a host: {found}")
+        raise DamagedKeystoreError(f"{what} is not fit for a host: {found}")
     if finding.severity is Severity.EXPOSURE and not accept_exposures:
-        raise DamagedKeystore(f"{what} is exposed: {found}; or export with --accept-exposures")
+        raise DamagedKeystoreError(f"{what} is exposed: {found}; or export with --accept-exposures")
 
 
 def _files(view: KeystoreView, names: list[str], public: PublicFiles) -> Iterator[ExportedFile]:

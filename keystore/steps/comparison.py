@@ -18,7 +18,7 @@ from keystore.disk.governance_file import governance_domains, governance_stands
 from keystore.disk.register_file import needs_register, read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
-from keystore.errors import NotAKeystore, printable
+from keystore.errors import NotAKeystoreError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document
 from keystore.formats.policy import EnclavePolicy
@@ -48,7 +48,7 @@ def compare(
 ) -> ProvisionReport | None:
     """The report of a run in which nothing is to be done; None when something is.
 
-    Raises NotAKeystore when the keystore is not complete and must not, or cannot, be made.
+    Raises NotAKeystoreError when the keystore is not complete and must not, or cannot, be made.
     """
     view = KeystoreView(root)
     if not view.is_complete:
@@ -75,12 +75,12 @@ def compare(
 
 def _refuse_unless_it_can_be_made(view: KeystoreView, options: ProvisionOptions) -> None:
     if not options.create:
-        raise NotAKeystore(
+        raise NotAKeystoreError(
             f"{printable(view.root)} is not a complete keystore, and creating it was forbidden; "
             "make it with: secure-keystore create"
         )
     if not view.can_be_completed:
-        raise NotAKeystore(
+        raise NotAKeystoreError(
             f"{printable(view.root)} exists and is not a keystore; choose an empty or new directory"
         )
 

@@ -22,7 +22,7 @@ from keystore.disk.settings import Settings
 from keystore.disk.store import Content, Store
 from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput, NotAKeystore, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, NotAKeystoreError, printable
 from keystore.formats.certificate import read_certificate
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
@@ -82,7 +82,7 @@ class CreateReport:
 def create_keystore(keystore: Path | str, options: CreateOptions | None = None) -> CreateReport:
     """Create the keystore or complete it; a complete one is left as it is.
 
-    Raises NotAKeystore for a directory with other things in it, InvalidInput for a CA that cannot serve.
+    Raises NotAKeystoreError for a directory with other things in it, InvalidInputError for a CA that cannot serve.
     """
     chosen = options or CreateOptions()
     root = resolve_root(keystore)
@@ -95,7 +95,7 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
 
 
 def refuse_unusable(options: CreateOptions) -> None:
-    """Before anything is written: options that no keystore can be made with. Raises InvalidInput."""
+    """Before anything is written: options that no keystore can be made with. Raises InvalidInputError."""
     now = options.now or utc_now()
     for lifetime in (options.ca_lifetime, options.lifetime):
         Validity.starting(now, lifetime, backdate=options.backdate)
@@ -111,7 +111,7 @@ def refuse_unusable(options: CreateOptions) -> None:
 def _refuse_foreign(root: Path) -> None:
     view = KeystoreView(root)
     if not view.is_complete and not view.can_be_completed:
-        raise NotAKeystore(
+        raise NotAKeystoreError(
             f"{printable(root)} exists and is not a keystore; choose an empty or new directory"
         )
 
@@ -180,7 +180,7 @@ def _record_present_ca(opened: Store, view: KeystoreView, role: Role) -> None:
 def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
     """A bundle of stand-alone enclaves, or a lost CA: another CA would replace what these enclaves trust."""
     if view.key_file(role) is None and os.path.isdir(view.root / layout.ENCLAVES) and view.enclaves():
-        raise DamagedKeystore(
+        raise DamagedKeystoreError(
             f"{printable(view.root)} holds enclaves, but not the {role.value.replace('_ca', ' CA')} they belong to: "
             "a deployed copy, or a keystore to restore from a backup"
         )
@@ -195,7 +195,7 @@ def authority_kind(made: Authority) -> str:
 def _refuse_other_ca(opened: Store, role: Role, imported: ImportedCa) -> None:
     given = read_certificate(_read_given(imported.certificate), printable(imported.certificate))
     if given.der != KeystoreView(opened.root).ca(role).der:
-        raise InvalidInput(
+        raise InvalidInputError(
             f"the keystore has another {role.value} already; a CA is replaced with: "
             "secure-keystore renew KEYSTORE --ca start"
         )
@@ -224,7 +224,7 @@ def _make_ca(
 
 def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
     if encrypt and access.passphrase is None:
-        raise InvalidInput("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
+        raise InvalidInputError("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
     return access.passphrase if encrypt else None
 
 
@@ -247,7 +247,7 @@ def _read_given(path: Path) -> bytes:
     try:
         return read_bytes(path)
     except OSError as error:
-        raise InvalidInput(f"cannot read {printable(path)}: {error.strerror}") from None
+        raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
 
 
 def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: bytes) -> None:
@@ -287,7 +287,7 @@ def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
     pem = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY}")
     uri = safe_files.read_if_there(opened.root, f"{waiting}/key.p11")
     if pem is None and uri is None:
-        raise DamagedKeystore(
+        raise DamagedKeystoreError(
             f"{printable(opened.root / waiting)} holds a certificate without key; remove it"
         )
     name, stale = layout.ca_key(role), layout.ca_key_uri(role)
@@ -315,7 +315,7 @@ def _complete_governance(opened: Store, options: CreateOptions, actions: list[st
 def _unsigned_default(root: Path) -> bytes | None:
     """What an interrupted run left beside a missing ``governance.p7s``, unless it is more lax than the default.
 
-    Raises DamagedKeystore for any other document: nobody signed it, so somebody must look at it first.
+    Raises DamagedKeystoreError for any other document: nobody signed it, so somebody must look at it first.
     """
     present = safe_files.read_if_there(root, layout.GOVERNANCE_XML)
     if present is None:
@@ -325,9 +325,9 @@ def _unsigned_default(root: Path) -> bytes | None:
         found = parse_governance(present, printable(place))
         if found == Governance.for_domains(found.domains()):
             return present
-    except InvalidInput:
+    except InvalidInputError:
         pass
-    raise DamagedKeystore(
+    raise DamagedKeystoreError(
         f"{printable(place)} is not the default governance, and its signature governance.p7s is missing; look at "
         f"it and remove it: rm {shlex.quote(str(place))}"
     )
@@ -361,7 +361,7 @@ def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: dat
     """Sign the governance again if it is not the one signed last, or its domains or signer no longer fit; whether
     that was needed.
 
-    Raises InvalidInput when it has several rules and none for a domain: then a person must decide.
+    Raises InvalidInputError when it has several rules and none for a domain: then a person must decide.
     """
     view = KeystoreView(opened.root)
     if governance_stands(view, domains, opened.register):

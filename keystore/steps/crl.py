@@ -14,7 +14,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.store import Link, Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.register import IssuedCertificate, Register
 from keystore.formats.role import Role
 from keystore.formats.validity import later
@@ -40,7 +40,7 @@ def can_revoke(view: KeystoreView) -> bool:
 
 def refuse_without_crl_sign(view: KeystoreView) -> None:
     if not can_revoke(view):
-        raise InvalidInput(
+        raise InvalidInputError(
             "the identity CA may not sign CRLs (key usage lacks cRLSign), participants would refuse one; "
             "replace the CA (renew --ca start), or only delete with --no-revoke"
         )
@@ -60,7 +60,7 @@ def revocable(view: KeystoreView, register: Register, enclaves: Iterable[str]) -
 def publish_crl(opened: Store, access: CaAccess, now: datetime) -> None:
     """Write ``public/crl.pem`` as the register has it and give it to every enclave.
 
-    Raises InvalidInput when the CA may not sign CRLs, SigningUnavailable without its key.
+    Raises InvalidInputError when the CA may not sign CRLs, SigningUnavailableError without its key.
     """
     view = KeystoreView(opened.root)
     refuse_without_crl_sign(view)
@@ -94,12 +94,12 @@ def restore_crl(
 ) -> list[str]:
     """Publish the CRL anew when it is not the one to use, or ends within ``within``; what was done, in words.
 
-    Raises DamagedKeystore for a CRL that this keystore did not publish: it may be all that says who was revoked.
+    Raises DamagedKeystoreError for a CRL that this keystore did not publish: it may be all that says who was revoked.
     """
     view = KeystoreView(opened.root)
     problem = crl_problem(view, opened.register if opened.has_register else None, now)
     if problem is not None and opened.has_register and not opened.register.crl_published:
-        raise DamagedKeystore(
+        raise DamagedKeystoreError(
             f"{layout.CRL} was not published by this keystore; look at it, remove it, and revoke with "
             "secure-keystore remove or renew --revoke-old"
         )

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, UnsafeKeystore, printable
+from keystore.errors import DamagedKeystoreError, UnsafeKeystoreError, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
@@ -79,7 +79,7 @@ def inspect(
     """``due``: certificates that end before it count as stale (``now`` for: only the expired). ``register`` is None
     on a host that issues nothing.
 
-    Raises UnsafeKeystore for links, owners and modes that let others in.
+    Raises UnsafeKeystoreError for links, owners and modes that let others in.
     """
     directory = layout.enclave_directory(enclave)
     wanted_links = layout.enclave_links(enclave, crl=view.has_crl)
@@ -105,13 +105,13 @@ def inspect(
 
 
 def _is_there(view: KeystoreView, directory: str) -> bool:
-    """Whether the enclave's directory exists; raises UnsafeKeystore when it or one above is a link."""
+    """Whether the enclave's directory exists; raises UnsafeKeystoreError when it or one above is a link."""
     path = f"{view.root}/{layout.ENCLAVES}"
     for part in directory.split("/")[1:]:
         path = f"{path}/{part}"
         try:
             if stat.S_ISLNK(os.lstat(path).st_mode):
-                raise UnsafeKeystore(
+                raise UnsafeKeystoreError(
                     f"{printable(path)} is a link; an enclave must be a real directory. "
                     f"Remove it: rm {shlex.quote(path)}"
                 )
@@ -165,9 +165,9 @@ def _key_mode(view: KeystoreView, directory: str) -> int:
     except (FileNotFoundError, NotADirectoryError):
         return 0
     if not stat.S_ISREG(info.st_mode):
-        raise UnsafeKeystore(f"{printable(path)} is not a regular file; remove it")
+        raise UnsafeKeystoreError(f"{printable(path)} is not a regular file; remove it")
     if problem := safe_files.private_problem(path, info):
-        raise UnsafeKeystore(problem)
+        raise UnsafeKeystoreError(problem)
     return stat.S_IMODE(info.st_mode)
 
 
@@ -219,14 +219,14 @@ def _record_problem(register: Register | None, enclave: str, serial: int) -> str
 def _key_is_ours(register: Register, enclave: str, key_pem: bytes) -> bool:
     """Whether a certificate of this enclave was issued for the key and is not revoked: only such a key is certified
     again."""
-    from keystore.errors import SigningUnavailable
+    from keystore.errors import SigningUnavailableError
     from keystore.signing.authority import spki
     from keystore.signing.identity import public_half
     from keystore.signing.public_key import fingerprint
 
     try:
         present = fingerprint(spki(public_half(key_pem, "the enclave's key")))
-    except SigningUnavailable:
+    except SigningUnavailableError:
         return False
     records = [one for one in register.of_enclave(enclave) if one.key == present]
     return bool(records) and all(one.revoked is None for one in records)
@@ -242,7 +242,7 @@ def _permissions_stand(
         return False
     try:
         present = smime.read(signed, f"{directory}/{layout.PERMISSIONS}")
-    except DamagedKeystore:
+    except DamagedKeystoreError:
         reasons.append("the signed permissions cannot be read")
         return False
     if not present.embeds(view.ca(Role.PERMISSIONS).der):

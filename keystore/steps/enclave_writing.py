@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.register import IssuedCertificate, Register, SignedPermissions
@@ -78,7 +78,7 @@ class EnclaveWriter:
         cas = [self._view.ca(role).validity for role in Role]
         if not all(ca.covers(self._now) for ca in cas):
             root = shlex.quote(str(self._view.root))
-            raise DamagedKeystore(
+            raise DamagedKeystoreError(
                 "a CA of this keystore is expired, or not yet valid (is the clock right?); to replace it: "
                 f"secure-keystore renew {root} --ca start"
             )
@@ -100,7 +100,7 @@ class EnclaveWriter:
         names |= {enclave: common_name(enclave, self._scheme) for enclave in fresh}
         pairs = [pair for pair in borrowable(names) if fresh & set(pair)]
         if pairs:
-            raise InvalidInput(
+            raise InvalidInputError(
                 f"with compatible subjects, on Cyclone DDS {cannot_be_told_apart(pairs)}; use exact "
                 "subjects, rename the enclaves, or accept it with --allow-subject-overlap"
             )

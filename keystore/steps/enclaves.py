@@ -73,7 +73,7 @@ def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
 
 
 def list_enclaves(keystore: Path | str) -> list[str]:
-    """Names of all enclaves, sorted; the root is ``/``. Raises NotAKeystore."""
+    """Names of all enclaves, sorted; the root is ``/``. Raises NotAKeystoreError."""
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     return view.enclaves()
@@ -84,7 +84,7 @@ def drop_shares(
 ) -> ProvisionReport:
     """Take the shares of a launch out of every enclave; what no other launch asks for is taken away for good.
 
-    Raises InvalidInput when it has none, or while a launch runs on one of these enclaves.
+    Raises InvalidInputError when it has none, or while a launch runs on one of these enclaves.
     """
     root = resolve_root(keystore)
     KeystoreView(root).require_complete()

@@ -12,7 +12,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats import certificate, der
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
@@ -58,7 +58,7 @@ class StatusReport(NamedTuple):
 
 
 def status(keystore: Path | str, *, now: datetime | None = None) -> StatusReport:
-    """Raises NotAKeystore, DamagedKeystore for what cannot be read."""
+    """Raises NotAKeystoreError, DamagedKeystoreError for what cannot be read."""
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     names = view.enclaves()
@@ -112,7 +112,7 @@ def _enclave_expiries(view: KeystoreView, name: str) -> Iterator[Expiry]:
         try:
             yield _expiry("certificate", name, certificate.read_pem(cert).validity)
         except der.DerError as error:
-            raise DamagedKeystore(f"{directory}/{layout.CERT}: {error}") from None
+            raise DamagedKeystoreError(f"{directory}/{layout.CERT}: {error}") from None
     signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
     if signed is not None:
         yield _expiry("permissions", name, _permissions_validity(signed, f"{directory}/{layout.PERMISSIONS}"))
@@ -127,5 +127,5 @@ def _permissions_validity(signed: bytes, place: str) -> Validity:
     found = dict(reversed(re.findall(_DATE, smime.read(signed, place).document)))
     try:
         return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))
-    except (KeyError, UnicodeDecodeError, InvalidInput):
-        raise DamagedKeystore(f"{place} states no validity") from None
+    except (KeyError, UnicodeDecodeError, InvalidInputError):
+        raise DamagedKeystoreError(f"{place} states no validity") from None

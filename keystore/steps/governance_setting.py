@@ -10,7 +10,7 @@ from keystore.disk.copies import refresh_copies
 from keystore.disk.governance_file import governance_stands, signed_governance
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.governance import Governance, governance_document
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
@@ -51,7 +51,7 @@ def _stands(view: KeystoreView, document: bytes) -> bool:
     """Whether exactly ``document`` is in force; what cannot be read is not."""
     try:
         signed = signed_governance(view)
-    except DamagedKeystore:
+    except DamagedKeystoreError:
         return False
     twin = safe_files.read_if_there(view.root, layout.GOVERNANCE_XML)
     return signed.document == document == twin and governance_stands(view, None)

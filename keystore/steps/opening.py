@@ -42,7 +42,7 @@ def take_over(opened: Store, now: datetime) -> None:
     """Record what can be known of a keystore without a register: of what stands in it all that its CAs really
     signed, and what an earlier version remembered of certificates that were replaced.
 
-    Raises DamagedKeystore for a CRL that cannot be trusted: nobody knows then who was revoked.
+    Raises DamagedKeystoreError for a CRL that cannot be trusted: nobody knows then who was revoked.
     """
     view = KeystoreView(opened.root)
     register = _authorities(view)

@@ -10,7 +10,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.governance_file import governance_domains
 from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, KeystoreError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats.permissions import permissions_document
 from keystore.formats.permissions_change import taken_away
 from keystore.formats.permissions_dates import redated
@@ -54,7 +54,7 @@ def kept_permissions(
 ) -> bytes:
     """What the enclave was granted before, under its new subject and dates; without a past, nothing.
 
-    Raises DamagedKeystore for a document that is not the one signed last for this enclave.
+    Raises DamagedKeystoreError for a document that is not the one signed last for this enclave.
     """
     place = _place(enclave)
     if safe_files.read_if_there(view.root, place) is None:
@@ -64,11 +64,13 @@ def kept_permissions(
         mine = _grant(document, enclave)
         last = register.permissions(enclave)
         if last is not None and (mine is None or rules_digest(mine) != last.rules):
-            raise DamagedKeystore(f"{printable(view.root / place)} is not what was signed last for {enclave}")
+            raise DamagedKeystoreError(
+                f"{printable(view.root / place)} is not what was signed last for {enclave}"
+            )
         names = {mine.subject_name.strip()} if mine is not None else set()
         return redated(document, names, subject, validity, printable(place))
     except KeystoreError as error:
-        raise DamagedKeystore(
+        raise DamagedKeystoreError(
             f"{error}. What it may do is not known then: give it with secure-keystore apply-policy"
         ) from None
 

@@ -15,7 +15,7 @@ from keystore.disk import layout, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.validity import utc_now
@@ -66,7 +66,9 @@ def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:
     names = [validate_enclave_name(policy.path) for policy in policies]
     if len(set(names)) != len(names):
         twice = next(name for name in names if names.count(name) > 1)
-        raise InvalidInput(f"enclave {printable(twice)} is given twice; merge its profiles into one policy")
+        raise InvalidInputError(
+            f"enclave {printable(twice)} is given twice; merge its profiles into one policy"
+        )
     return policies
 
 

@@ -21,7 +21,7 @@ from keystore.disk import layout, lock
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
@@ -62,8 +62,8 @@ def remove(
     """Revoke what they have and had, publish the CRL to all remaining enclaves, then delete. Repeating completes an
     interrupted run.
 
-    Enclaves below a removed one stay. One whose files are lost is revoked as the register knows it. Raises InvalidInput
-    for an enclave that was never there.
+    Enclaves below a removed one stay. One whose files are lost is revoked as the register knows it.
+    Raises InvalidInputError for an enclave that was never there.
     """
     chosen = options or RemoveOptions()
     now = chosen.now or utc_now()
@@ -75,7 +75,7 @@ def remove(
         lost = {one.enclave for one in revocable(view, opened.register, wanted)}
         unknown = sorted(set(wanted) - set(view.enclaves()) - lost)
         if unknown:
-            raise InvalidInput(
+            raise InvalidInputError(
                 f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
             )
         warnings = _strike(opened, wanted, chosen, now)

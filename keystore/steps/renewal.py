@@ -22,7 +22,7 @@ from keystore.disk.copies import refresh_copies
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
@@ -65,7 +65,7 @@ def renew(
 ) -> ProvisionReport:
     """Renew these enclaves; without a list all that is due or exposed. Repeating does nothing more.
 
-    Raises InvalidInput for an enclave that is not there, SigningUnavailable without the CA keys.
+    Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA keys.
     """
     chosen = options or RenewOptions()
     root = resolve_root(keystore)
@@ -99,7 +99,7 @@ def _opened(root: Path, options: ProvisionOptions, now: datetime) -> AbstractCon
 def _refuse_unknown(root: Path, named: list[str] | None) -> None:
     unknown = sorted(set(named or ()) - set(KeystoreView(root).enclaves()))
     if unknown:
-        raise InvalidInput(
+        raise InvalidInputError(
             f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
         )
 

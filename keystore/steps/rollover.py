@@ -28,7 +28,7 @@ from keystore.disk.governance_file import governance_stands
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Content, Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate, read_pem
 from keystore.formats.der import DerError
 from keystore.formats.register import AuthorityState
@@ -62,7 +62,7 @@ def roll_over(
 ) -> ProvisionReport:
     """One step of replacing CAs; repeating an interrupted step completes it.
 
-    ``options.creation`` gives curve, lifetime and names of the new CAs. Raises InvalidInput for a step out of
+    ``options.creation`` gives curve, lifetime and names of the new CAs. Raises InvalidInputError for a step out of
     order.
     """
     chosen = (options or ProvisionOptions())._replace(create=False)
@@ -87,7 +87,9 @@ def roll_over(
 def _start(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
     view = KeystoreView(opened.root)
     if view.shares_one_ca:
-        raise InvalidInput("one CA for identities and permissions: first run secure-keystore renew KEYSTORE")
+        raise InvalidInputError(
+            "one CA for identities and permissions: first run secure-keystore renew KEYSTORE"
+        )
     if not opened.is_directory(_waiting(role)):
         _make_next(opened, role, options, now, encrypt)
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
@@ -131,7 +133,7 @@ def _switch(opened: Store, role: Role, options: ProvisionOptions, now: datetime,
     if not opened.is_directory(_waiting(role)):
         if len(KeystoreView(opened.root).ca_bundle(role)) > 1 or _retired(opened, role):
             return ""  # switched already
-        raise InvalidInput(f"there is no new {_title(role)} yet: first --ca start, and deploy")
+        raise InvalidInputError(f"there is no new {_title(role)} yet: first --ca start, and deploy")
     view = KeystoreView(opened.root)
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
     key = safe_files.read_private(opened.root, f"{_waiting(role)}/{layout.KEY}")
@@ -178,14 +180,14 @@ def _forget_next(opened: Store, role: Role) -> None:
 
 def _finish(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
     if opened.is_directory(_waiting(role)):
-        raise InvalidInput(
+        raise InvalidInputError(
             f"everything is still signed by the old {_title(role)}: first --ca switch, and deploy"
         )
     return _trust(opened, role, pem_certificate(KeystoreView(opened.root).ca(role).der))
 
 
 def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
-    """Raises InvalidInput while anything in force hangs on an old CA: nobody would trust it any more."""
+    """Raises InvalidInputError while anything in force hangs on an old CA: nobody would trust it any more."""
     view = KeystoreView(opened.root)
     stranded = sorted({name for name in view.enclaves() if _hangs_on_old_ca(view, name, roles)})
     governance = Role.PERMISSIONS in roles and not governance_stands(view, None)
@@ -197,7 +199,7 @@ def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
         what.append(f"{len(stranded)} of {len(view.enclaves())} enclaves ({some})")
     if governance:
         what.append("the governance")
-    raise InvalidInput(
+    raise InvalidInputError(
         f"{' and '.join(what)} still belong to the old CA and would be trusted no more; complete the switch first: "
         "secure-keystore renew KEYSTORE --ca switch, then deploy"
     )
@@ -208,7 +210,7 @@ def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) 
     directory = layout.enclave_directory(enclave)
     pem = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
     signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
-    with suppress(DerError, DamagedKeystore):
+    with suppress(DerError, DamagedKeystoreError):
         if Role.IDENTITY in roles and pem and not read_pem(pem).names_issuer(view.ca(Role.IDENTITY)):
             return True
         if Role.PERMISSIONS in roles and signed:

@@ -19,7 +19,7 @@ from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import LaunchHold, enclaves_with_shares, is_running, read_shares
 from keystore.disk.store import PRIVATE_MODE, Batch, Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput, printable
+from keystore.errors import InvalidInputError, printable
 from keystore.formats.permissions import permissions_document
 from keystore.formats.permissions_names import full_name
 from keystore.formats.policy import EnclavePolicy, Profile, Qualifier
@@ -49,7 +49,7 @@ class EnclaveShare:
     hold: LaunchHold | None = None
 
     def document(self, subject: str, validity: Validity) -> bytes:
-        """The permissions of all shares together. Raises InvalidInput where they cannot be united."""
+        """The permissions of all shares together. Raises InvalidInputError where they cannot be united."""
         domains = united_domains(self.shares) if self.shares else governance_domains(KeystoreView(self.root))
         policy = united(self.enclave, self.shares)
         return permissions_document(subject, policy, validity=validity, domains=domains, rmw=self.rmw)
@@ -152,7 +152,7 @@ class LaunchShares(NamedTuple):
 
 
 def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
-    """Every launch with shares, by owner. Raises NotAKeystore."""
+    """Every launch with shares, by owner. Raises NotAKeystoreError."""
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     found: dict[str, list[str]] = {}
@@ -166,14 +166,14 @@ def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
 
 
 def given_up(root: Path, owner: str) -> list[EnclaveShare]:
-    """The shares of ``owner``, to be dropped. Raises InvalidInput when it has none, or while somebody runs on them."""
+    """The shares of ``owner``, to be dropped. Raises InvalidInputError when it has none, or while somebody uses them."""
     mine = [
         EnclaveShare(root, enclave, owner, None)
         for enclave in enclaves_with_shares(root)
         if any(share.owner == owner for share in read_shares(root, enclave))
     ]
     if not mine:
-        raise InvalidInput(
+        raise InvalidInputError(
             f"no launch {printable(owner)} has a share in {printable(root)}; secure-keystore shares lists all"
         )
     refuse_running(root, (one.enclave for one in mine))
@@ -181,10 +181,10 @@ def given_up(root: Path, owner: str) -> list[EnclaveShare]:
 
 
 def refuse_running(root: Path, enclaves: Iterable[str]) -> None:
-    """Raises InvalidInput when a running launch has a share of one of them: it would lose what it is using."""
+    """Raises InvalidInputError when a running launch has a share of one of them: it would lose what it is using."""
     for enclave in enclaves:
         for share in read_shares(root, enclave):
             if is_running(root, share.owner):
-                raise InvalidInput(
+                raise InvalidInputError(
                     f"{printable(share.owner)} is running and uses enclave {enclave}; stop it first"
                 )

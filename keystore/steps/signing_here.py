@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import KeystoreError, SigningUnavailable, printable
+from keystore.errors import KeystoreError, SigningUnavailableError, printable
 from keystore.formats.permissions_change import grant_for, taken_away
 from keystore.formats.role import Role
 from keystore.formats.subject import subject_name
@@ -23,7 +23,7 @@ _SHOWN = 10
 def refuse_without_keys(
     view: KeystoreView, states: list[EnclaveState], wanted: Mapping[str, WantedEnclave]
 ) -> None:
-    """Raises SigningUnavailable with every enclave that differs, and how, when the key that would be needed is not
+    """Raises SigningUnavailableError with every enclave that differs, and how, when the key that would be needed is not
     here."""
     if view.key_file(Role.PERMISSIONS) is not None and view.key_file(Role.IDENTITY) is not None:
         return
@@ -37,7 +37,7 @@ def refuse_without_keys(
         return
     more = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
     listed = "".join(f"\n  {line}" for line in lines[:_SHOWN]) + more
-    raise SigningUnavailable(
+    raise SigningUnavailableError(
         f"{printable(view.root)} has no CA keys, so nothing can be signed here, but these enclaves differ from what "
         f"is asked for:{listed}\nBring them up to date where the CA keys are (start or apply-policy there), "
         "then export again"

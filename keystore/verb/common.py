@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.terminal import json_text, raw
-from keystore.errors import InvalidInput
+from keystore.errors import InvalidInputError
 from keystore.formats.validity import parse_duration, parse_end, utc_now
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def add_domains(parser: argparse.ArgumentParser) -> None:
 
 
 def domains(arguments: argparse.Namespace) -> Domains | None:
-    """What ``add_domains`` was given. Raises InvalidInput."""
+    """What ``add_domains`` was given. Raises InvalidInputError."""
     from keystore.formats.domains import Domains
 
     return Domains.parse(arguments.domain_id) if arguments.domain_id else None
@@ -135,7 +135,7 @@ def span(arguments: argparse.Namespace) -> Span:
         return Span(None, None, backdate)
     try:
         return Span(parse_duration(text), None, backdate)
-    except InvalidInput:
+    except InvalidInputError:
         return Span(None, parse_end(text, utc_now()), backdate)
 
 

@@ -70,12 +70,12 @@ def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> Provisio
 
 
 def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
-    from keystore.errors import InvalidInput
+    from keystore.errors import InvalidInputError
     from keystore.formats.role import Role
     from keystore.steps.rollover import Step, roll_over
 
     if arguments.enclaves:
-        raise InvalidInput("--ca concerns all enclaves; do not name any")
+        raise InvalidInputError("--ca concerns all enclaves; do not name any")
     roles = tuple(Role) if arguments.ca_role == "both" else (Role(f"{arguments.ca_role}_ca"),)
     step = Step(arguments.ca)
     report = roll_over(arguments.keystore, step, roles, options=options, encrypt=arguments.encrypt_ca_keys)

@@ -56,7 +56,7 @@ def verify(
     now: datetime | None = None,
     required: Requirements | None = None,
 ) -> VerifyReport:
-    """Check everything; raises NotAKeystore only when there is nothing to check."""
+    """Check everything; raises NotAKeystoreError only when there is nothing to check."""
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     order = list(Severity)

@@ -10,7 +10,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.authorities import describe
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
-from keystore.errors import KeystoreError, SigningUnavailable, UnsafeKeystore
+from keystore.errors import KeystoreError, SigningUnavailableError, UnsafeKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.governance import Governance, parse_governance
 from keystore.formats.register import Register
@@ -100,7 +100,7 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
         return
     try:
         reference = safe_files.read_private(view.root, name)
-    except UnsafeKeystore:
+    except UnsafeKeystoreError:
         return  # the check of all files names it, with what to do about it
     locked = b"ENCRYPTED" in reference and access.passphrase is None
     if locked or (name.endswith(".p11") and access.pin is None):
@@ -113,7 +113,7 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
         return
     try:
         view.authority(role, access)
-    except SigningUnavailable as error:
+    except SigningUnavailableError as error:
         yield Finding(Severity.ERROR, "ca-key", name, str(error), repair.BACKUP)
 
 

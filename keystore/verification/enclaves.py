@@ -10,7 +10,13 @@ from datetime import datetime
 from keystore.disk import layout, safe_files
 from keystore.disk.governance_file import signed_governance
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput, KeystoreError, SigningUnavailable, UnsafeKeystore, printable
+from keystore.errors import (
+    InvalidInputError,
+    KeystoreError,
+    SigningUnavailableError,
+    UnsafeKeystoreError,
+    printable,
+)
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
@@ -133,7 +139,7 @@ class _EnclaveCheck:
             yield from self._certificate()
             yield from self._links()
             yield from self._permissions()
-        except UnsafeKeystore:
+        except UnsafeKeystoreError:
             return  # the check of all files names it, with what to do about it
         except KeystoreError as error:
             yield self.error("unreadable", "", str(error))
@@ -297,13 +303,13 @@ class _EnclaveCheck:
                 Severity.EXPOSURE, "everything", layout.PERMISSIONS, "grants every topic (*)", self._renew()
             )
         ranges = [(low, low if high is None else high) for rule in mine.rules for low, high in rule.domains]
-        with contextlib.suppress(InvalidInput):
+        with contextlib.suppress(InvalidInputError):
             self.domains = Domains(tuple(ranges)) if ranges else None
 
     def _validity(self, grant: Grant, facts: CertificateFacts) -> Iterator[Finding]:
         try:
             validity = Validity(parse_moment(grant.not_before), parse_moment(grant.not_after))
-        except InvalidInput as error:
+        except InvalidInputError as error:
             yield self.error("permissions-dates", layout.PERMISSIONS, str(error))
             return
         if not validity.covers(self._now):
@@ -323,5 +329,5 @@ def _loads(key_pem: bytes) -> bool:
     try:
         signer = FileSigner(load_private_key(key_pem, None, layout.KEY))
         return signature_is_valid(spki(signer.public_key()), signer.sign(probe), probe)
-    except (SigningUnavailable, ValueError):
+    except (SigningUnavailableError, ValueError):
         return False

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, safe_files
-from keystore.errors import InvalidEnclaveName, printable
+from keystore.errors import InvalidEnclaveNameError, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.role import Role
 from keystore.verification import repair
@@ -42,7 +42,7 @@ def check_files(root: Path) -> Iterator[Finding]:
             yield from _check_file(root, relative, info)
     try:
         check_distinct(names)
-    except InvalidEnclaveName as error:
+    except InvalidEnclaveNameError as error:
         yield Finding(
             Severity.ERROR, "case-collision", error.name, str(error),
             repair.run_on(root, "rm -r", _less_of_an_enclave(root, error.name, names), "or the other one"),
@@ -93,7 +93,7 @@ def _check_directory(root: Path, relative: str, info: os.stat_result, names: lis
         name = relative.removeprefix(layout.ENCLAVES)
         try:
             names.append(validate_enclave_name(name))
-        except InvalidEnclaveName as error:
+        except InvalidEnclaveNameError as error:
             stray = _stray(root, relative, f"no enclave can have this name: {error.reason}")
             yield _not_a_file(root, relative, "rm -r") or stray
         else:

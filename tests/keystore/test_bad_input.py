@@ -11,7 +11,7 @@ import pytest
 
 from keystore.disk import lock
 from keystore.disk.store import opened
-from keystore.errors import DamagedKeystore, InvalidInput, UnsafeKeystore
+from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.governance_yaml import parse_governance_yaml
 from keystore.formats.validity import parse_end
 from keystore.signing.ca_access import Secret
@@ -103,12 +103,12 @@ YAML = {
 
 @pytest.mark.parametrize("name", YAML)
 def test_governance_yaml(name: str) -> None:
-    with pytest.raises(InvalidInput, match=r"^g\.yaml"):
+    with pytest.raises(InvalidInputError, match=r"^g\.yaml"):
         parse_governance_yaml(YAML[name], "g.yaml")
 
 
 def test_no_keystore_is_made_for_an_impossible_validity(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="already have ended"):
+    with pytest.raises(InvalidInputError, match="already have ended"):
         provision(tmp_path / "ks", [policy("/a")], options=options(valid_until=NOW.replace(year=2001)))
     assert not (tmp_path / "ks").exists()
 
@@ -136,7 +136,7 @@ def test_the_lock_is_never_another_file(tmp_path: Path) -> None:
     (tmp_path / "precious").write_text("mine")
     (root / ".lock").unlink()
     os.link(tmp_path / "precious", root / ".lock")
-    with pytest.raises(UnsafeKeystore, match="hard link"), opened(root):
+    with pytest.raises(UnsafeKeystoreError, match="hard link"), opened(root):
         pass
     assert (tmp_path / "precious").read_text() == "mine"
 
@@ -161,7 +161,7 @@ def test_nobody_else_may_put_a_ca_in_waiting(tmp_path: Path) -> None:
     (waiting / "key.pem").write_bytes((other / "private/identity_ca.key.pem").read_bytes())
     before = (root / "public/identity_ca.cert.pem").read_bytes()
     (root / "private/incoming").chmod(0o770)
-    with pytest.raises(UnsafeKeystore, match="chmod -R go-w"):
+    with pytest.raises(UnsafeKeystoreError, match="chmod -R go-w"):
         provision(root, [policy("/a")], options=options())
     assert (root / "public/identity_ca.cert.pem").read_bytes() == before
 
@@ -171,7 +171,7 @@ def test_a_governance_that_nobody_signed_is_not_signed(tmp_path: Path) -> None:
     (root / "enclaves/governance.p7s").unlink()
     twin = root / "enclaves/governance.xml"
     twin.write_bytes(twin.read_bytes().replace(b">ENCRYPT<", b">NONE<"))
-    with pytest.raises(DamagedKeystore, match=r"not the default governance.*rm "):
+    with pytest.raises(DamagedKeystoreError, match=r"not the default governance.*rm "):
         create_keystore(root)
     twin.unlink()
     assert create_keystore(root).actions == ("governance signed",)
@@ -184,7 +184,7 @@ def test_a_bundle_whose_enclaves_stand_alone_gets_no_other_ca(tmp_path: Path) ->
     assert not provision(bundle, [policy("/a")], options=options()).changed
     shutil.rmtree(bundle / "public")  # of earlier versions
     (bundle / "enclaves/governance.p7s").unlink()
-    with pytest.raises(DamagedKeystore, match="a deployed copy"):
+    with pytest.raises(DamagedKeystoreError, match="a deployed copy"):
         provision(bundle, [policy("/a")], options=options())
     assert not (bundle / "public/identity_ca.cert.pem").exists()
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from keystore.disk import layout
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.steps.bundle import PublicFiles, export
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.verification import verify
@@ -106,23 +106,23 @@ def test_strays_stay_at_home(root: Path, tmp_path: Path) -> None:
 
 
 def test_nothing_matches(root: Path, tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="no enclave matches '/robot9"):
+    with pytest.raises(InvalidInputError, match="no enclave matches '/robot9"):
         export(root, tmp_path / "out", ["/robot1", "/robot9*"])
     assert not (tmp_path / "out").exists()
 
 
 def test_what_exists_is_not_overwritten(root: Path, tmp_path: Path) -> None:
     (tmp_path / "out.tar").write_text("mine")
-    with pytest.raises(InvalidInput, match="exists already"):
+    with pytest.raises(InvalidInputError, match="exists already"):
         export(root, tmp_path / "out.tar", ["*"])
     assert (tmp_path / "out.tar").read_text() == "mine"
 
 
 def test_incomplete_and_expired_enclaves_are_not_deployed(root: Path, tmp_path: Path) -> None:
-    with pytest.raises(DamagedKeystore, match="not valid now"):
+    with pytest.raises(DamagedKeystoreError, match="not valid now"):
         export(root, tmp_path / "out", ["/robot1"], now=NOW + 9000 * DAY)
     (root / "enclaves/robot1/permissions.p7s").unlink()
-    with pytest.raises(DamagedKeystore, match="incomplete"):
+    with pytest.raises(DamagedKeystoreError, match="incomplete"):
         export(root, tmp_path / "out", ["/robot1"])
 
 

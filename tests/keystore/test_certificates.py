@@ -11,7 +11,7 @@ from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore.errors import InvalidInput, SigningUnavailable
+from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats import certificate, der
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
@@ -70,7 +70,7 @@ def test_the_profile_of_each_ca(role: Role, documents: bool) -> None:
 def test_cas_have_names_of_their_own() -> None:
     assert ca(Role.IDENTITY).facts.subject != ca(Role.IDENTITY).facts.subject
     for name in ("", "a" * 65, "a,b", "a/b", "a=b", 'a"b', "a\\b"):
-        with pytest.raises(InvalidInput):
+        with pytest.raises(InvalidInputError):
             authority.self_signed_ca(Role.IDENTITY, name, authority.new_key(Curve.P256), VALIDITY)
 
 
@@ -80,7 +80,7 @@ def test_an_enclave_never_outlives_its_ca(identity_ca: Authority) -> None:
 
 
 def test_a_ca_and_another_ones_key_are_told_apart(identity_ca: Authority) -> None:
-    with pytest.raises(SigningUnavailable, match="do not belong together"):
+    with pytest.raises(SigningUnavailableError, match="do not belong together"):
         authority.authority_of(identity_ca.pem(), ca(Role.IDENTITY).signer, "ca.pem")
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInput, NotAKeystore, SigningUnavailable
+from keystore.errors import InvalidInputError, NotAKeystoreError, SigningUnavailableError
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.role import Role
@@ -51,7 +51,7 @@ def test_an_empty_directory_is_used(tmp_path: Path) -> None:
 def test_a_file_and_a_full_directory_are_not(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     for path in (tmp_path / "file", tmp_path):
-        with pytest.raises(NotAKeystore):
+        with pytest.raises(NotAKeystoreError):
             created(path)
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
@@ -108,19 +108,19 @@ def test_importing_again_is_nothing_new_but_another_ca_is_refused(tmp_path: Path
     assert create_keystore(root, CreateOptions(imported={Role.IDENTITY: mine}, now=NOW)).actions == ()
     (tmp_path / "other").mkdir()
     _, other = made_ca(Role.IDENTITY, tmp_path / "other")
-    with pytest.raises(InvalidInput, match="renew KEYSTORE --ca start"):
+    with pytest.raises(InvalidInputError, match="renew KEYSTORE --ca start"):
         create_keystore(root, CreateOptions(imported={Role.IDENTITY: other}, now=NOW))
 
 
 def test_cas_that_cannot_serve_are_refused_before_anything_is_written(tmp_path: Path) -> None:
     made, pair = made_ca(Role.IDENTITY, tmp_path)
     swapped = {Role.PERMISSIONS: pair}  # may not sign documents
-    with pytest.raises(InvalidInput, match="digitalSignature"):
+    with pytest.raises(InvalidInputError, match="digitalSignature"):
         created(tmp_path / "ks", imported=swapped, now=NOW)
     _, other = made_ca(Role.PERMISSIONS, tmp_path)
-    with pytest.raises(SigningUnavailable, match="do not belong together"):
+    with pytest.raises(SigningUnavailableError, match="do not belong together"):
         created(tmp_path / "ks2", imported={Role.IDENTITY: ImportedCa(pair.certificate, other.key)}, now=NOW)
-    with pytest.raises(InvalidInput, match="not valid now"):
+    with pytest.raises(InvalidInputError, match="not valid now"):
         created(tmp_path / "ks3", imported={Role.IDENTITY: pair}, now=NOW - 90 * DAY)
     assert made.facts.common_name == "imported identity_ca"
 
@@ -137,7 +137,7 @@ def test_encrypted_ca_keys(tmp_path: Path) -> None:
     provision(root, [policy("/a")], options=options(access=access))
     assert findings(root, access) == set()
     assert findings(root) == {"ca-key-locked"}
-    with pytest.raises(SigningUnavailable, match="is encrypted; give its passphrase"):
+    with pytest.raises(SigningUnavailableError, match="is encrypted; give its passphrase"):
         provision(root, [policy("/b")], options=options())
     assert not (root / "enclaves/b").exists()
 
@@ -156,7 +156,7 @@ def test_a_wrong_passphrase_is_told_without_showing_anything(tmp_path: Path) -> 
     root = created(tmp_path / "ks", encrypt_ca_keys=True, access=right)
     (tmp_path / "wrong").write_bytes(b"tr0ub4dor")
     wrong = CaAccess(passphrase=Secret(file=tmp_path / "wrong"))
-    with pytest.raises(SigningUnavailable, match="is the passphrase right") as caught:
+    with pytest.raises(SigningUnavailableError, match="is the passphrase right") as caught:
         provision(root, [policy("/a")], options=options(access=wrong))
     frames = [entry.frame.f_locals for entry in caught.traceback]
     assert "tr0ub4dor" not in repr(frames) + str(caught.value) + repr(wrong)
@@ -173,7 +173,7 @@ def test_passphrases_from_descriptor_and_environment(monkeypatch: pytest.MonkeyP
     os.close(reading)
     monkeypatch.setenv("KEYSTORE_SENTENCE", SENTENCE.decode())
     assert Secret(variable="KEYSTORE_SENTENCE").value() == SENTENCE
-    with pytest.raises(InvalidInput, match=r"\$NOT_SET"):
+    with pytest.raises(InvalidInputError, match=r"\$NOT_SET"):
         Secret(variable="NOT_SET").value()
 
 
@@ -206,7 +206,7 @@ def test_where_the_ca_keys_are_not_nothing_is_signed_but_a_launch_works(tmp_path
     (root / "private").rmdir()
     assert actions(provision(root, [policy("/a")], options=options())) == {}
     with pytest.raises(
-        SigningUnavailable, match=r"has no CA keys.*(?s:.)*/a: other permissions; lacks publish rt/new"
+        SigningUnavailableError, match=r"has no CA keys.*(?s:.)*/a: other permissions; lacks publish rt/new"
     ):
         provision(root, [policy("/a", "/new")], options=options())
     assert findings(root) == {"no-ca-key"}

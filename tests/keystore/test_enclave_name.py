@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keystore.disk import layout
-from keystore.errors import InvalidEnclaveName
+from keystore.errors import InvalidEnclaveNameError
 from keystore.formats.enclave_name import MAX_LENGTH, check_distinct, segments, validate_enclave_name
 
 GOOD = ["/", "/a", "/_", "/a/_b", "/Front/camera_2", "/" + "a" * 244, "/" + "/".join("abcdefghijklmnopqrs")]
@@ -46,7 +46,7 @@ def test_good_names_come_back_unchanged(name: str) -> None:
 
 @pytest.mark.parametrize(("name", "reason"), BAD.items())
 def test_bad_names_are_refused_with_the_reason(name: str, reason: str) -> None:
-    with pytest.raises(InvalidEnclaveName) as caught:
+    with pytest.raises(InvalidEnclaveNameError) as caught:
         validate_enclave_name(name)
     assert reason in caught.value.reason
     assert str(caught.value).isprintable(), "a name must not smuggle escape sequences into the terminal"
@@ -56,7 +56,7 @@ def test_bad_names_are_refused_with_the_reason(name: str, reason: str) -> None:
 def test_no_name_however_hostile_has_a_directory_outside_the_enclaves(name: str) -> None:
     try:
         directory = layout.enclave_directory(name)
-    except InvalidEnclaveName:
+    except InvalidEnclaveNameError:
         return
     resolved = os.path.normpath(f"/keystore/{directory}")
     assert resolved == f"/keystore/{directory}", "one name, one spelling"
@@ -72,5 +72,5 @@ def test_segments() -> None:
 def test_names_that_differ_only_in_case_would_share_a_directory_on_some_file_systems() -> None:
     check_distinct(["/a/b", "/a/c", "/a"])
     for names in (["/a", "/A"], ["/front/camera", "/Front/lidar"], ["/a/b", "/A"]):
-        with pytest.raises(InvalidEnclaveName, match="only in case"):
+        with pytest.raises(InvalidEnclaveNameError, match="only in case"):
             check_distinct(names)

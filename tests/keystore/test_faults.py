@@ -216,12 +216,12 @@ def test_a_dead_run_does_not_hold_the_lock(tmp_path: Path) -> None:
 
 def test_the_holder_of_the_lock_is_named(tmp_path: Path) -> None:
     from keystore.disk.lock import exclusive
-    from keystore.errors import KeystoreBusy
+    from keystore.errors import KeystoreBusyError
 
     root = tmp_path / "ks"
     create_keystore(root, CreateOptions(durable=False))
     before = snapshot(root)
-    with exclusive(root), pytest.raises(KeystoreBusy, match=f"pid {os.getpid()} on") as caught:
+    with exclusive(root), pytest.raises(KeystoreBusyError, match=f"pid {os.getpid()} on") as caught:
         filled(root, ["/a"], lock_timeout=0.05)
     assert caught.value.exit_status == 75
     assert snapshot(root) == before

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore.errors import InvalidInput
+from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.governance import (
     DomainRule,
@@ -141,7 +141,7 @@ BAD_YAML = {
 
 @pytest.mark.parametrize(("text", "message"), BAD_YAML.items())
 def test_bad_yaml_is_refused_with_its_place(text: str, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message) as caught:
+    with pytest.raises(InvalidInputError, match=message) as caught:
         parse_governance_yaml(text.encode(), "x.yaml")
     assert str(caught.value).startswith("x.yaml")
 
@@ -159,7 +159,7 @@ def test_bad_yaml_is_refused_with_its_place(text: str, message: str) -> None:
     ],
 )
 def test_documents_that_an_implementation_refuses_are_refused(damage: tuple[str, str]) -> None:
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInputError):
         parse_governance(CAMERA_XML.replace(*damage).encode(), "governance.xml")
 
 
@@ -201,5 +201,5 @@ def test_a_launch_on_a_domain_without_rule_asks_a_person(tmp_path: Path) -> None
     two = Governance((DomainRule(domains=Domains.single(0)), DomainRule(domains=Domains.single(1))))
     root = filled(tmp_path / "ks")
     set_governance(root, two, options=QUICK)
-    with pytest.raises(InvalidInput, match="several to choose from"):
+    with pytest.raises(InvalidInputError, match="several to choose from"):
         provision(root, [policy("/a")], options=options(domains=Domains.single(2)))

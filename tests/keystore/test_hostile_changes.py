@@ -455,11 +455,11 @@ def test_the_cas_of_a_bundle_can_be_pinned(present: Path, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ["second CA", "key behind a certificate", "default ALLOW", "data in clear"])
 def test_nothing_of_it_is_exported(name: str, present: Path, tmp_path: Path) -> None:
-    from keystore.errors import DamagedKeystore
+    from keystore.errors import DamagedKeystoreError
 
     root = copy_of(present, tmp_path)
     HOSTILE[name][1](root)
-    with pytest.raises(DamagedKeystore):
+    with pytest.raises(DamagedKeystoreError):
         export(root, tmp_path / "out", ["/a"])
     assert not (tmp_path / "out").exists()
 

@@ -7,7 +7,7 @@ import re
 import pytest
 
 from keystore.disk.governance_file import covers
-from keystore.errors import InvalidInput
+from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_names import ros_rules
 from keystore.formats.permissions_read import parse_permissions
@@ -57,18 +57,18 @@ BROKEN = {
 @pytest.mark.parametrize("name", BROKEN)
 def test_documents_that_must_not_be_accepted(name: str) -> None:
     text, reason = BROKEN[name]
-    with pytest.raises(InvalidInput, match=rf"perm.xml:?\d*: .*{re.escape(reason)}"):
+    with pytest.raises(InvalidInputError, match=rf"perm.xml:?\d*: .*{re.escape(reason)}"):
         parse_permissions(text, "perm.xml")
 
 
 def test_too_large_a_document() -> None:
-    with pytest.raises(InvalidInput, match="larger than"):
+    with pytest.raises(InvalidInputError, match="larger than"):
         parse_permissions(b" " * 5_000_000)
 
 
 def test_a_doctype_in_another_encoding_is_found_too() -> None:
     text = '<?xml version="1.0" encoding="UTF-16"?><!DOCTYPE dds><dds/>'.encode("utf-16")
-    with pytest.raises(InvalidInput, match="DOCTYPE"):
+    with pytest.raises(InvalidInputError, match="DOCTYPE"):
         parse_permissions(text)
 
 
@@ -101,7 +101,7 @@ def test_domain_lists(text: str) -> None:
 
 @pytest.mark.parametrize("text", ["", "a", "-1", "231", "0-231", "5-3", "0,", "0x0", "1 2", "1-2-3", "1000"])
 def test_domain_lists_that_are_refused(text: str) -> None:
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInputError):
         Domains.parse(text)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore.errors import InvalidInput, SigningUnavailable
+from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, utc_now
 from keystore.signing import authority
@@ -132,7 +132,7 @@ def test_without_pin_or_module_the_message_says_so(
         ),
     }
     for message, wrong in cases.items():
-        with pytest.raises(SigningUnavailable, match=message) as caught:
+        with pytest.raises(SigningUnavailableError, match=message) as caught:
             provision(root, [policy("/a")], options=options(access=wrong))
         assert PIN not in str(caught.value)
 
@@ -152,7 +152,7 @@ def test_an_unchanged_launch_needs_no_token(root: Path, token: Mapping[str, str]
     ],
 )
 def test_bad_uris_are_refused_unseen(text: str, message: str) -> None:
-    with pytest.raises(InvalidInput, match=message) as caught:
+    with pytest.raises(InvalidInputError, match=message) as caught:
         parse_uri(text)
     assert "1234" not in str(caught.value)
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore.errors import InvalidInput
+from keystore.errors import InvalidInputError
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
 from keystore.formats.policy_xml import parse_policy, policy_xml, read_policy
 from keystore.formats.safe_xml import check_schema, parse_xml
@@ -122,7 +122,7 @@ NOT_POLICIES = {
 @pytest.mark.parametrize("name", NOT_POLICIES)
 def test_what_is_no_policy_is_told_with_its_line(name: str) -> None:
     text, reason = NOT_POLICIES[name]
-    with pytest.raises(InvalidInput, match=rf"p\.xml:?\d*: .*{re.escape(reason)}"):
+    with pytest.raises(InvalidInputError, match=rf"p\.xml:?\d*: .*{re.escape(reason)}"):
         parse_policy(text.encode(), "p.xml")
 
 
@@ -173,7 +173,7 @@ def test_a_policy_as_it_is_written() -> None:
 
 
 def test_a_policy_without_enclaves_cannot_be_written() -> None:
-    with pytest.raises(InvalidInput, match="at least one enclave"):
+    with pytest.raises(InvalidInputError, match="at least one enclave"):
         policy_xml(Policy(()))
 
 
@@ -282,7 +282,7 @@ def test_includes_that_are_refused(name: str, tmp_path: Path) -> None:
     (folder / "link.xml").symlink_to(tmp_path / "outside.xml")
     body, reason = UNSAFE[name]
     main = write(folder, "policy.xml", policy(body))
-    with pytest.raises(InvalidInput, match=re.escape(reason)) as caught:
+    with pytest.raises(InvalidInputError, match=re.escape(reason)) as caught:
         read_policy(main)
     assert "the secret" not in str(caught.value)
 

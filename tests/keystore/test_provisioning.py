@@ -15,7 +15,7 @@ import pytest
 from keystore.disk import layout
 from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidEnclaveName, InvalidInput, NotAKeystore, UnsafeKeystore
+from keystore.errors import InvalidEnclaveNameError, InvalidInputError, NotAKeystoreError, UnsafeKeystoreError
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_read import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Policy
@@ -263,33 +263,33 @@ def test_a_new_domain_extends_the_governance(tmp_path: Path) -> None:
 
 
 def test_creating_can_be_forbidden(tmp_path: Path) -> None:
-    with pytest.raises(NotAKeystore, match="creating it was forbidden"):
+    with pytest.raises(NotAKeystoreError, match="creating it was forbidden"):
         provision(tmp_path / "ks", [policy("/a")], options=options(create=False))
     assert not (tmp_path / "ks").exists()
 
 
 def test_a_directory_with_other_things_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(NotAKeystore):
+    with pytest.raises(NotAKeystoreError):
         provision(tmp_path, [policy("/a")], options=options())
     assert list(tmp_path.iterdir()) == [tmp_path / "thesis.tex"]
 
 
 @pytest.mark.parametrize("name", ["/../escape", "/a/../../b", "relative", "/a/", ""])
 def test_bad_names_write_nothing(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InvalidEnclaveName):
+    with pytest.raises(InvalidEnclaveNameError):
         provision(tmp_path / "ks", [EnclavePolicy(name, ())], options=options())
     assert list(tmp_path.iterdir()) == []
 
 
 def test_one_enclave_given_twice(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInput, match="given twice"):
+    with pytest.raises(InvalidInputError, match="given twice"):
         provision(tmp_path / "ks", [policy("/a"), policy("/a")], options=options())
 
 
 def test_a_name_that_differs_only_in_case_from_an_existing_one(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/robot/a"])
-    with pytest.raises(InvalidEnclaveName, match="only in case"):
+    with pytest.raises(InvalidEnclaveNameError, match="only in case"):
         provision(root, [policy("/Robot/b")], options=options())
 
 
@@ -310,7 +310,7 @@ def test_repeating_create_enclave_never_widens_permissions(tmp_path: Path) -> No
 
 
 def test_apply_policy_needs_a_keystore(tmp_path: Path) -> None:
-    with pytest.raises(NotAKeystore):
+    with pytest.raises(NotAKeystoreError):
         apply_policy(tmp_path / "ks", Policy((policy("/a"),)), options=options())
     root = created(tmp_path / "ks")
     apply_policy(root, Policy((policy("/a"), policy("/b"))), options=options())
@@ -321,7 +321,7 @@ def test_compatible_subjects_refuse_names_that_cyclone_confuses(tmp_path: Path) 
     wanted = options(subjects=SubjectScheme.COMPATIBLE)
     root = created(tmp_path / "ks", subjects=SubjectScheme.COMPATIBLE)
     create_enclave(root, "/robot/talker", options=wanted)
-    with pytest.raises(InvalidInput, match="/talker could use the permissions of /robot/talker"):
+    with pytest.raises(InvalidInputError, match="/talker could use the permissions of /robot/talker"):
         create_enclave(root, "/talker", options=wanted)
     assert list_enclaves(root) == ["/robot/talker"]
     create_enclave(root, "/talker", options=wanted._replace(allow_subject_overlap=True))
@@ -338,7 +338,7 @@ def test_an_enclave_behind_a_link_is_refused(tmp_path: Path) -> None:
     (tmp_path / "elsewhere").mkdir()
     (root / "enclaves/b").symlink_to(tmp_path / "elsewhere")
     for name in ("/b", "/b/c"):
-        with pytest.raises(UnsafeKeystore, match="must be a real directory"):
+        with pytest.raises(UnsafeKeystoreError, match="must be a real directory"):
             provision(root, [policy(name)], options=options())
     assert list((tmp_path / "elsewhere").iterdir()) == []
 
@@ -361,7 +361,7 @@ def test_a_link_in_place_of_an_identity_is_refused(tmp_path: Path, name: str) ->
     root = filled(tmp_path / "ks", ["/a"])
     (root / "enclaves/a" / name).rename(tmp_path / name)
     (root / "enclaves/a" / name).symlink_to(tmp_path / name)
-    with pytest.raises(UnsafeKeystore):
+    with pytest.raises(UnsafeKeystoreError):
         provision(root, [policy("/a")], options=options())
 
 
@@ -370,7 +370,7 @@ def test_a_ca_file_that_links_out_of_the_keystore_is_refused(tmp_path: Path, nam
     root = filled(tmp_path / "ks", ["/a"])
     (root / name).rename(tmp_path / "out.pem")
     (root / name).symlink_to(tmp_path / "out.pem")
-    with pytest.raises(UnsafeKeystore, match="rm "):
+    with pytest.raises(UnsafeKeystoreError, match="rm "):
         provision(root, [policy("/b")], options=options())
     assert "strange-link" in codes(root)
 
@@ -382,7 +382,7 @@ def test_private_parts_that_others_can_write_are_refused_with_the_repair(
     root = filled(tmp_path / "ks", ["/a"])
     path = root / private
     path.chmod(stat.S_IMODE(path.stat().st_mode) | 0o020)
-    with pytest.raises(UnsafeKeystore, match=r"chmod (-R go-w|go-rwx)"):
+    with pytest.raises(UnsafeKeystoreError, match=r"chmod (-R go-w|go-rwx)"):
         provision(root, [policy("/a", "/new"), policy("/b")], options=options())
 
 
@@ -391,18 +391,18 @@ def test_private_parts_that_others_can_write_are_refused_with_the_repair(
 def test_foreign_private_parts_are_refused_with_the_repair(tmp_path: Path, private: str) -> None:
     root = filled(tmp_path / "ks", ["/a"])
     os.chown(root / private, 12345, -1)
-    with pytest.raises(UnsafeKeystore, match="chown -R 0"):
+    with pytest.raises(UnsafeKeystoreError, match="chown -R 0"):
         provision(root, [policy("/a", "/new")], options=options())
 
 
 def test_world_writable_places_are_refused(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a"])
     (root / "enclaves").chmod(0o777)
-    with pytest.raises(UnsafeKeystore, match="chmod o-w"):
+    with pytest.raises(UnsafeKeystoreError, match="chmod o-w"):
         provision(root, [policy("/b")], options=options())
     (tmp_path / "open").mkdir()
     (tmp_path / "open").chmod(0o777)
-    with pytest.raises(UnsafeKeystore, match="everybody can rename"):
+    with pytest.raises(UnsafeKeystoreError, match="everybody can rename"):
         provision(tmp_path / "open/ks", [policy("/a")], options=options())
 
 

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
-from keystore.errors import DamagedKeystore, InvalidInput, UnsafeKeystore
+from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_pem
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection
@@ -94,14 +94,14 @@ class TestTheRecord:
         root = filled(tmp_path / "ks")
         assert (root / layout.REGISTER).stat().st_mode & 0o777 == 0o600
         (root / layout.REGISTER).chmod(0o666)
-        with pytest.raises(UnsafeKeystore, match="can be written by others"):
+        with pytest.raises(UnsafeKeystoreError, match="can be written by others"):
             provision(root, [policy("/a")], options=options())
 
     @pytest.mark.parametrize("text", ["", "{}", "[]", '{"version": 1}', "\xff", "[" * 100_000])
     def test_that_cannot_be_read_is_not_guessed(self, tmp_path: Path, text: str) -> None:
         root = filled(tmp_path / "ks")
         (root / layout.REGISTER).write_bytes(text.encode("latin-1"))
-        with pytest.raises(DamagedKeystore, match=r"register\.json.* restore it from a backup"):
+        with pytest.raises(DamagedKeystoreError, match=r"register\.json.* restore it from a backup"):
             provision(root, [policy("/a")], options=options())
 
     def test_forgets_what_has_ended(self, tmp_path: Path) -> None:
@@ -186,7 +186,7 @@ class TestRevocations:
         _, old = self.removed(tmp_path)
         other = filled(tmp_path / "other", ["/a"])
         shutil.copy(old, other / "public/crl.pem")
-        with pytest.raises(DamagedKeystore, match="was not published by this keystore"):
+        with pytest.raises(DamagedKeystoreError, match="was not published by this keystore"):
             provision(other, [policy("/a")], options=options())
 
     def test_what_was_replaced_before_the_removal_is_revoked_too(self, tmp_path: Path) -> None:
@@ -202,7 +202,7 @@ class TestRevocations:
         shutil.rmtree(root / "enclaves/b")
         assert remove(root, ["/b"], options=QUICK).revoked == 1
         assert is_revoked(root, lost) and codes(root) == set()
-        with pytest.raises(InvalidInput, match="no enclave /b"):
+        with pytest.raises(InvalidInputError, match="no enclave /b"):
             remove(root, ["/b"], options=QUICK)
 
 
@@ -243,7 +243,7 @@ class TestRightsThatAreTakenAway:
         root = self.reduced(tmp_path)
         for name in ("permissions.p7s", "permissions.xml"):
             shutil.copy(tmp_path / "before" / name, root / "enclaves/a" / name)
-        with pytest.raises(DamagedKeystore, match=r"not what was signed last for /a.* apply-policy"):
+        with pytest.raises(DamagedKeystoreError, match=r"not what was signed last for /a.* apply-policy"):
             renew(root, ["/a"], options=RenewOptions(provisioning=options()))
         provision(root, [policy("/a")], options=options())
         assert [rule.publish for rule in grant(root, "/a").rules] == [("ros_discovery_info", "rt/chatter")]
@@ -357,7 +357,7 @@ class TestAuthorities:
         trusted = root / layout.ca_cert(role)
         ours = trusted.read_bytes()
         trusted.write_bytes(ours + (other / layout.ca_cert(role)).read_bytes())
-        with pytest.raises(UnsafeKeystore, match=r"a CA that this keystore did not make: .*SHA-256 "):
+        with pytest.raises(UnsafeKeystoreError, match=r"a CA that this keystore did not make: .*SHA-256 "):
             provision(root, [policy("/a")], options=options())
         report = renew(root, options=RenewOptions(provisioning=options()))
         assert f"removed from {layout.ca_cert(role)}" in report.created[0]
@@ -366,7 +366,7 @@ class TestAuthorities:
     def test_one_in_place_of_ours_is_refused(self, tmp_path: Path) -> None:
         root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
         shutil.copy(other / "public/identity_ca.cert.pem", root / "public/identity_ca.cert.pem")
-        with pytest.raises(UnsafeKeystore, match="did not make"):
+        with pytest.raises(UnsafeKeystoreError, match="did not make"):
             provision(root, [policy("/a")], options=options())
 
     def test_a_roll_over_of_our_own_is_known(self, tmp_path: Path) -> None:
@@ -383,7 +383,7 @@ class TestAuthorities:
         shutil.rmtree(root / "enclaves/b")
         shutil.copytree(tmp_path / "b", root / "enclaves/b", symlinks=True)
         with pytest.raises(
-            InvalidInput, match=r"1 of 3 enclaves \(/b\) still belong to the old CA.*--ca switch"
+            InvalidInputError, match=r"1 of 3 enclaves \(/b\) still belong to the old CA.*--ca switch"
         ):
             roll_over(root, Step.FINISH, options=options())
         roll_over(root, Step.SWITCH, options=options())
@@ -429,7 +429,7 @@ class TestTakingOver:
         root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
         trusted = root / "public/identity_ca.cert.pem"
         trusted.write_bytes(trusted.read_bytes() + (other / "public/identity_ca.cert.pem").read_bytes())
-        with pytest.raises(UnsafeKeystore, match="did not make"):
+        with pytest.raises(UnsafeKeystoreError, match="did not make"):
             provision(self.earlier(root), [policy("/a")], options=options())
 
     @pytest.mark.parametrize("step", [Step.START, Step.SWITCH])

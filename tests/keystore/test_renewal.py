@@ -9,7 +9,7 @@ import pytest
 from keystore.disk import layout
 from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificates
 from keystore.formats.permissions_read import parse_permissions
 from keystore.formats.role import Role
@@ -106,7 +106,7 @@ def test_what_an_enclave_of_the_old_keystore_signed_is_not_taken_over(sros2: Pat
     document = (sros2 / "enclaves/a/permissions.xml").read_text().replace("rt/chatter", "*")
     (sros2 / "enclaves/a/permissions.p7s").write_bytes(attacker.sign(document))
     (sros2 / "enclaves/a/permissions.xml").write_text(document)
-    with pytest.raises(DamagedKeystore, match="not the permissions CA"):
+    with pytest.raises(DamagedKeystoreError, match="not the permissions CA"):
         renew(sros2, options=renewing())
 
 
@@ -144,7 +144,7 @@ def test_named_enclaves_are_renewed_in_any_case(tmp_path: Path) -> None:
     assert (root / "enclaves/a/key.pem").read_bytes() != key
     assert granted(root, "/a") == {"rt/chatter", "ros_discovery_info"}
     assert codes(root) == set()
-    with pytest.raises(InvalidInput, match="no enclave /c"):
+    with pytest.raises(InvalidInputError, match="no enclave /c"):
         renew(root, ["/c"], options=renewing())
 
 
@@ -170,7 +170,7 @@ def test_an_expired_ca_is_said_and_rolled_over(tmp_path: Path) -> None:
     creation = CreateOptions(ca_lifetime=50 * DAY)
     root = filled(tmp_path / "ks", ["/a"], now=NOW, creation=creation)
     late = NOW + 60 * DAY
-    with pytest.raises(DamagedKeystore, match=r"renew \S+ --ca start"):
+    with pytest.raises(DamagedKeystoreError, match=r"renew \S+ --ca start"):
         renew(root, options=renewing(now=late))
     for step in Step:
         roll_over(root, step, options=options(now=late))
@@ -237,10 +237,10 @@ def test_a_switch_interrupted_while_it_forgets_is_completed(tmp_path: Path, left
 
 def test_steps_out_of_order_are_refused(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a"])
-    with pytest.raises(InvalidInput, match="first --ca start"):
+    with pytest.raises(InvalidInputError, match="first --ca start"):
         roll_over(root, Step.SWITCH, options=options())
     roll_over(root, Step.START, options=options())
-    with pytest.raises(InvalidInput, match="first --ca switch"):
+    with pytest.raises(InvalidInputError, match="first --ca switch"):
         roll_over(root, Step.FINISH, options=options())
 
 

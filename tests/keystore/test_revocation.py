@@ -11,7 +11,7 @@ from cryptography import x509
 from keystore.disk import layout
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_pem
 from keystore.steps.bundle import export
 from keystore.steps.enclaves import list_enclaves
@@ -132,7 +132,7 @@ def test_a_restored_backup_of_a_revoked_enclave_is_found_and_not_exported(root: 
     remove(root, ["/c"], options=quick())
     shutil.copytree(tmp_path / "backup", root / "enclaves/c", symlinks=True)
     assert "revoked" in codes(root)
-    with pytest.raises(DamagedKeystore, match=r"enclave /c is not fit for a host: .*revoked"):
+    with pytest.raises(DamagedKeystoreError, match=r"enclave /c is not fit for a host: .*revoked"):
         export(root, tmp_path / "out", ["/c"])
 
 
@@ -143,7 +143,7 @@ def test_only_deleting(root: Path) -> None:
 
 def test_an_unknown_enclave_changes_nothing(root: Path) -> None:
     before = snapshot(root)
-    with pytest.raises(InvalidInput, match="no enclave /nowhere"):
+    with pytest.raises(InvalidInputError, match="no enclave /nowhere"):
         remove(root, ["/a", "/nowhere"], options=quick())
     assert snapshot(root) == before
 

@@ -13,7 +13,7 @@ import pytest
 
 from keystore.disk import layout
 from keystore.disk.share_files import LaunchHold, is_running, read_shares
-from keystore.errors import DamagedKeystore, InvalidInput, UnsafeKeystore
+from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_pem
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_read import parse_permissions
@@ -140,7 +140,9 @@ class TestWhileAnotherRuns:
 
     def test_giving_the_enclave_something_else_is_refused(self, root: Path, running: LaunchHold) -> None:
         before = snapshot(root)
-        with pytest.raises(InvalidInput, match=f"{BRINGUP}' is running and uses enclave /; stop it first"):
+        with pytest.raises(
+            InvalidInputError, match=f"{BRINGUP}' is running and uses enclave /; stop it first"
+        ):
             provision(root, [policy("/", "/else")], options=options())
         assert snapshot(root) == before
         running.close()
@@ -187,18 +189,18 @@ class TestDropping:
         assert granted(root) == set() and list_shares(root) == ()
 
     def test_of_a_running_launch_is_refused(self, root: Path, running: LaunchHold) -> None:
-        with pytest.raises(InvalidInput, match="is running"):
+        with pytest.raises(InvalidInputError, match="is running"):
             drop_shares(root, BRINGUP, options=options())
 
     def test_beside_a_running_launch_is_refused(self, root: Path, running: LaunchHold) -> None:
         """What it takes away would revoke the certificate that the running one uses."""
         start(root, NAVIGATION, policy("/", "/plan"))
-        with pytest.raises(InvalidInput, match=f"{BRINGUP}' is running"):
+        with pytest.raises(InvalidInputError, match=f"{BRINGUP}' is running"):
             drop_shares(root, NAVIGATION, options=options())
 
     def test_of_an_unknown_launch_is_refused(self, root: Path) -> None:
         filled(root, ["/a"])
-        with pytest.raises(InvalidInput, match="no launch '/nowhere' has a share"):
+        with pytest.raises(InvalidInputError, match="no launch '/nowhere' has a share"):
             drop_shares(root, "/nowhere", options=options())
 
     def test_as_a_command(self, root: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -234,7 +236,7 @@ class TestWhatCannotBeUnited:
         no_secret = Rule(Operation.PUBLISH, Qualifier.DENY, "/secret")
         start(root, BRINGUP, ruled(everything, no_secret))
         start(root, NAVIGATION, policy("/", "/plan"))
-        with pytest.raises(InvalidInput, match=r"one of them denies the other needs \(rt/secret\)"):
+        with pytest.raises(InvalidInputError, match=r"one of them denies the other needs \(rt/secret\)"):
             start(root, NAVIGATION, policy("/", "/secret"))
 
 
@@ -250,14 +252,14 @@ class TestTheFiles:
         """What they ask for would be signed."""
         start(root, BRINGUP, policy("/"))
         (root / layout.shares("/")).chmod(0o666)
-        with pytest.raises(UnsafeKeystore, match="can be written by others"):
+        with pytest.raises(UnsafeKeystoreError, match="can be written by others"):
             start(root, NAVIGATION, policy("/"))
 
     @pytest.mark.parametrize("text", ["", "{}", "[]", '{"version": 1, "shares": [{}]}', "[" * 100_000])
     def test_that_cannot_be_read_are_not_guessed(self, root: Path, text: str) -> None:
         start(root, BRINGUP, policy("/"))
         (root / layout.shares("/")).write_text(text)
-        with pytest.raises(DamagedKeystore, match="does not hold the shares"):
+        with pytest.raises(DamagedKeystoreError, match="does not hold the shares"):
             start(root, NAVIGATION, policy("/"))
 
     def test_hold_every_rule_as_it_was_given(self, root: Path) -> None:

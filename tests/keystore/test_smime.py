@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore.errors import DamagedKeystore, InvalidInput
+from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats import certificate
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
@@ -68,7 +68,7 @@ def test_openssl_signs_what_we_read(tmp_path: Path, extra: tuple[str, ...]) -> N
         "-in", tmp_path / "x.xml", "-out", tmp_path / "x.p7s",
     )  # fmt: skip
     if extra:
-        with pytest.raises(DamagedKeystore):
+        with pytest.raises(DamagedKeystoreError):
             check((tmp_path / "x.p7s").read_bytes())
     else:
         assert check((tmp_path / "x.p7s").read_bytes()) == DOCUMENT
@@ -99,24 +99,24 @@ def test_any_document_comes_back_unchanged(lines: list[str]) -> None:
 
 @pytest.mark.parametrize("document", [b"a\rb", b"a\0b", b"\r"])
 def test_bytes_that_verifiers_read_differently_are_not_signed(document: bytes) -> None:
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInputError):
         sign(document)
 
 
 def test_changed_content_is_refused() -> None:
-    with pytest.raises(DamagedKeystore, match="changed after signing"):
+    with pytest.raises(DamagedKeystoreError, match="changed after signing"):
         check(sign(DOCUMENT).replace(b"</dds>", b"</ddx>"))
 
 
 def test_a_changed_signature_is_refused() -> None:
     signed = smime.read(sign(DOCUMENT), "x")
     broken = signed._replace(pkcs7=signed.pkcs7[:-1] + bytes([signed.pkcs7[-1] ^ 1]))
-    with pytest.raises(DamagedKeystore):
+    with pytest.raises(DamagedKeystoreError):
         smime.check(broken, [CA.facts], "x")
 
 
 def test_another_ca_is_refused() -> None:
-    with pytest.raises(DamagedKeystore, match="not the permissions CA"):
+    with pytest.raises(DamagedKeystoreError, match="not the permissions CA"):
         check(sign(DOCUMENT, OTHER))
 
 
@@ -126,14 +126,14 @@ def test_a_certificate_below_the_ca_is_refused() -> None:
     enclave = Authority(
         certificate.read_pem(made.cert), FileSigner(load_private_key(made.key or b"", None, "key"))
     )
-    with pytest.raises(DamagedKeystore, match="not the permissions CA"):
+    with pytest.raises(DamagedKeystoreError, match="not the permissions CA"):
         check(sign(DOCUMENT, enclave))
 
 
 def test_a_forger_with_the_cas_name_and_serial_is_refused() -> None:
     """Issuer and serial alone prove nothing: the signature must be by the CA's key."""
     forged = smime.sign(DOCUMENT, CA.facts, OTHER.signer, NOW)
-    with pytest.raises(DamagedKeystore, match="not by the permissions CA"):
+    with pytest.raises(DamagedKeystoreError, match="not by the permissions CA"):
         check(forged)
 
 
@@ -141,7 +141,7 @@ def test_a_forger_with_the_cas_name_and_serial_is_refused() -> None:
     "p7s", [b"", b"x", b"\0" * 50, DOCUMENT, b'Content-Type: multipart/signed; boundary=""\n\n']
 )
 def test_what_is_no_smime_is_refused(p7s: bytes) -> None:
-    with pytest.raises(DamagedKeystore):
+    with pytest.raises(DamagedKeystoreError):
         check(p7s)
 
 
@@ -151,5 +151,5 @@ def test_damage_is_refused_or_harmless(position: int, damage: bytes) -> None:
     whole = sign(DOCUMENT)
     try:
         assert check(whole[:position] + damage + whole[position + len(damage) :]) == DOCUMENT
-    except DamagedKeystore:
+    except DamagedKeystoreError:
         return

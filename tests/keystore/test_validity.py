@@ -6,7 +6,7 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
-from keystore.errors import InvalidInput
+from keystore.errors import InvalidInputError
 from keystore.formats.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_moment
 from tests.keystore.kit import DAY, NOW
 
@@ -18,7 +18,7 @@ def test_the_default_is_sros2s_day_of_back_dating() -> None:
 
 def test_less_than_14_hours_of_back_dating_would_stop_fast_dds_west_of_utc() -> None:
     assert Validity.starting(NOW, DAY, backdate=timedelta(hours=14)).not_before == NOW - timedelta(hours=14)
-    with pytest.raises(InvalidInput, match="14 h"):
+    with pytest.raises(InvalidInputError, match="14 h"):
         Validity.starting(NOW, DAY, backdate=timedelta(hours=13))
 
 
@@ -38,9 +38,9 @@ def test_seconds_are_whole_and_zones_become_utc() -> None:
 
 
 def test_ends_before_it_begins() -> None:
-    with pytest.raises(InvalidInput, match="before it begins"):
+    with pytest.raises(InvalidInputError, match="before it begins"):
         Validity(NOW, NOW - DAY)
-    with pytest.raises(InvalidInput, match="already have ended"):
+    with pytest.raises(InvalidInputError, match="already have ended"):
         Validity.starting(NOW, until=NOW - DAY)
 
 
@@ -54,7 +54,7 @@ def test_durations(text: str, expected: timedelta) -> None:
 
 @pytest.mark.parametrize("text", ["", "90", "d", "-1d", "1.5d", "99999999d", "1d2h", "²d"])
 def test_no_durations(text: str) -> None:
-    with pytest.raises(InvalidInput):
+    with pytest.raises(InvalidInputError):
         parse_duration(text)
 
 
@@ -63,5 +63,5 @@ def test_iso_dates_are_utc_unless_they_say_otherwise() -> None:
     assert iso(parse_moment("2030-12-31T10:00:00+02:00")) == "2030-12-31T08:00:00Z"
     assert iso(parse_end("2035-01-01", NOW)) == "2035-01-01T00:00:00Z"
     assert parse_end("1d", NOW) == NOW + DAY
-    with pytest.raises(InvalidInput, match="ISO date"):
+    with pytest.raises(InvalidInputError, match="ISO date"):
         parse_moment("next year")

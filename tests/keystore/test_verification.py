@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from keystore.disk.view import KeystoreView
-from keystore.errors import NotAKeystore
+from keystore.errors import NotAKeystoreError
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document
 from keystore.formats.role import Role
@@ -178,5 +178,5 @@ def test_names_of_strays_cannot_speak_to_the_terminal(
 
 def test_nothing_to_check(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "nowhere"):
-        with pytest.raises(NotAKeystore):
+        with pytest.raises(NotAKeystoreError):
             verify(path)
