@@ -166,7 +166,7 @@ def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
 
 
 def given_up(root: Path, owner: str) -> list[EnclaveShare]:
-    """The shares of ``owner``, to be dropped. Raises InvalidInputError when it has none, or while somebody uses them."""
+    """The shares of ``owner``, to be dropped. Raises InvalidInputError for none, or while somebody uses them."""
     mine = [
         EnclaveShare(root, enclave, owner, None)
         for enclave in enclaves_with_shares(root)
