@@ -44,6 +44,7 @@ from nodl.infer.cpp.objects import (
     nodes_in,
 )
 from nodl.infer.cpp.standard import CASTS, CONTAINER_METHODS, STANDARD, container_call, is_standard
+from nodl.infer.cpp.store import Changes
 from nodl.infer.cpp.syntax import children, text, unwrapped
 from nodl.infer.cpp.values import (
     BOTTOM,
@@ -607,11 +608,30 @@ def invoke(
     run.active.append(function)
     bind_parameters(run, function, values, inner)
     outcome = run.execute(function.body, inner) if function.body is not None else NEXT
+    if function.name in HOOKS:
+        inner.exits = _successes(inner)
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
     _write_back(run, function, inner, node, frame)
     inner.finished = not inner.captured
     return inner.returned
+
+
+# Transitions of a lifecycle node (rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp).
+HOOKS = ("on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown", "on_error")
+
+
+def _successes(inner: Frame) -> list[Changes]:
+    """A transition that fails leaves the node where nothing else runs."""
+    kept = [
+        changes
+        for changes, value in zip(inner.exits, inner.exit_values, strict=True)
+        if not value or not all(_FAILED.search(str(getattr(a, "why", getattr(a, "name", "")))) for a in value)
+    ]
+    return kept or inner.exits
+
+
+_FAILED = re.compile(r"::(?:FAILURE|ERROR)$")
 
 
 def _class_bindings(run: Machine, function: Function, this_object: Obj) -> dict[str, Type]:

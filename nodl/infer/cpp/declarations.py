@@ -79,6 +79,7 @@ class Class:
     methods: dict[str, list[Function]] = field(default_factory=dict)
     declared: dict[str, list[Function]] = field(default_factory=dict)  # without body: defaults and virtual
     inherits_constructors: bool = False
+    template_defaults: dict[str, str] = field(default_factory=dict)
 
     @property
     def line(self) -> int:
@@ -135,6 +136,7 @@ def index_file(source: Preprocessed) -> FileIndex:
 class _Collector:
     def __init__(self, index: FileIndex):
         self.index = index
+        self.defaults: dict[str, str] = {}  # of the template parameters that were just read
 
     def collect(self, node: Node, scope: Scope, templates: list[str], cls: Class | None = None) -> None:
         for child in node.named_children:
@@ -155,6 +157,7 @@ class _Collector:
             self.function(child, scope, templates, cls)
         elif kind == "template_declaration":
             names = _template_names(child.child_by_field_name("parameters"))
+            self.defaults = _template_defaults(child.child_by_field_name("parameters"))
             for inner_node in child.named_children[1:]:
                 self.one(inner_node, scope, [*templates, *names], cls)
         elif kind in (
@@ -188,6 +191,7 @@ class _Collector:
         made = Class(
             name, "::".join((*scope, *(steps or [name]))), self.index, node, inner, templates=templates
         )
+        made.template_defaults, self.defaults = (self.defaults if templates else {}), {}
         for child in node.named_children:
             if child.type == "base_class_clause":
                 made.bases = [
@@ -337,6 +341,16 @@ def _template_names(node: Node | None) -> list[str]:
         else:
             names.append("")
     return names
+
+
+def _template_defaults(node: Node | None) -> dict[str, str]:
+    found = {}
+    for child in children(node):
+        default = child.child_by_field_name("default_type")
+        name = child.child_by_field_name("name")
+        if default is not None and name is not None:
+            found[text(name)] = text(default)
+    return found
 
 
 def _function_declarator(node: Node) -> Node | None:

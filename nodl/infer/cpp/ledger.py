@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.declarations import Class, Field, FileIndex, Function
+from nodl.infer.cpp.names import POINTER_MEMBERS
 from nodl.infer.cpp.syntax import text
 from nodl.source_ref import SourceRef
 
@@ -233,8 +234,9 @@ class Reach:
             self.waiting += self.by_name.get(word, ())
             if word in self.run.names.classes:
                 self._use(word)
-            for _, _, target, _ in self.run.names.aliases.get(word, ()):
-                self._mention(_WORD.findall(target))
+            if word not in POINTER_MEMBERS:  # a pointer makes nothing of what it points to
+                for _, _, target, _ in self.run.names.aliases.get(word, ()):
+                    self._mention(_WORD.findall(target))
 
     def _use(self, name: str) -> None:
         if name not in self.used:

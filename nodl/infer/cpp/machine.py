@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
 MAX_DEPTH = 60
-MAX_STEPS = 1_500_000
+MAX_STEPS = 800_000
 MAX_RECURSION = 2
 
 StatementHandler = Callable[["Machine", "Node", "Frame"], int]
@@ -98,6 +98,7 @@ class Frame:
     names: set[str] = field(default_factory=set)
     returned: Value = BOTTOM
     exits: list[Changes] = field(default_factory=list)
+    exit_values: list[Value] = field(default_factory=list)
     mark: int = 0
     loops: list[Loop] = field(default_factory=list)
     depth: int = 0
@@ -130,7 +131,7 @@ class Machine:
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.objects: dict[object, Obj] = {}
         self.records: dict[object, NodeRecord] = {}
-        self.callbacks: dict[object, tuple[Atom, Frame]] = {}
+        self.callbacks: dict[tuple[object, object], tuple[Atom, Frame]] = {}
         self.ran: dict[str, set[int]] = {}  # file -> first bytes of what was run
         self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
         self.called: set[Function] = set()

@@ -15,7 +15,7 @@ _WRAPPERS = frozenset({
     "std::reference_wrapper",
     "std::atomic", "tl::optional", "boost::optional",
 })  # fmt: skip
-_POINTER_MEMBERS = frozenset({
+POINTER_MEMBERS = frozenset({
     "SharedPtr", "UniquePtr", "WeakPtr", "ConstSharedPtr", "ConstUniquePtr", "ConstWeakPtr", "Ptr", "ConstPtr",
     "SharedPtrConst",
 })  # fmt: skip
@@ -315,8 +315,8 @@ class Names:
         """The class that pluginlib makes for a lookup name."""
         return self.plugins.get(name)
 
-    def plugin_type(self, name: str) -> Type:
-        return Type(name.replace("/", "::"))
+    def plugin_type(self, name: str, file: FileIndex) -> Type:
+        return self.resolve(name.replace("/", "::"), (), file)
 
     # --- types ------------------------------------------------------------------------------------------
 
@@ -386,7 +386,7 @@ class Names:
         if cls is not None:
             return Type(cls.qualified, arguments, pointer)
         head, separator, last = name.rpartition("::")
-        if separator and last in _POINTER_MEMBERS:
+        if separator and last in POINTER_MEMBERS:
             inner = self.resolve(head, scope, file, bindings, depth + 1)
             return inner._replace(pointer=True)
         if separator:
@@ -418,7 +418,7 @@ class Names:
 
     def _member(self, outer: Type, rest: str, pointer: bool, scope: Scope, file: FileIndex) -> Type:
         """A type named inside of another: ``Foo<T>::SharedPtr``, ``ActionT::Goal``."""
-        if rest in _POINTER_MEMBERS:
+        if rest in POINTER_MEMBERS:
             return outer._replace(pointer=True)
         cls = self.find_class(outer.name, scope, file)
         if cls is not None:

@@ -246,6 +246,8 @@ def construct_class(
 ) -> None:
     """Run the constructor of ``cls`` (a base or the class itself) on ``this``."""
     bindings = dict(zip(cls.templates, kind.arguments, strict=False))
+    for name, default in cls.template_defaults.items():
+        bindings.setdefault(name, run.names.resolve(default, cls.scope, cls.file))
     this.bindings[cls] = bindings
     constructor = chosen(
         run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments

@@ -7,10 +7,10 @@ symbol that is not known keeps its directives; those lines are remembered as ``u
 
 from __future__ import annotations
 
-import itertools
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 from nodl.infer.cpp.macros import Macro, decided, expanded
 
@@ -90,7 +90,7 @@ class _Pass:
 
     def run(self, source: str) -> Preprocessed:
         lines = _without_comments(source).split("\n")
-        self.guard = _guard_of(lines)
+        self.guards = _guards_of(lines)
         out: list[str] = []
         index = 0
         while index < len(lines):
@@ -134,7 +134,7 @@ class _Pass:
         condition = {"ifdef": f"defined({rest})", "ifndef": f"!defined({rest})"}.get(word, rest)
         state: bool | None = False
         if parent:
-            state = True if rest == self.guard else self._decide(condition)
+            state = True if word == "ifndef" and rest in self.guards else self._decide(condition)
         written = parent and state is None
         self.stack.append(_Conditional(number, parent, state is True, state, written, condition, number))
         return f"#if {_symbol(condition)}" if written else ""
@@ -200,7 +200,7 @@ class _Pass:
 
     def _tidied(self, source: str) -> str:
         """Macros expanded; what only the compiler and linker read, such as export macros, blanked."""
-        source = expanded(source, {n: m for n, m in self.macros.items() if n != self.guard})
+        source = expanded(source, {n: m for n, m in self.macros.items() if n not in self.guards})
         source = _EXPORT.sub(_blank, source)
         source = _ATTRIBUTE.sub(_blank, source)
         source = _DISAMBIGUATOR.sub(_blank, source)
@@ -256,14 +256,11 @@ def _without_comments(source: str) -> str:
     return _TOKENS.sub(kept, source.replace("\r\n", "\n"))
 
 
-def _guard_of(lines: list[str]) -> str:
-    words = [line.split() for line in lines if line.lstrip().startswith("#")][:3]
-    for first, second in itertools.pairwise(words):
-        if (
-            first[0] == "#ifndef"
-            and second[0] == "#define"
-            and first[1:2] == second[1:2]
-            and len(second) == 2
-        ):
-            return first[1]
-    return ""
+def _guards_of(lines: list[str]) -> frozenset[str]:
+    """Symbols that guard against a second inclusion: ``#ifndef X`` and, with nothing between, ``#define X``."""
+    words = [line.split() for line in lines if line.strip()]
+    return frozenset(
+        first[1]
+        for first, second in pairwise(words)
+        if len(first) == 2 == len(second) and first[0] == "#ifndef" and second == ["#define", first[1]]
+    )

@@ -10,11 +10,12 @@ from dataclasses import dataclass, field
 import nodl.infer.cpp.calls
 import nodl.infer.cpp.models
 import nodl.infer.cpp.statements  # noqa: F401  (registers how statements run)
+from nodl.infer.cpp.calls import HOOKS
 from nodl.infer.cpp.cmake import Target
 from nodl.infer.cpp.declarations import Class, FileIndex, Function, index_file
 from nodl.infer.cpp.findings import NodeRecord
 from nodl.infer.cpp.ledger import CREATES, Answer, account
-from nodl.infer.cpp.machine import BudgetExceeded, Frame, Machine, Settings
+from nodl.infer.cpp.machine import NEXT, BudgetExceeded, Frame, Machine, Settings
 from nodl.infer.cpp.names import KNOWN_HEADERS, Names, Type
 from nodl.infer.cpp.objects import construct
 from nodl.infer.cpp.preprocess import Preprocessed, preprocess
@@ -261,43 +262,48 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
 
 
 def _callbacks(run: Machine) -> None:
-    """What the outside may call, in any order and any number of times, until nothing changes."""
-    done: dict[object, int] = {}
+    """What the outside may call, in any order and any number of times, until nothing changes.
+
+    A lifecycle node is configured, then activated, before anything else that its transitions have prepared.
+    """
+    _round(run)
+    for name in HOOKS[:2]:
+        _overrides(run)
+        for atom, frame in [c for (what, _), c in run.callbacks.items() if getattr(what, "name", "") == name]:
+            _call_back(run, atom, frame, certainly=True)
     for _ in range(MAX_ROUNDS):
         before = len(run.callbacks), run.version()
         _overrides(run)
-        for key in list(run.callbacks):
-            atom, frame = run.callbacks[key]
-            done[key] = done.get(key, 0) + 1
-            if done[key] <= MAX_ROUNDS:
-                _call_back(run, atom, frame)
+        _round(run)
         if (len(run.callbacks), run.version()) == before:
             return
 
 
-def _call_back(run: Machine, atom: object, frame: Frame) -> None:
+def _round(run: Machine) -> None:
+    for atom, frame in list(run.callbacks.values()):
+        _call_back(run, atom, frame)
+
+
+def _call_back(run: Machine, atom: object, frame: Frame, certainly: bool = False) -> None:
     from nodl.infer.cpp.calls import call_lambda, invoke
 
     if isinstance(atom, Lambda):
         if run.subtree_matters(atom.node):
             run.branches([lambda: _one(call_lambda(run, atom, [], atom.node, atom.frame)), lambda: 1])
-    elif isinstance(atom, Bound) and run.makes_interfaces(atom.function):
+    elif isinstance(atom, Bound) and (certainly or run.makes_interfaces(atom.function)):
         given = [unknown(f"the argument {p.name}") for p in atom.function.parameters]
-        run.branches(
-            [
-                lambda: _one(invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())),
-                lambda: 1,
-            ]
-        )
+
+        def go() -> int:
+            invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())
+            return NEXT
+
+        run.branches([go] if certainly else [go, lambda: NEXT])
     elif isinstance(atom, Bound):
         run.called.add(atom.function)
 
 
 def _one(value: Value) -> int:
     return 1
-
-
-_HOOKS = frozenset({"on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown", "on_error"})
 
 
 def _overrides(run: Machine) -> None:
@@ -308,7 +314,7 @@ def _overrides(run: Machine) -> None:
         for cls in run.names.ancestry(obj.cls):
             for name, methods in run.names.methods.get(cls, {}).items():
                 for method in methods:
-                    if (method.virtual or name in _HOOKS) and method in run.names.find_methods(obj.cls, name):
+                    if (method.virtual or name in HOOKS) and method in run.names.find_methods(obj.cls, name):
                         run.callbacks.setdefault(
                             (method, obj), (Bound(method, obj), Frame(method.file, method.scope, None, obj))
                         )

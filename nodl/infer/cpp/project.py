@@ -9,6 +9,7 @@ import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from html import unescape
 from pathlib import Path
 
 from nodl.infer.cpp.cmake import Build, Target, read_build
@@ -172,7 +173,7 @@ def plugin_classes(file: str) -> list[PluginClass]:
     """The classes of a plugin description file; none when it cannot be read."""
     found = []
     for match in _CLASS.finditer(re.sub(r"<!--(?:.|\n)*?-->", "", _read(file))):
-        values = {m[1]: m[2] if m[2] is not None else m[3] for m in _ATTRIBUTE.finditer(match[1])}
+        values = {m[1]: unescape(m[2] if m[2] is not None else m[3]) for m in _ATTRIBUTE.finditer(match[1])}
         if "type" in values:
             name = values.get("name") or values["type"]
             found.append(

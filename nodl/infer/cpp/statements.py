@@ -68,8 +68,11 @@ _ENDS = frozenset({"exit", "std::exit", "abort", "std::abort", "_exit", "std::te
 
 @statement("return_statement", "co_return_statement")
 def return_statement(run: Machine, node: Node, frame: Frame) -> int:
+    value = BOTTOM
     for child in children(node):
-        frame.returned = join(frame.returned, run.evaluate(child, frame))
+        value = run.evaluate(child, frame)
+    frame.returned = join(frame.returned, value)
+    frame.exit_values.append(value)
     frame.exits.append(run.store.changes(frame.mark))
     return RETURN
 

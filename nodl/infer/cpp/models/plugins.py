@@ -13,7 +13,7 @@ from nodl.infer.cpp.machine import Frame, Machine
 from nodl.infer.cpp.models.parameters import parameter_names
 from nodl.infer.cpp.names import Type
 from nodl.infer.cpp.objects import construct
-from nodl.infer.cpp.values import BOTTOM, Obj, Value, join, unknown
+from nodl.infer.cpp.values import BOTTOM, Obj, Param, Value, join, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -31,8 +31,10 @@ def _instance(run: Machine, call: Call) -> Value:
     loader = call.receiver
     base = loader.type.arguments[0] if loader is not None and loader.type.arguments else Type("")
     found: list[Value] = []
-    for name in parameter_names(run, call.value(0)):
-        if name is None:
+    for name, atom in zip(parameter_names(run, call.value(0)), call.value(0), strict=True):
+        if name == "" and not (run.settings.start is None and isinstance(atom, Param)):
+            continue  # pluginlib throws
+        if not name:
             run.gap(
                 call.node,
                 call.frame,
@@ -45,7 +47,7 @@ def _instance(run: Machine, call: Call) -> Value:
 
 def _made(run: Machine, name: str, base: Type, call: Call) -> Value:
     entry = run.names.plugin(name)
-    kind = run.names.plugin_type(entry or name)
+    kind = run.names.plugin_type(entry or name, call.frame.file)
     cls = run.names.class_of(kind, (), call.frame.file)
     run.plugins_used.setdefault(entry or name)
     if cls is None:
@@ -55,7 +57,7 @@ def _made(run: Machine, name: str, base: Type, call: Call) -> Value:
             f"the source of plugin {name} ({base}) is not in reach; it may make interfaces",
         )
         return unknown(f"the plugin {name}")
-    return construct(run, Type(cls.qualified), [], call.node, call.frame, heap=True)
+    return construct(run, kind, [], call.node, call.frame, heap=True)
 
 
 @library_method(
