@@ -596,6 +596,8 @@ def invoke(
         if function.parameters and run.makes_interfaces(function):
             run.gap(node, frame, f"{function} calls itself, deeper than is followed")
         return unknown("a recursion")
+    if function.only_computes and not run.makes_interfaces(function):
+        return unknown(f"the result of {function.name}()")
     inner = Frame(
         function.file, function.scope, function, this_object, bindings or {},
         path=(*frame.path[-24:], (frame.file.file, node.start_byte)),

@@ -16,6 +16,11 @@ _LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
 Scope = tuple[str, ...]  # namespaces and classes around a declaration
 
 
+_NUMBERS = frozenset({
+    "bool", "int", "double", "float", "size_t", "unsigned", "unsigned int", "std::size_t", "unsigned char",
+})  # fmt: skip
+
+
 @dataclass(eq=False, slots=True)
 class Parameter:
     name: str
@@ -47,6 +52,16 @@ class Function:
         if self._words is None:
             self._words = frozenset(re.findall(r"[A-Za-z_]\w*", _LITERAL.sub("", text(self.node))))
         return self._words
+
+    @property
+    def only_computes(self) -> bool:
+        """A number or condition from values that it cannot change, in more than a few lines."""
+        declarator = _function_declarator(self.node)
+        if declarator is None or self.body is None or self.body.end_byte - self.body.start_byte < 300:
+            return False
+        constant = any(text(child) == "const" for child in declarator.named_children)
+        changes = any(p.type.rstrip().endswith(("&", "*")) and "const" not in p.type for p in self.parameters)
+        return _type_text(self.node) in _NUMBERS and not changes and (constant or not self.owner)
 
     @property
     def line(self) -> int:
