@@ -21,6 +21,7 @@ from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
 from enclave_launch.runtime.companion import LaunchCompanion
+from enclave_launch.runtime.environment_watch import EnvironmentWatch, Unplanned, Watched
 from enclave_launch.runtime.gate import EnclaveGate, Grant
 from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.live_process import LiveProcess
@@ -71,6 +72,10 @@ class LiveHost(BaseHost):
         self._parameter_directory: Path | None = None
         self._parameter_files: dict[str, str] = {}
         self._tasks: set[asyncio.Task[None]] = set()
+        self._planned: dict[str, Mapping[str, str]] = {}  # security variables by process name
+        self._watch = EnvironmentWatch(self._watched, self._on_unplanned)
+        if gate is not None:
+            self._tasks.add(self._loop.create_task(self._watch.run(), name="environment watch"))
         self.processes: list[LiveProcess] = []
         self.failed: list[str] = []  # names of processes that ended badly on their own
 
@@ -199,6 +204,8 @@ class LiveHost(BaseHost):
         self, process: ResolvedProcess, base: Mapping[str, str], emulate_tty: bool
     ) -> ProcessSpec:
         grant = await self._granted(process)
+        self._planned[process.process_name] = grant.environment
+        self._watch.process_started()
         environment = {name: value for name, value in base.items() if name not in self._secrets}
         spec = ProcessSpec(
             cmd=(*process.cmd, *grant.arguments),
@@ -208,6 +215,15 @@ class LiveHost(BaseHost):
             emulate_tty=emulate_tty,
         )
         return self._companion.prepared(process, spec) if self._companion is not None else spec
+
+    def _watched(self) -> list[Watched]:
+        """What runs, with the variables that its enclave needs."""
+        running = ((live.process.process_name, live.pid) for live in self.processes)
+        return [Watched(name, pid, self._planned.get(name, {})) for name, pid in running if pid is not None]
+
+    def _on_unplanned(self, found: Unplanned) -> None:
+        self.failed.append(found.watched.name)
+        self._log.log("ERROR", found.watched.name, str(found))
 
     async def _granted(self, process: ResolvedProcess) -> Grant:
         if self._gate is None:

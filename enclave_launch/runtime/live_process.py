@@ -86,6 +86,12 @@ class LiveProcess:
             self._say("INFO", f"process details: cmd='{command}', cwd='{self.process.cwd}', custom_env?=True")
         return await self._supervised.run()
 
+    @property
+    def pid(self) -> int | None:
+        """Of the incarnation that runs."""
+        child = self._supervised.child
+        return child.pid if child is not None and child.running else None
+
     def interrupt_again(self) -> None:
         """The user pressed Ctrl-C once more; a terminal would have passed that on."""
         self._supervised.signal(Signals.SIGINT, quiet=True)

@@ -1,0 +1,143 @@
+"""Looks at the environment of what really runs, from /proc, and ends what is not what was planned.
+
+A program between us and a node (a prefix that was vouched for, a shell, a script's ``#!/usr/bin/env -S -u``) may drop
+the variables that lead to the enclave; the node would then join unsecured. So some time after each start, and every
+now and then, the process itself must have the variables it was given, and so must each of its descendants that has
+loaded a ROS middleware or a DDS. Where /proc does not show an environment (another user, no /proc) nothing is said.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import re
+import signal
+from collections.abc import Callable, Iterator, Mapping
+from typing import NamedTuple
+
+from enclave_launch.boundary.files import read_bytes
+
+FIRST_LOOK = 0.25  # seconds after a start; then ever rarer
+RAREST_LOOK = 15.0
+_SPEAKS_DDS = re.compile(rb"/lib(rcl|rmw|ddsc|fastrtps|fastdds|nddsc|zenoh)[-_.\w]*\.so")
+_VARIABLE = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*=")
+
+
+class Watched(NamedTuple):
+    """A running process of the launch and the variables that were planned for it."""
+
+    name: str
+    pid: int
+    planned: Mapping[str, str]
+
+
+class Unplanned(NamedTuple):
+    """``pid`` is the process itself or a descendant of it."""
+
+    watched: Watched
+    pid: int
+    why: str
+
+    def __str__(self) -> str:
+        who = "" if self.pid == self.watched.pid else f" (its descendant with pid {self.pid})"
+        return (
+            f"{self.watched.name}{who} does not run with the environment that was planned: {self.why}; it was ended, "
+            "since it would not be secured. What stands between launch and the program changes it"
+        )
+
+
+def unplanned(watched: Watched, children: Mapping[int, list[int]]) -> Iterator[Unplanned]:
+    """What of one process and its descendants has other variables. ``children``: by the pid of the parent."""
+    for pid in (watched.pid, *_descendants(watched.pid, children)):
+        if pid == watched.pid or _speaks_dds(pid):
+            environment = environment_of(pid)
+            why = None if environment is None else _difference(environment, watched.planned)
+            if why is not None:
+                yield Unplanned(watched, pid, why)
+
+
+def environment_of(pid: int) -> dict[str, str] | None:
+    """As the program was started with it; None where that cannot be told: the process has ended, belongs to somebody
+    else, or has written over it (as those do that change their title)."""
+    try:
+        entries = [entry for entry in read_bytes(f"/proc/{pid}/environ").split(b"\0") if entry]
+    except OSError:
+        return None
+    if not all(_VARIABLE.match(entry) for entry in entries):
+        return None
+    pairs = (os.fsdecode(entry).partition("=") for entry in entries)
+    return {name: value for name, _, value in pairs}
+
+
+def children_by_parent() -> dict[int, list[int]]:
+    """All processes of this system that can be seen; empty without /proc."""
+    children: dict[int, list[int]] = {}
+    with contextlib.suppress(OSError):
+        for entry in os.listdir("/proc"):
+            if entry.isdigit():
+                with contextlib.suppress(OSError):
+                    # "pid (name) state ppid": the name may hold spaces and parentheses
+                    fields = read_bytes(f"/proc/{entry}/stat").rpartition(b")")[2].split()
+                    children.setdefault(int(fields[1]), []).append(int(entry))
+    return children
+
+
+class EnvironmentWatch:
+    """``running`` gives the processes of this moment; ``ended`` is told of each that had to be killed."""
+
+    def __init__(self, running: Callable[[], list[Watched]], ended: Callable[[Unplanned], None]) -> None:
+        self._running = running
+        self._ended = ended
+        self._started = asyncio.Event()
+
+    def process_started(self) -> None:
+        """Look soon."""
+        self._started.set()
+
+    async def run(self) -> None:
+        """Until cancelled."""
+        pause = RAREST_LOOK
+        while True:
+            with contextlib.suppress(asyncio.TimeoutError):
+                await asyncio.wait_for(self._started.wait(), pause)
+                self._started.clear()
+                pause = FIRST_LOOK
+                await asyncio.sleep(pause)
+            self.look()
+            pause = min(2 * pause, RAREST_LOOK)
+
+    def look(self) -> None:
+        watched = self._running()
+        if not watched:
+            return
+        children = children_by_parent()
+        for process in watched:
+            for found in unplanned(process, children):
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.kill(found.pid, signal.SIGKILL)
+                    self._ended(found)
+
+
+def _descendants(root: int, children: Mapping[int, list[int]]) -> Iterator[int]:
+    waiting = list(children.get(root, ()))
+    while waiting:
+        pid = waiting.pop()
+        yield pid
+        waiting.extend(children.get(pid, ()))
+
+
+def _speaks_dds(pid: int) -> bool:
+    try:
+        return _SPEAKS_DDS.search(read_bytes(f"/proc/{pid}/maps")) is not None
+    except OSError:
+        return False
+
+
+def _difference(environment: Mapping[str, str], planned: Mapping[str, str]) -> str | None:
+    for name, value in planned.items():
+        if name not in environment:
+            return f"{name} is not set"
+        if environment[name] != value:
+            return f"{name} is {environment[name]!r}, not {value!r}"
+    return None
