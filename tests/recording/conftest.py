@@ -12,9 +12,9 @@ import pytest
 from enclave_launch.recording.build import recorder_library
 from enclave_launch.recording.environment import RECORD_VARIABLE
 from nodl.record.assembly import Record, read_record
+from tests.recording.stand_in_launch import build_stand_in
 
 ROOT = Path(__file__).parent.parent.parent
-STAND_IN = Path(__file__).parent / "stand_in"
 
 
 @pytest.fixture(scope="session")
@@ -24,22 +24,7 @@ def recorder() -> Path:
 
 @pytest.fixture(scope="session")
 def stand_in(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with the stand-in's libraries and ``program``, as they would lie in an installation."""
-    folder = tmp_path_factory.mktemp("stand_in")
-    flags = ["-g", "-fPIC", f"-L{folder}", f"-Wl,-rpath,{folder}", "-Wl,--no-as-needed"]
-
-    def build(name: str, source: str, *more: str) -> None:
-        command = ["cc", *flags[:2], str(STAND_IN / source), "-o", str(folder / name), *flags[2:], *more]
-        subprocess.run(command, check=True)
-
-    build("librcutils.so", "rcl.c", "-shared", "-DPART=1")
-    build("librcl.so", "rcl.c", "-shared", "-DPART=2", "-lrcutils")
-    build("librcl_action.so", "rcl.c", "-shared", "-DPART=3", "-lrcl", "-lrcutils")
-    build("librcl_lifecycle.so", "rcl.c", "-shared", "-DPART=4", "-lrcl", "-lrcutils")
-    libraries = ("-lrcl", "-lrcl_action", "-lrcl_lifecycle", "-lrcutils")
-    build("librclcpp.so", "rclcpp.c", "-shared", "-pthread", *libraries)
-    build("program", "program.c", "-lrclcpp")
-    return folder
+    return build_stand_in(tmp_path_factory.mktemp("stand_in"))
 
 
 class Recorded:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 ROOT = Path(__file__).parent.parent.parent
+SOURCES = Path(__file__).parent / "stand_in"
 PACKAGE = "stand_in_nodes"
 QOS = "qos: {history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
 LISTS = {
@@ -61,6 +62,24 @@ class Workspace(NamedTuple):
             check=False,
             timeout=timeout,
         )
+
+
+def build_stand_in(folder: Path) -> Path:
+    """``folder`` with the stand-in's libraries and ``program``, as they would lie in an installation."""
+    link = [f"-L{folder}", f"-Wl,-rpath,{folder}", "-Wl,--no-as-needed"]
+
+    def build(name: str, source: str, *more: str) -> None:
+        command = ["cc", "-g", "-fPIC", str(SOURCES / source), "-o", str(folder / name), *link, *more]
+        subprocess.run(command, check=True)
+
+    build("librcutils.so", "rcl.c", "-shared", "-DPART=1")
+    build("librcl.so", "rcl.c", "-shared", "-DPART=2", "-lrcutils")
+    build("librcl_action.so", "rcl.c", "-shared", "-DPART=3", "-lrcl", "-lrcutils")
+    build("librcl_lifecycle.so", "rcl.c", "-shared", "-DPART=4", "-lrcl", "-lrcutils")
+    libraries = ("-lrcl", "-lrcl_action", "-lrcl_lifecycle", "-lrcutils")
+    build("librclcpp.so", "rclcpp.c", "-shared", "-pthread", *libraries)
+    build("program", "program.c", "-lrclcpp")
+    return folder
 
 
 def asks(endpoints: Iterable[tuple[str, str]]) -> str:
