@@ -11,12 +11,11 @@ import re
 import time
 from collections import deque
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Grants, Need
-from enclave_launch.recording.patches import Patch, manifest_patch, policy_patch
 from enclave_launch.recording.reasons import Cause, cause_of
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchControl
@@ -24,6 +23,9 @@ from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
 from nodl.record.asked import REFUSED, Asked, Role, asked_endpoint, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade
+
+if TYPE_CHECKING:
+    from enclave_launch.recording.patches import Patch
 
 _PATIENCE = 0.3
 """Seconds to wait for what a middleware prints about a participant that was not made: it goes another way."""
@@ -164,6 +166,11 @@ def _name(process: RecordedProcess) -> str:
 
 def _patch(need: Need, asked: Asked, described: Description) -> Patch:
     """In the node's manifest where it is a file that can be read, else in a policy file."""
+    from enclave_launch.recording.patches import (  # not before something is refused
+        manifest_patch,
+        policy_patch,
+    )
+
     source = described.node.interface.source if described.node is not None else None
     if source is not None and _MANIFEST.search(source.file):
         try:

@@ -11,6 +11,7 @@ import shutil
 import stat
 import struct
 from collections.abc import Iterator, Sequence
+from functools import lru_cache
 from typing import BinaryIO, NamedTuple
 
 _LOAD, _DYNAMIC, _INTERPRETER = 1, 2, 3  # p_type
@@ -47,7 +48,14 @@ def _programs(words: Sequence[str], search_path: str) -> Iterator[Program]:
         elif place == 0 or os.path.isabs(word):
             path = shutil.which(word, path=search_path)
             if path is not None:
-                yield look_at_program(path)
+                status = os.stat(path)
+                yield _looked_at(path, (status.st_ino, status.st_ctime_ns))
+
+
+@lru_cache(maxsize=1024)
+def _looked_at(path: str, state: tuple[int, int]) -> Program:
+    """Launches start one program many times; ``state`` changes with the file."""
+    return look_at_program(path)
 
 
 def look_at_program(path: str, depth: int = 0) -> Program:
