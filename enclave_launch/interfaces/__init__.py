@@ -149,9 +149,12 @@ class InterfaceFinder:
 
 
 def _complete(interface: NodeInterface) -> bool:
-    """Whether an analysis answered everything: no gap, and no name with an unknown part."""
-    parts = (part for endpoint in interface.endpoints for part in endpoint.name.parts)
-    return not interface.gaps and not any(isinstance(part, UnknownPart) for part in parts)
+    """Whether an analysis answered everything: no gap, and no name that is unknown in part or empty."""
+    return not interface.gaps and all(
+        endpoint.name.parts
+        and not any(part == "" or isinstance(part, UnknownPart) for part in endpoint.name.parts)
+        for endpoint in interface.endpoints
+    )
 
 
 def _executable_name(process: ResolvedProcess) -> str:

@@ -1,0 +1,220 @@
+"""Nodes of the library that ships with us, in launch files as users write them: granted beside what is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.flow import resolve
+from enclave_launch.options import ResolveOptions
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.report.plan_json import allowed_names
+
+Launch = Callable[..., LaunchPlan]
+
+
+@pytest.fixture
+def launch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Launch:
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+
+    def plan(text: str, distro: str = "jazzy") -> LaunchPlan:
+        file = tmp_path / "t.launch.xml"
+        file.write_text(f"<launch>{text}</launch>")
+        return resolve(file, options=ResolveOptions(distro=distro, allow_missing_packages=True))
+
+    return plan
+
+
+def allowed(plan: LaunchPlan, kind: str) -> list[str]:
+    return sorted(
+        name
+        for enclave in plan.derived.policy.enclaves
+        for name in allowed_names(enclave)[kind]
+        if (kind, name) not in plan.derived.built_in_names(enclave.path)
+    )
+
+
+def problems(plan: LaunchPlan) -> str:
+    return " ".join(map(str, plan.problems))
+
+
+NAV2 = '<node pkg="nav2_{0}" exec="{0}_server" name="{0}_server"><param from="{1}"/></node>'
+
+
+def test_a_planner_server_has_its_costmap_layers_and_planners(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "nav2.yaml"
+    file.write_text("""
+planner_server: {ros__parameters: {planner_plugins: [Fine], Fine: {plugin: nav2_smac_planner::SmacPlannerHybrid}}}
+global_costmap:
+  global_costmap:
+    ros__parameters:
+      plugins: [static_layer, obstacles]
+      static_layer: {plugin: nav2_costmap_2d::StaticLayer}
+      obstacles:
+        plugin: nav2_costmap_2d::ObstacleLayer
+        observation_sources: front rear
+        front: {topic: /front/scan}
+        rear: {topic: points, data_type: PointCloud2}
+""")
+    plan = launch(NAV2.format("planner", file))
+    assert not plan.problems
+    assert {"/map", "/front/scan", "/global_costmap/points"} <= set(allowed(plan, "subscribe"))
+    assert "/unsmoothed_plan" in allowed(plan, "publish")
+    assert "/global_costmap/obstacles" in allowed(plan, "publish")
+    assert not {"/scan", "/global_costmap/voxel_grid", "/expansions"} & {
+        *allowed(plan, "publish"),
+        *allowed(plan, "subscribe"),
+    }
+    assert "/transform_listener_impl_*/get_type_description" in {
+        name for e in plan.derived.policy.enclaves for name in allowed_names(e)["serve_services"]
+    }
+    assert not any("transform_listener" in n and "parameters" in n for n in allowed(plan, "serve_services"))
+
+
+def test_a_planner_that_nobody_describes_stops_a_secure_start(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "nav2.yaml"
+    file.write_text(
+        "planner_server: {ros__parameters: {planner_plugins: [Mine], Mine: {plugin: my::Planner}}}"
+    )
+    assert "plugin 'Mine' is of class my::Planner, which no document describes" in problems(
+        launch(NAV2.format("planner", file))
+    )
+
+
+TREE = '<root><BehaviorTree><Sequence><Spin server_name="{}"/>{}</Sequence></BehaviorTree></root>'
+
+
+def test_a_behavior_tree_says_what_bt_navigator_calls(launch: Launch, tmp_path: Path) -> None:
+    tree = tmp_path / "tree.xml"
+    node = (
+        '<node pkg="nav2_bt_navigator" exec="bt_navigator" name="bt_navigator">'
+        f'<param name="navigators" value="[navigate_to_pose]"/>'
+        f'<param name="default_nav_to_pose_bt_xml" value="{tree}"/></node>'
+    )
+    tree.write_text(TREE.format("turn", ""))
+    plan = launch(node)
+    assert allowed(plan, "call_actions") == ["/navigate_to_pose", "/turn"] and not plan.problems
+    tree.write_text(TREE.format("turn", "<MyNode/>"))
+    assert "node 'MyNode' of the behavior tree uses is not known" in problems(launch(node))
+
+
+TWIST_MUX = '<node pkg="twist_mux" exec="twist_mux" name="twist_mux"><param from="{}"/></node>'
+
+
+def test_twist_mux_subscribes_the_topics_of_its_file(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "mux.yaml"
+    file.write_text(
+        "twist_mux: {ros__parameters: {topics: {joy: {topic: joy_vel}, nav: {topic: /nav}}, locks: {e: {topic: stop}}}}"
+    )
+    assert allowed(launch(TWIST_MUX.format(file)), "subscribe") == ["/joy_vel", "/nav", "/stop"]
+
+
+RVIZ = """
+Panels: [{{Class: rviz_common/Displays}}]
+Visualization Manager:
+  Displays:
+    - {{Class: rviz_default_plugins/LaserScan, Enabled: false, Topic: {{Value: /scan}}}}
+    - Class: rviz_common/Group
+      Displays: [{{Class: rviz_default_plugins/Map, Topic: {{Value: /map}}, Update Topic: {{Value: /map_updates}}}}]
+    - {{Class: rviz_default_plugins/Grid}}
+    {more}
+  Tools: [{{Class: rviz_default_plugins/SetGoal, Topic: {{Value: /goal}}}}]
+"""
+
+
+def test_rviz_gets_what_its_displays_and_tools_name(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "view.rviz"
+    node = f'<node pkg="rviz2" exec="rviz2" name="rviz2" args="-d {file}"/>'
+    file.write_text(RVIZ.format(more=""))
+    plan = launch(node)
+    assert allowed(plan, "subscribe") == ["/map", "/map_updates", "/scan", "/tf", "/tf_static"]
+    assert allowed(plan, "publish") == ["/goal"] and not plan.problems
+    file.write_text(RVIZ.format(more="- {Class: my_rviz/Display}"))
+    assert "display of class 'my_rviz/Display' needs is not known" in problems(launch(node))
+    assert "launch names no rviz file" in problems(launch('<node pkg="rviz2" exec="rviz2" name="rviz2"/>'))
+
+
+def test_a_gazebo_bridge_bridges_its_arguments_and_its_file(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "bridge.yaml"
+    file.write_text(
+        "- {ros_topic_name: odom, gz_topic_name: /model/odom, ros_type_name: nav_msgs/msg/Odometry, "
+        "gz_type_name: gz.msgs.Odometry, direction: GZ_TO_ROS}\n"
+    )
+    node = (
+        '<node pkg="ros_gz_bridge" exec="parameter_bridge" name="b" args="{}">'
+        '<param name="config_file" value="{}"/></node>'
+    )
+    words = "/clock@rosgraph_msgs/msg/Clock[gz.msgs.Clock /cmd_vel@geometry_msgs/msg/Twist]gz.msgs.Twist"
+    plan = launch(node.format(words, file))
+    assert allowed(plan, "publish") == ["/clock", "/odom"]
+    assert allowed(plan, "subscribe") == ["/cmd_vel"]
+    file.write_text("- {ros_topic_name: odom, direction: SIDEWAYS}\n")
+    assert "'SIDEWAYS' is no direction of a bridge" in problems(launch(node.format(words, file)))
+
+
+@pytest.mark.parametrize(
+    ("pkg", "exe"), [("rosbridge_server", "rosbridge_websocket"), ("foxglove_bridge",) * 2]
+)
+def test_bridges_for_any_topic_are_a_gap_until_a_policy_answers(launch: Launch, pkg: str, exe: str) -> None:
+    assert "say with --policy what it may" in problems(launch(f'<node pkg="{pkg}" exec="{exe}" name="b"/>'))
+
+
+def test_relay_takes_its_topics_from_the_command_line(launch: Launch) -> None:
+    node = '<node pkg="topic_tools" exec="relay" name="r" args="{}"/>'
+    plan = launch(node.format("/in"))
+    assert (allowed(plan, "subscribe"), allowed(plan, "publish")) == (["/in"], ["/in_relay"])
+    assert allowed(launch(node.format("/in out")), "publish") == ["/out"]
+
+
+def test_republish_uses_the_transports_it_is_told(launch: Launch) -> None:
+    node = (
+        '<node pkg="image_transport" exec="republish" name="r"><param name="in_transport" value="compressed"/>'
+        '<param name="out_transport" value="raw"/></node>'
+    )
+    plan = launch(node)
+    assert (allowed(plan, "subscribe"), allowed(plan, "publish")) == (["/in/compressed"], ["/out"])
+
+
+CONTROL = """
+<node pkg="robot_state_publisher" exec="robot_state_publisher"><param name="robot_description" value="{urdf}"/></node>
+<node pkg="controller_manager" exec="ros2_control_node"><param from="{file}"/></node>
+<node pkg="controller_manager" exec="spawner" args="arm {words}"/>
+"""
+URDF = "&lt;robot name='r'&gt;&lt;ros2_control name='Left Arm'/&gt;&lt;/robot&gt;"
+
+
+def test_a_controller_manager_gets_what_its_spawners_load(launch: Launch, tmp_path: Path) -> None:
+    file, own = tmp_path / "cm.yaml", tmp_path / "arm.yaml"
+    file.write_text("controller_manager: {ros__parameters: {update_rate: 100}}")
+    own.write_text("arm: {ros__parameters: {type: joint_trajectory_controller/JointTrajectoryController}}")
+    urdf = URDF.replace("Left Arm", "Left")
+    plan = launch(CONTROL.format(urdf=urdf, file=file, words=f"--param-file {own}"))
+    assert not plan.problems
+    assert "/arm/follow_joint_trajectory" in allowed(plan, "serve_actions")
+    assert "/controller_manager/set_parameters" in allowed(plan, "call_services")
+    assert "/left" in [node.fqn for node in plan.nodes]
+    plan = launch(CONTROL.format(urdf=urdf, file=file, words=""))
+    assert "the class of plugin 'arm' is not known" in problems(plan)
+    assert "/controller_manager/set_parameters" not in allowed(plan, "call_services")
+
+
+def test_an_ekf_subscribes_its_inputs_and_publishes_tf_in_its_namespace_too(launch: Launch) -> None:
+    node = (
+        '<node pkg="robot_localization" exec="ekf_node" name="ekf" namespace="r1">'
+        '<param name="odom0" value="wheel/odom"/><param name="imu0" value="/imu"/>'
+        '<remap from="odometry/filtered" to="odom"/><remap from="/tf" to="tf"/></node>'
+    )
+    plan = launch(node)
+    assert {"/r1/wheel/odom", "/imu", "/r1/tf"} <= set(allowed(plan, "subscribe"))
+    assert {"/r1/odom", "/r1/tf"} <= set(allowed(plan, "publish"))
+    assert "/r1/cmd_vel" not in allowed(plan, "subscribe")
+
+
+def test_slam_toolbox_is_a_lifecycle_node_since_jazzy_only(launch: Launch) -> None:
+    node = '<node pkg="slam_toolbox" exec="async_slam_toolbox_node" name="slam_toolbox"/>'
+    (old,) = (e for e in launch(node, "humble").derived.policy.enclaves)
+    (new,) = (e for e in launch(node, "jazzy").derived.policy.enclaves)
+    assert "/slam_toolbox/change_state" not in allowed_names(old)["serve_services"]
+    assert "/slam_toolbox/change_state" in allowed_names(new)["serve_services"]

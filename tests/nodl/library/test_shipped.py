@@ -1,0 +1,140 @@
+"""The library that ships with us: every document is whole, findable, and refers only to what there is."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from nodl.dependence import Dependence
+from nodl.library import SHIPPED, Library, fits
+from nodl.library.document import LibraryDocument, read_library_document
+from nodl.library.index import INDEX, index_text, read_index
+from nodl.node_interface import EndpointKind
+from nodl.verb import main
+
+FILES = sorted(str(path.relative_to(SHIPPED)) for path in Path(SHIPPED).glob("*/*.nodl.yaml"))
+DOCUMENTS = {file: read_library_document(os.path.join(SHIPPED, file)) for file in FILES}
+LIBRARY = Library()
+
+
+def of(document: LibraryDocument) -> Dependence:
+    return document.interface.depends or Dependence()
+
+
+def test_the_index_says_what_the_documents_say() -> None:
+    assert Path(SHIPPED, INDEX).read_text() == index_text(SHIPPED), "run: secure-nodl library index"
+
+
+def test_there_are_at_least_a_hundred_pairs_of_package_and_program_or_plugin() -> None:
+    pairs = {(e.package, name) for e in read_index(SHIPPED) for name in (*e.programs, *e.classes)}
+    assert len(pairs) >= 100
+
+
+def test_a_look_up_opens_one_document(monkeypatch: pytest.MonkeyPatch) -> None:
+    opened: list[str] = []
+
+    def read(path: str) -> LibraryDocument:
+        opened.append(path)
+        return read_library_document(path)
+
+    monkeypatch.setattr("nodl.library.read_library_document", read)
+    assert Library().find("nav2_lifecycle_manager", "lifecycle_manager", distro="jazzy")
+    assert len(opened) <= 1
+
+
+def test_a_document_is_small_sorted_and_says_how_it_is_known() -> None:
+    for file, document in DOCUMENTS.items():
+        assert os.path.getsize(document.file) < 10_000, file
+        evidence = document.evidence
+        assert evidence.repository and evidence.version and len(evidence.commit) >= 7 and evidence.how, file
+        endpoints = document.interface.endpoints
+        for kind in EndpointKind:
+            names = [endpoint.name.text for endpoint in endpoints if endpoint.kind is kind]
+            assert names == sorted(names), file
+        assert all(endpoint.type for endpoint in endpoints), file
+
+
+def test_what_varies_is_listed() -> None:
+    for file, document in DOCUMENTS.items():
+        listed = {(endpoint.kind, endpoint.name.text) for endpoint in document.interface.endpoints}
+        assert set(of(document).variations) <= listed, file
+
+
+def test_default_plugins_and_further_nodes_have_documents() -> None:
+    for file, document in DOCUMENTS.items():
+        depends = of(document)
+        for plugins in depends.plugins:
+            for name in plugins.types.values():
+                assert LIBRARY.of_class(name), (file, name)
+        stems = [node.document for node in depends.nodes] + [c.document for c in depends.configurations]
+        for stem in filter(None, stems):
+            assert LIBRARY.named(stem), (file, stem)
+
+
+def test_a_condition_asks_for_a_parameter_with_a_known_default() -> None:
+    """Else "not set" would silently mean "no"; a test that says what it means (``set``, ``not``) may stand alone."""
+    for file, document in DOCUMENTS.items():
+        depends = of(document)
+        for variation in depends.variations.values():
+            for test in (test for group in variation.when.any_of for test in group):
+                alone = test.is_set or test.negated or test.parameter == "words"
+                by_item = "$(item)" in test.parameter or test.parameter.startswith(("argument ", "--"))
+                assert alone or by_item or test.parameter in depends.defaults, (file, test.parameter)
+
+
+@pytest.mark.parametrize(
+    ("versions", "distro", "version", "holds"),
+    [
+        ({"jazzy": "1.3"}, "jazzy", "1.3.7", True),
+        ({"jazzy": "1.3"}, "jazzy", "1.31.0", False),
+        ({"jazzy": "1.3"}, "humble", "1.3.7", True),
+        ({"jazzy": "1.3"}, "jazzy", None, True),
+        ({"jazzy": "1.3"}, "humble", None, False),
+        ({}, "humble", "9", True),
+    ],
+)
+def test_a_series_covers_what_begins_with_it(
+    versions: dict[str, str], distro: str, version: str | None, holds: bool
+) -> None:
+    assert fits(versions, distro, version) is holds
+
+
+def test_the_verbs_find_show_and_miss(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["library", "where", "nav2_amcl", "amcl"]) == 0
+    assert capsys.readouterr().out.endswith("nav2_amcl/amcl.nodl.yaml\n")
+    assert main(["library", "show", "nav2_amcl", "amcl"]) == 0
+    shown = capsys.readouterr().out
+    assert "amcl_pose" in shown and "source read: github.com/ros-navigation/navigation2" in shown
+    assert main(["library", "list", "nav2_amcl"]) == 0
+    assert "nav2_amcl::AmclNode" in capsys.readouterr().out
+    assert main(["library", "show", "nav2_amcl", "unheard_of"]) == 1
+    assert "no document of nav2_amcl/unheard_of" in capsys.readouterr().err
+
+
+def test_sources_are_held_against_documents(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """The real talker's document, once with a package that agrees and once with one that says something else."""
+    source = tmp_path / "demo_nodes_py"
+    source.mkdir()
+    (source / "package.xml").write_text("<package><name>demo_nodes_py</name></package>")
+    (source / "setup.py").write_text(
+        "setup(entry_points={'console_scripts': ['talker = demo_nodes_py.talker:main']})"
+    )
+    (source / "demo_nodes_py").mkdir()
+    program = (
+        "from rclpy.node import Node\nfrom std_msgs.msg import String\n"
+        "class Talker(Node):\n"
+        "    def __init__(self):\n"
+        "        super().__init__('talker')\n"
+        "        self.create_publisher(String, {topic}, 10)\n"
+        "def main():\n    Talker()\n"
+    )
+    (source / "demo_nodes_py/__init__.py").touch()
+    (source / "demo_nodes_py/talker.py").write_text(program.format(topic="'chatter'"))
+    assert main(["library", "check", str(tmp_path)]) == 0
+    assert "demo_nodes_py/talker: agrees" in capsys.readouterr().out
+    (source / "demo_nodes_py/talker.py").write_text(program.format(topic="'chat'"))
+    assert main(["library", "check", str(tmp_path)]) == 1
+    out = capsys.readouterr().out
+    assert "only in the document: publisher chatter" in out and "only in the source: publisher chat" in out
