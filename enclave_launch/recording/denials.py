@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Grants, Need
-from enclave_launch.recording.reasons import Cause, cause_of
+from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, Cause, cause_of
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
@@ -98,6 +98,7 @@ class Explainer:
         self._printed: dict[str, deque[str]] = {}
         self._waiting: list[tuple[float, RecordedProcess, str, tuple[str, ...]]] = []
         self._told: set[Need] = set()
+        self._middlewares: set[str] = set()
 
     def opened(self, launch: LaunchControl, recording: Recording) -> None:
         self._launch, self._recording = launch, recording
@@ -110,6 +111,8 @@ class Explainer:
             process, _ = self._recording.record.node_of(line)
             if not self._endpoint_was_refused(process, line):
                 self._waiting.append((time.monotonic() + _PATIENCE, process, line.name, line.error))
+        elif isinstance(line, Initialised) and line.rc == 0:
+            self._middleware(line)
         elif isinstance(line, Initialised) and line.rc == REFUSED:
             joining = self._recording.record.process_of(line.pid)
             if joining is not None:
@@ -125,6 +128,18 @@ class Explainer:
 
     def closed(self) -> None:
         self._tell_waiting(float("inf"))
+
+    def _middleware(self, line: Initialised) -> None:
+        """Told once: what two of them cannot say to each other shows as silence, not as an error."""
+        known = set(self._middlewares)
+        self._middlewares.add(line.middleware)
+        if line.middleware and known and line.middleware not in known and len(self._middlewares) == 2:
+            said = " and ".join(sorted(self._middlewares))
+            text = (
+                f"processes of this launch use {said}: {MIXED_MIDDLEWARES.what}; {MIXED_MIDDLEWARES.remedy}"
+            )
+            if self._launch is not None:
+                self._launch.say("WARNING", text)
 
     def _endpoint(self, line: EndpointMade, process: RecordedProcess, node: RecordedNode) -> None:
         if role_of(line) is Role.PART_OF_ACTION:

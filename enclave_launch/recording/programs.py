@@ -48,8 +48,15 @@ def _programs(words: Sequence[str], search_path: str) -> Iterator[Program]:
         elif place == 0 or os.path.isabs(word):
             path = shutil.which(word, path=search_path)
             if path is not None:
-                status = os.stat(path)
-                yield _looked_at(path, (status.st_ino, status.st_ctime_ns))
+                yield _looked_at(path, _state(path))
+
+
+def _state(path: str) -> tuple[int, int]:
+    try:
+        status = os.stat(path)
+    except OSError:
+        return (0, 0)
+    return (status.st_ino, status.st_ctime_ns)
 
 
 @lru_cache(maxsize=1024)

@@ -77,6 +77,11 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
         "give all processes the governance of one keystore",
     ),
 )
+MIXED_MIDDLEWARES = Cause(
+    "secured, some pairs of them never finish the handshake, and are silent",
+    "use one middleware for all (RMW_IMPLEMENTATION)",
+    "",
+)
 _COMPILED = tuple((re.compile(pattern), what, remedy) for pattern, what, remedy in _CAUSES)
 HARMLESS = re.compile(r"Remote secure participant .* not allowed")
 """Printed while a peer is met before it is authenticated; ends with the handshake."""

@@ -248,10 +248,16 @@ class Recording:
             self.say_warning(f"{process} is not recorded: {why}")
 
     def _name_the_silent(self) -> None:
+        if self._optional:
+            return  # nobody counts on the record being complete
         known = {item.process for item in self.unrecorded}
         for started in self.record.silent():
             if started.process not in known:
                 why = "nothing was heard of it: it or what started it does not keep LD_PRELOAD"
+                self._not_recorded(started.process, why)
+        for started in self.record.mute():
+            if started.process not in known and started.kind != "executable":
+                why = "it never called librcl: it is no ROS node, or has an rcl of its own"
                 self._not_recorded(started.process, why)
 
 

@@ -30,7 +30,7 @@ _PARAMETER_SERVICES = frozenset(
         "set_parameters_atomically",
     }
 )
-_LOGGER_SERVICES = frozenset({"get_logger_levels", "set_logger_levels"})
+LOGGER_SERVICES = frozenset({"get_logger_levels", "set_logger_levels"})
 _INTROSPECTION = "/_service_event"
 _FIRST_PART = "/_action/send_goal"
 
@@ -137,7 +137,7 @@ def _role_of_server(endpoint: EndpointMade) -> Role:
         return Role.OWN
     if last in _PARAMETER_SERVICES:
         return Role.BUILT_IN
-    return Role.LOGGER_SERVICE if last in _LOGGER_SERVICES else Role.OWN
+    return Role.LOGGER_SERVICE if last in LOGGER_SERVICES else Role.OWN
 
 
 def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:

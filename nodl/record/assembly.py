@@ -122,6 +122,12 @@ class Record:
         heard = {origin.pid for pid in self._loaded if (origin := self._origin(pid))}
         return [started for pid, started in self._started.items() if pid not in heard]
 
+    def mute(self) -> list[StartedProcess]:
+        """Processes that the recorder is in and that never called rcl: no ROS, or a copy of librcl of their own."""
+        speaking = {p.started.pid for p in self.attributed() if p.started is not None}
+        unheard = {started.pid for started in self.silent()}
+        return [s for pid, s in self._started.items() if pid not in speaking and pid not in unheard]
+
     def _begin(self, pid: int, loaded: Loaded | None) -> RecordedProcess:
         process = RecordedProcess(loaded, pid)
         self._current[pid] = process

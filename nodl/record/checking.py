@@ -14,7 +14,7 @@ from typing import NamedTuple
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, split_fqn
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
-from nodl.record.asked import Asked, AskedNode
+from nodl.record.asked import LOGGER_SERVICES, Asked, AskedNode
 from nodl.record.origins import arguments_as_inputs
 from nodl.remap import NodeNames
 
@@ -72,7 +72,12 @@ def compare(node: AskedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
         missing = [_difference(Verdict.MISSING, node, asked) for asked in _granted(node)]
         about = Difference(Verdict.WRONG, node.fqn, None, f"node name {node.name}", f"described: {names}")
         return Comparison(0, (about, *missing))
-    described = [each for endpoint in interface.endpoints for each in _described(node, endpoint)]
+    described = [
+        each
+        for endpoint in interface.endpoints
+        for each in _described(node, endpoint)
+        if not (node.logger_services and each.shown in _logger_services(node))
+    ]
     asked = _granted(node)
     differences = [*_about_the_node(node, interface)]
     differences += [_difference(Verdict.MISSING, node, each) for each in asked if not _find(each, described)]
@@ -83,6 +88,11 @@ def compare(node: AskedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
     ]
     agreed = sum(1 for each in asked if _find(each, described))
     return Comparison(agreed, tuple(dict.fromkeys(differences)))
+
+
+def _logger_services(node: AskedNode) -> tuple[str, ...]:
+    """An attribute of the recorded node, not endpoints of its own."""
+    return tuple(f"{node.fqn}/{name}" for name in LOGGER_SERVICES)
 
 
 def _matching(node: AskedNode, interfaces: Sequence[NodeInterface]) -> NodeInterface | None:
