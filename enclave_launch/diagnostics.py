@@ -68,6 +68,7 @@ class Code(str, Enum):
     EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
     # of what could take an enclave away
     CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, on which nothing here was tried"
+    HANDSHAKE_FAILS = "handshake-fails", "Processes on two DDS implementations cannot authenticate each other"
     DOMAIN_INVALID = "domain-invalid", "A process has an impossible ROS_DOMAIN_ID"
     DOMAIN_NOT_SERVED = "domain-not-served", "A process is in a domain that the permissions leave out"
     DOMAINS_SHARED = "domains-shared", "An enclave may join the domains of several processes"
@@ -318,6 +319,26 @@ def connext(process: str, place: SourceLocation) -> Diagnostic:
         "tried on it; permissions name topics as ROS does (rt/chatter), topic aliases of plain Connext need both names"
     )
     return Diagnostic(Code.CONNEXT_UNTRIED, process, text, place)
+
+
+def handshake_fails(fast: str, cyclone: str, *, planned: bool) -> Diagnostic:
+    if fast == cyclone:
+        text = (
+            f"enclave {fast} has processes on Fast DDS and on Cyclone DDS: chance decides at each start which of them "
+            "authenticate each other"
+        )
+        return Diagnostic(
+            Code.HANDSHAKE_FAILS, fast, text, None, "give those of each DDS an enclave of their own"
+        )
+    text = (
+        f"enclave {fast} (Fast DDS) and enclave {cyclone} (Cyclone DDS) never authenticate each other with these "
+        "subjects: Fast DDS would begin the handshake, which Cyclone DDS refuses (measured on 0.10.2 and 2.9.1)"
+    )
+    new = "certificates that are made now get subjects that avoid it" if planned else ""
+    remedy = (
+        new or "run both on one DDS, or remove one of the enclaves from the keystore so that it is made anew"
+    )
+    return Diagnostic(Code.HANDSHAKE_FAILS, fast, text, None, remedy)
 
 
 def domain_invalid(process: str, why: str, place: SourceLocation) -> Diagnostic:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic, program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
-from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner
+from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner, mixed_enclaves
 from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
@@ -118,6 +118,7 @@ def provision(
     while the result lives. Raises ``ManifestError`` for a plan with problems (nothing is written then) and
     ``ProvisionError``.
     """
+    from enclave_launch.admission.handshakes import halves
     from enclave_launch.secured import ProvisionedLaunch, launch_owner, provision_policies
     from enclave_launch.security_environment import SecuritySettings
     from enclave_launch.served_domains import with_domains
@@ -130,6 +131,7 @@ def provision(
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
     asked = chosen.keystore or ProvisionOptions()
     asked = asked._replace(launch=asked.launch or LaunchHold(settings.keystore, launch_owner(plan)))
+    asked = asked._replace(guid_halves=halves(mixed_enclaves(plan.processes)))
     wanted = with_domains(plan, asked, os.environ)
     report = provision_policies(settings, plan, wanted)
     return ProvisionedLaunch(plan, settings, report, wanted, asked)

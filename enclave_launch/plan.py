@@ -15,8 +15,9 @@ from typing import NamedTuple
 
 from enclave_launch.admission import AdmissionOptions, prefix_refusals, refusals, remarks
 from enclave_launch.admission.domains import domain_of
+from enclave_launch.admission.handshakes import Member, Pair, failing, mixed_pairs
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
-from enclave_launch.admission.middleware import middleware_of
+from enclave_launch.admission.middleware import middleware_of, vendor_of
 from enclave_launch.diagnostics import (
     Code,
     Diagnostic,
@@ -27,6 +28,7 @@ from enclave_launch.diagnostics import (
     enclave_too_deep,
     enclave_ungranted,
     executable_without_enclave,
+    handshake_fails,
     library_version,
     no_manifest,
     node_name_unknown,
@@ -47,6 +49,7 @@ from enclave_launch.process import (
 )
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
+from keystore.formats.subject import common_name
 from nodl.node_interface import RANDOM_ENDING, NodeInterface
 
 
@@ -272,6 +275,7 @@ class Planner(NamedTuple):
                 *(note for item in processes for note in remarks(item.process, evaluation.distro)),
                 *_domains_shared(processes),
                 *_ungranted(processes, derived),
+                *_handshakes(processes),
                 *derived.warnings,
             ),
         )
@@ -307,6 +311,23 @@ def _domains_shared(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]
                 for item in items
             )
             yield domains_shared(enclave, ", ".join(map(str, sorted(by_domain))), tuple(who))
+
+
+def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
+    """Enclaves on Fast DDS with those on Cyclone DDS that could meet them."""
+    return mixed_pairs(
+        Member(item.enclave.path, item.domain, vendor_of(item.middleware))
+        for item in processes
+        if item.enclave
+    )
+
+
+def _handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
+    """With the subjects that enclaves have by themselves."""
+    pairs = mixed_enclaves(processes)
+    subjects = {path: common_name(path) for pair in pairs for path in pair}
+    for pair in failing(pairs, subjects):
+        yield handshake_fails(*pair, planned=True)
 
 
 def _ungranted(processes: Iterable[PlannedProcess], derived: DerivedPolicy) -> Iterator[Diagnostic]:

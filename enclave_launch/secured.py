@@ -9,11 +9,13 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.diagnostics import enclave_of_several_launches
+from enclave_launch.admission.handshakes import failing
+from enclave_launch.diagnostics import Diagnostic, enclave_of_several_launches, handshake_fails
 from enclave_launch.errors import ProvisionError
-from enclave_launch.plan import LaunchPlan, PlannedProcess
+from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import Grant, identity
 from enclave_launch.security_environment import (
@@ -41,6 +43,18 @@ class ProvisionedLaunch(NamedTuple):
     report: ProvisionReport
     options: ProvisionOptions
     asked: ProvisionOptions
+
+    @property
+    def handshakes(self) -> tuple[Diagnostic, ...]:
+        """Of processes on two DDS implementations, those that cannot authenticate each other with the certificates
+        they have now."""
+        from keystore.disk.view import KeystoreView
+
+        pairs = mixed_enclaves(self.plan.processes)
+        view = KeystoreView(Path(self.settings.keystore))
+        subjects = {path: view.common_name(path) for pair in pairs for path in pair}
+        known = {path: name for path, name in subjects.items() if name}
+        return tuple(handshake_fails(*pair, planned=False) for pair in failing(pairs, known))
 
     @property
     def secret_variables(self) -> frozenset[str]:

@@ -67,7 +67,9 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
     if args.strategy == "Permissive":
         print(f"ros2 launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, args.keystore, options=security_options(args))
-    _say(*plan.warnings, *launch.report.warnings, *expiry_notices(launch, args.warn_expiry))
+    _say(
+        *plan.warnings, *launch.report.warnings, *launch.handshakes, *expiry_notices(launch, args.warn_expiry)
+    )
     gate = PlannedGate(
         plan.evaluation.processes,
         plan.evaluation.components,

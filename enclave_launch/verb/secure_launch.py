@@ -261,7 +261,14 @@ def _launch(
 
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
-    _warn((*repair_notices(launch), *launch.report.warnings, *expiry_notices(launch, options.warn_expiry)))
+    _warn(
+        (
+            *repair_notices(launch),
+            *launch.report.warnings,
+            *launch.handshakes,
+            *expiry_notices(launch, options.warn_expiry),
+        )
+    )
     if companion is None and not options.no_explain_denials:
         companion = _explainer(plan)
     return run(launch, options=_run_settings(options, companion))

@@ -21,7 +21,7 @@ from keystore.errors import (
     StorageError,
     printable,
 )
-from keystore.formats.certificate import CertificateFacts, read_certificates
+from keystore.formats.certificate import CertificateFacts, read_certificate, read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 
@@ -121,6 +121,12 @@ class KeystoreView:
     @cached_property
     def has_crl(self) -> bool:
         return os.path.lexists(self.root / layout.CRL)
+
+    def common_name(self, enclave: str) -> str | None:
+        """Of the certificate that an enclave has; None without one."""
+        relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
+        pem = safe_files.read_if_there(self.root, relative)
+        return read_certificate(pem, printable(relative)).common_name if pem else None
 
     def enclaves(self) -> list[str]:
         """Names of all enclaves (directories with a key or a certificate), sorted; links are not followed."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 from datetime import datetime, timedelta
 from functools import cached_property
+from itertools import count
 from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files, store
@@ -12,6 +13,7 @@ from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import read_certificate
+from keystore.formats.guid_prefix import half_of
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.register import IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
@@ -106,10 +108,7 @@ class EnclaveWriter:
             )
 
     def _present_name(self, enclave: str) -> str:
-        relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
-        pem = safe_files.read_if_there(self._view.root, relative)
-        facts = read_certificate(pem, printable(relative)) if pem else None
-        return (facts.common_name if facts else None) or common_name(enclave, self._scheme)
+        return self._view.common_name(enclave) or common_name(enclave, self._scheme)
 
     def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> tuple[str, ...]:
         """Add the enclave's missing files; returns what was done. Order: key, certificate, links,
@@ -219,10 +218,13 @@ class EnclaveWriter:
         present = latest.subject if latest is not None else records[-1].subject if records else ""
         if present and not new_generation and scheme_of(present) is self._scheme:
             return present
-        generation = 1
-        while new_generation and common_name(enclave, self._scheme, generation) in used:
-            generation += 1
-        return common_name(enclave, self._scheme, generation)
+        wanted = self._options.guid_halves.get(enclave) if self._scheme is SubjectScheme.EXACT else None
+        for generation in count(1):
+            name = common_name(enclave, self._scheme, generation)
+            taken = new_generation and name in used
+            if not taken and (wanted is None or half_of(name) is wanted):
+                break
+        return name
 
     def _revoke_longer(self, state: EnclaveState, validity: Validity) -> None:
         """A shorter life that was asked for is one only when the longer certificate cannot be used any more."""

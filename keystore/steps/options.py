@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
+from keystore.formats.guid_prefix import Half
 from keystore.formats.validity import DEFAULT_BACKDATE
 from keystore.signing.ca_access import CaAccess
 
@@ -49,3 +50,5 @@ class ProvisionOptions(NamedTuple):
     revoke: bool = True
     """Revoke certificates whose rights shrink or whose key is not safe; without it they are usable until they end."""
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})
+    guid_halves: Mapping[str, Half] = MappingProxyType({})
+    """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""
