@@ -411,7 +411,8 @@ def _parameters(declarator: Node, function: Function | None = None) -> list[Para
             continue
         declared = child.child_by_field_name("declarator")
         names = [n for n in walk(declared) if n.type == "identifier"] if declared is not None else []
-        written = _type_text(child) + _marks(declared)
+        constant = any(text(c) == "const" for c in child.named_children if c.type == "type_qualifier")
+        written = ("const " if constant else "") + _type_text(child) + _marks(declared)
         if written == "void" and not names:
             continue
         found.append(
