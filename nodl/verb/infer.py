@@ -15,6 +15,7 @@ from nodl.verb.options import add_prefix_argument
 if TYPE_CHECKING:
     from nodl.infer.report.expanded import ExpandedSystem
     from nodl.infer.system import InferredSystem
+    from nodl.node_interface import NodeInterface
 
 FORMATS = ("text", "json", "policy", "v1", "v2")
 
@@ -27,7 +28,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "subjects", nargs="+", metavar="PACKAGE|PATH", help="an installed package, or files and folders"
     )
     parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="write files into DIR")
-    parser.add_argument("--format", choices=FORMATS, default=None, help="text (default); with -o: v1")
+    parser.add_argument("--format", choices=FORMATS, default=None, help="text (default); with -o: v2")
+    parser.add_argument(
+        "--with-gaps",
+        action="store_true",
+        help="also write v2 documents of nodes that are not known in full; the gaps stand in them",
+    )
     parser.add_argument("--builtin", action="store_true", help="also show what every node has")
     parser.add_argument(
         "--accept-patterns", action="store_true", help="allow names known in part as patterns in a policy"
@@ -48,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     from nodl.infer.report.expanded import expand
 
     expanded = expand(system)
-    chosen = args.format or ("v1" if args.output else "text")
+    chosen = args.format or ("v2" if args.output else "text")
     documents = _documents(chosen, system, expanded, args)
     if args.output:
         _write(args.output, documents)
@@ -85,9 +91,28 @@ def _documents(
         return {
             "inferred.txt": text.replace(os.path.join(os.getcwd(), ""), "")
         }  # as a person would name the files
-    from nodl.infer.report.nodl_report import to_v1, to_v2
+    from nodl.infer.report.nodl_report import to_v1
+    from nodl.infer.report.v2_report import to_v2
 
-    return to_v1(system) if chosen == "v1" else to_v2(system)
+    return to_v1(system) if chosen == "v1" else to_v2(_writable(system, args.with_gaps))
+
+
+def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
+    """The nodes that documents are written of; those with open questions only when that is asked for."""
+    from nodl.infer.report.v2_report import open_questions
+
+    kept = []
+    for node in system.nodes:
+        questions = open_questions(node)
+        if questions and not with_gaps:
+            who = f"{node.package or '-'}/{node.executable or node.plugin or node.name}"
+            print(
+                printable(f"not written: {who} has {len(questions)} open questions (--with-gaps)"),
+                file=sys.stderr,
+            )
+        else:
+            kept.append(node)
+    return kept
 
 
 def _write(folder: Path, documents: dict[str, str]) -> None:
@@ -120,7 +145,7 @@ def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
     from nodl.ament_index import PackageNotFoundError, package_prefix
     from nodl.infer.executable import infer_executable
     from nodl.infer.system import InferredSystem
-    from nodl.node_interface import Gap, NodeInterface
+    from nodl.node_interface import Gap
     from nodl.source_ref import SourceRef
 
     try:

@@ -5,14 +5,16 @@ All writers read this; names here are those that apply when launch changes nothi
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from nodl.infer.models.signatures import PARAMETER_SERVICES
+from nodl.infer.results import remapped
 from nodl.infer.system import InferredSystem
 from nodl.name_template import NameTemplate, UnknownPart
 from nodl.names import InvalidNameError, expand_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, NodeInterface
+from nodl.remap import RemapRules, parse_rule
 from nodl.source_ref import SourceRef
 
 _STAR = "STAR_OF_A_PATTERN"
@@ -35,6 +37,7 @@ class Interface:
 class Node:
     interface: NodeInterface
     interfaces: tuple[Interface, ...]
+    programs: tuple[str, ...] = ()  # executables and plugins of packages that hold it
 
     @property
     def name(self) -> str:
@@ -61,7 +64,8 @@ def expand(system: InferredSystem) -> ExpandedSystem:
     """Sorted by node and place; equal questions are asked once."""
     unresolved: dict[OpenQuestion, None] = {}
     nodes = []
-    for interface in system.nodes:
+    for written, programs in _told_once(system.nodes):
+        interface = _under_own_rules(written)
         found: list[Interface] = []
         for endpoint in interface.endpoints:
             for expanded, why in _expanded(endpoint, interface):
@@ -72,11 +76,29 @@ def expand(system: InferredSystem) -> ExpandedSystem:
         for gap in interface.gaps:
             unresolved[OpenQuestion(gap.source, gap.why)] = None
         found.extend(_built_in(interface))
-        nodes.append(Node(interface, tuple(dict.fromkeys(found))))
+        nodes.append(Node(interface, tuple(dict.fromkeys(found)), programs))
     for gap in system.gaps:
         unresolved[OpenQuestion(gap.source, gap.why)] = None
     nodes.sort(key=lambda node: (node.namespace, node.name, node.interface.source))
     return ExpandedSystem(tuple(nodes), tuple(sorted(unresolved, key=lambda q: (q.source, q.why))))
+
+
+def _told_once(nodes: Iterable[NodeInterface]) -> list[tuple[NodeInterface, tuple[str, ...]]]:
+    """Each node with every program that holds it; the gaps are those of all of them."""
+    found: dict[object, NodeInterface] = {}
+    programs: dict[object, dict[str, None]] = {}
+    for node in nodes:
+        key = node._replace(executable=None, plugin=None, gaps=())
+        before = found.setdefault(key, node)
+        found[key] = before._replace(gaps=tuple(dict.fromkeys((*before.gaps, *node.gaps))))
+        names = [each for each in (node.executable, node.plugin) if each]
+        programs.setdefault(key, {}).update(dict.fromkeys(f"{node.package}/{name}" for name in names))
+    return [(found[key], tuple(programs[key])) for key in found]
+
+
+def _under_own_rules(node: NodeInterface) -> NodeInterface:
+    """Under the remap rules that the program itself gives to the node."""
+    return remapped(node, RemapRules(tuple(map(parse_rule, node.own_rules)), ())) if node.own_rules else node
 
 
 def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[Interface | None, str]]:

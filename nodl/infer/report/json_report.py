@@ -24,6 +24,8 @@ def _node(node: Node, built_in: bool) -> dict[str, object]:
         "namespace": node.namespace,
         "file": node.interface.source.file,
         "line": node.interface.source.line,
+        **({"programs": list(node.programs)} if node.programs else {}),
+        **({"lifecycle": True} if node.interface.lifecycle else {}),
         "interfaces": [_interface(each) for each in node.interfaces if built_in or not each.built_in],
     }
 

@@ -1,4 +1,4 @@
-"""Manifests to start from: NoDL v1 per package, NoDL v2 per node.
+"""Manifests to start from: NoDL v1, one for each package (``v2_report`` writes version 2).
 
 Names stay as the code writes them (relative, private), so that they survive a change of namespace. What a
 manifest cannot say (a name known in part) is left out and told in a comment.
@@ -18,14 +18,6 @@ _V1 = {
     EndpointKind.SERVICE_CLIENT: ("service", "client"),
     EndpointKind.ACTION_SERVER: ("action", "server"),
     EndpointKind.ACTION_CLIENT: ("action", "client"),
-}
-_V2 = {
-    EndpointKind.PUBLISHER: "publishers",
-    EndpointKind.SUBSCRIPTION: "subscriptions",
-    EndpointKind.SERVICE_SERVER: "service_servers",
-    EndpointKind.SERVICE_CLIENT: "service_clients",
-    EndpointKind.ACTION_SERVER: "action_servers",
-    EndpointKind.ACTION_CLIENT: "action_clients",
 }
 
 
@@ -64,39 +56,6 @@ def _v1_elements(said: dict[tuple[EndpointKind, str], str]) -> list[str]:
             f"    <{tag} name={quoteattr(name)} type={quoteattr(type_name)} role={quoteattr(role)}/>"
         )
     return lines
-
-
-def to_v2(system: InferredSystem) -> dict[str, str]:
-    """File name -> text: one document per node, ``<executable or node name>.nodl.yaml``."""
-    documents: dict[str, str] = {}
-    for node in system.nodes:
-        stem = node.executable or node.name or "unknown"
-        file = f"{stem.removesuffix('.py')}.nodl.yaml"
-        if file in documents:
-            file = f"{stem.removesuffix('.py')}.{node.name}.nodl.yaml"
-        documents[file] = _v2_document(node)
-    return dict(sorted(documents.items()))
-
-
-def _v2_document(node: NodeInterface) -> str:
-    said, unsaid = _split(node)
-    lines = [f"# Node {node.name or '(name not known)'}, inferred from {node.source}."]
-    lines.append("# Quality of service is not inferred; put in what the code asks for.")
-    lines.extend(f"# Not described: {_comment(endpoint)}" for endpoint in unsaid)
-    lines.append("nodl_version: 2")
-    for kind, category in _V2.items():
-        entries = sorted((name, type_name) for (each, name), type_name in said.items() if each is kind)
-        if entries:
-            lines.append(f"{category}:")
-        for name, type_name in entries:
-            lines += [f"  - name: {_quoted(name)}", f"    type: {_quoted(type_name)}"]
-            if kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION):
-                lines.append("    qos: {history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}")
-    return "\n".join([*lines, ""])
-
-
-def _quoted(text: str) -> str:
-    return "'" + text.replace("'", "''") + "'"
 
 
 def _split(node: NodeInterface) -> tuple[dict[tuple[EndpointKind, str], str], list[Endpoint]]:

@@ -9,7 +9,8 @@ from nodl.infer.report.expanded import ExpandedSystem
 def to_text(system: ExpandedSystem, *, built_in: bool = False) -> str:
     lines: list[str] = []
     for node in system.nodes:
-        lines.append(f"{node.namespace.rstrip('/')}/{node.name}  ({node.interface.source})")
+        held = f" in {', '.join(node.programs)}" if node.programs else ""
+        lines.append(f"{node.namespace.rstrip('/')}/{node.name}{held}  ({node.interface.source})")
         for interface in node.interfaces:
             if built_in or not interface.built_in:
                 kind = interface.kind.value.replace("_", " ")

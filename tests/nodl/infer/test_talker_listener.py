@@ -16,8 +16,9 @@ import pytest
 from nodl.infer import InferredSystem, infer_executable
 from nodl.infer.report.expanded import expand
 from nodl.infer.report.json_report import to_json
-from nodl.infer.report.nodl_report import to_v1, to_v2
+from nodl.infer.report.nodl_report import to_v1
 from nodl.infer.report.policy_report import to_policy
+from nodl.infer.report.v2_report import to_v2
 
 Infer = Callable[..., InferredSystem]
 
@@ -116,7 +117,7 @@ def test_manifests_read_back_as_what_was_inferred(infer: Infer, tmp_path: Path) 
     from nodl.document import read_document
 
     system = infer(LISTENER)
-    for documents in (to_v1(system), to_v2(system)):
+    for documents in (to_v1(system), to_v2(system.nodes)):
         for name, text in documents.items():
             path = tmp_path / name
             path.write_text(text, encoding="utf-8")
