@@ -57,7 +57,7 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
     from enclave_launch.runtime.gate import PlannedGate
     from enclave_launch.secured import PlanProvider
     from enclave_launch.verb.secure_launch import resolve_options
-    from enclave_launch.verb.security import expiry_notices, security_options
+    from enclave_launch.verb.security import expiry_notices, repair_notices, security_options
 
     if args.keystore is None:
         raise UsageError("--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE")
@@ -68,7 +68,11 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
         print(f"ros2 launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, args.keystore, options=security_options(args))
     _say(
-        *plan.warnings, *launch.report.warnings, *launch.handshakes, *expiry_notices(launch, args.warn_expiry)
+        *plan.warnings,
+        *repair_notices(launch),
+        *launch.report.warnings,
+        *launch.handshakes,
+        *expiry_notices(launch, args.warn_expiry),
     )
     gate = PlannedGate(
         plan.evaluation.processes,

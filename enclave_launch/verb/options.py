@@ -79,6 +79,11 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
         "--valid-for", metavar="TIME", help="validity of new certificates and permissions, such as 90d"
     )
     group.add_argument(
+        "--no-revoke",
+        action="store_true",
+        help="where rights are taken away: do not revoke the certificate of before (it can be used until it ends)",
+    )
+    group.add_argument(
         "--warn-expiry",
         metavar="TIME",
         default="30d",

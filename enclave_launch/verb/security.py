@@ -44,6 +44,7 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
         # With short lives each start renews in time: when two thirds are over.
         renew_within=(until - now) / 3 if until is not None else timedelta(0),
         subjects=subjects,
+        revoke=not options.no_revoke,
         access=CaAccess(passphrase=_passphrase(options)),
     )
 

@@ -26,6 +26,7 @@ FOR_SECURE = frozenset(
         "strategy",
         "domain_id",
         "valid_for",
+        "no_revoke",
         "warn_expiry",
         "compatible_subjects",
         "ca_passphrase_file",

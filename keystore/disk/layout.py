@@ -31,6 +31,8 @@ SUPERSEDED = "private/superseded.json"
 """Of earlier versions; taken over into the register."""
 REGISTER = "private/register.json"
 SHARES = "private/shares"
+CRL_UNLINKED = "private/crl-unlinked"
+"""There while a published CRL is given to the enclaves: an interrupted run left some without."""
 
 KEY, CERT = "key.pem", "cert.pem"
 PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"

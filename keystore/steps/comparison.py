@@ -54,8 +54,8 @@ def compare(
     if not view.is_complete:
         _refuse_unless_it_can_be_made(view, options)
         return None
-    if os.path.lexists(root / layout.INCOMING):  # an interrupted change of a CA
-        return None
+    if any(os.path.lexists(f"{root}/{name}") for name in (layout.INCOMING, layout.CRL_UNLINKED)):
+        return None  # a run was interrupted: of changing a CA, or of giving the CRL to all
     if needs_register(view):
         return None
     register = read_register(root)

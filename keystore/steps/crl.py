@@ -12,7 +12,7 @@ from datetime import datetime, timedelta
 
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_problem, crl_validity
-from keystore.disk.store import Link, Store
+from keystore.disk.store import PRIVATE_MODE, Link, Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.register import IssuedCertificate, Register
@@ -69,8 +69,14 @@ def publish_crl(opened: Store, access: CaAccess, now: datetime) -> None:
     revoked = opened.register.revoked(fingerprint(issuer.facts.der))
     crl = IdentityIssuer(issuer).revocation_list(revoked, now - _BACKDATE, end, opened.register.crl_number)
     with opened.batch() as batch:
+        batch.file(layout.CRL_UNLINKED, b"", PRIVATE_MODE)
         batch.file(layout.CRL, crl)
+    _link_all(opened)
+
+
+def _link_all(opened: Store) -> None:
     link_crl(opened, KeystoreView(opened.root).enclaves())
+    opened.remove(layout.CRL_UNLINKED)
 
 
 def revoke(opened: Store, serials: Collection[int], access: CaAccess, now: datetime) -> None:
@@ -107,7 +113,7 @@ def restore_crl(
         if not view.has_crl:
             return []
         if crl_validity(view).not_after > later(now, within):
-            link_crl(opened, view.enclaves())  # an interrupted run may have left some without
+            _link_all(opened)  # an interrupted run may have left some without
             return []
         problem = "the CRL ends soon" if within else "the CRL has ended"
     with opened.batch() as batch:

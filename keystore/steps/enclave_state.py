@@ -152,7 +152,7 @@ def _identity(
     )
     if problem is None:
         return _Found(Reissue.NOTHING, facts)
-    if register is not None and not _key_is_ours(register, enclave, key):
+    if register is not None and not _key_is_ours(view, register, enclave, key):
         return _Found(Reissue.KEY_PAIR, facts, f"its private key was not issued here ({problem})", True)
     return _Found(Reissue.CERTIFICATE, facts, problem)
 
@@ -216,9 +216,9 @@ def _record_problem(register: Register | None, enclave: str, serial: int) -> str
     return None
 
 
-def _key_is_ours(register: Register, enclave: str, key_pem: bytes) -> bool:
-    """Whether a certificate of this enclave was issued for the key and is not revoked: only such a key is certified
-    again."""
+def _key_is_ours(view: KeystoreView, register: Register, enclave: str, key_pem: bytes) -> bool:
+    """Whether the key is that of the certificate in force, or of one by the present CA that is not revoked: only such
+    a key is certified again. What an old CA issued says nothing: nobody revokes it."""
     from keystore.errors import SigningUnavailableError
     from keystore.signing.authority import spki
     from keystore.signing.identity import public_half
@@ -228,8 +228,11 @@ def _key_is_ours(register: Register, enclave: str, key_pem: bytes) -> bool:
         present = fingerprint(spki(public_half(key_pem, "the enclave's key")))
     except SigningUnavailableError:
         return False
-    records = [one for one in register.of_enclave(enclave) if one.key == present]
-    return bool(records) and all(one.revoked is None for one in records)
+    issuer = fingerprint(view.ca(Role.IDENTITY).der)
+    return any(
+        one.key == present and one.revoked is None and (one.in_force or one.issuer == issuer)
+        for one in register.of_enclave(enclave)
+    )
 
 
 def _permissions_stand(

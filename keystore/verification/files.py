@@ -20,7 +20,7 @@ from keystore.verification.surroundings import check_hard_links, check_owner
 _TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES})
 _KNOWN = frozenset({
     layout.LOCK, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
-    layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER,
+    layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER, layout.CRL_UNLINKED,
     *(layout.ca_cert(role) for role in Role),
     *(layout.ca_key(role) for role in Role), *(layout.ca_key_uri(role) for role in Role),
 })  # fmt: skip

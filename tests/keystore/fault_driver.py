@@ -15,13 +15,15 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+from keystore.disk.share_files import LaunchHold
 from keystore.errors import KeystoreError
 from keystore.formats.role import Role
 from keystore.steps.creation import CreateOptions, create_keystore
+from keystore.steps.provisioning import provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.rollover import Step, roll_over
-from tests.keystore.kit import filled, options
+from tests.keystore.kit import filled, options, policy
 
 KILLED = 97
 REPORTED = 3
@@ -67,6 +69,14 @@ def work(name: str, root: Path) -> None:
         renew(root, options=RenewOptions(provisioning=options()))
     elif name == "remove":
         remove(root, NAMES[:2], options=RemoveOptions(durable=False))
+    elif name == "take over":
+        filled(root, NAMES[:6])
+    elif name == "reduce":
+        provision(root, [policy(one, "/other") for one in NAMES[:3]], options=options())
+    elif name == "share":
+        hold = LaunchHold(root, "/second.launch.xml")
+        provision(root, [policy(one, "/other") for one in NAMES[:3]], options=options(launch=hold))
+        hold.close()
     else:
         roll_over(root, Step(name), tuple(Role), options=options())
 

@@ -16,13 +16,17 @@ import pytest
 
 from keystore import verification
 from keystore.disk import layout
+from keystore.disk.register_file import read_register
+from keystore.disk.share_files import LaunchHold
 from keystore.disk.view import KeystoreView
+from keystore.formats.certificate import read_pem
 from keystore.steps.creation import CreateOptions, create_keystore
 from keystore.steps.expiry import status
+from keystore.steps.provisioning import provision
 from keystore.verification import Finding
 from tests.dds import sros2_style
 from tests.keystore.fault_driver import KILLED, NAMES, REPORTED, install_fault, work
-from tests.keystore.kit import contents, filled, snapshot
+from tests.keystore.kit import contents, filled, options, policy, snapshot
 
 HERE = Path(__file__).parents[2]
 # Each enclave of a 50-enclave run takes the same steps: by default the first and last steps of the run and an
@@ -73,8 +77,14 @@ def prepared(name: str, root: Path) -> None:
         grants = {path: sros2_style.Grant(publish=("/chatter",)) for path in ("/", "/a", "/a/b")}
         sros2_style.create(root, 0, grants)
         return
-    if name in ("renew", "remove", "start", "switch", "finish"):
+    if name in ("renew", "remove", "start", "switch", "finish", "take over", "reduce"):
         filled(root, NAMES[:6])
+    if name == "take over":
+        (root / layout.REGISTER).unlink()
+    if name == "share":
+        first = LaunchHold(root, "/first.launch.xml")
+        provision(root, [policy(one) for one in NAMES[:6]], options=options(launch=first))
+        first.close()
     for earlier in {"switch": ("start",), "finish": ("start", "switch")}.get(name, ()):
         work(earlier, root)
 
@@ -88,7 +98,20 @@ def visible_enclaves_are_whole(root: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["create", "provision", "renew", "repair", "remove", "start", "switch", "finish"]
+    "name",
+    [
+        "create",
+        "provision",
+        "renew",
+        "repair",
+        "remove",
+        "start",
+        "switch",
+        "finish",
+        "take over",
+        "reduce",
+        "share",
+    ],
 )
 def test_killed_at_every_step(tmp_path: Path, name: str) -> None:
     prepared(name, tmp_path / "start")
@@ -101,16 +124,38 @@ def test_killed_at_every_step(tmp_path: Path, name: str) -> None:
         if (tmp_path / "start").exists():
             shutil.copytree(tmp_path / "start", root, symlinks=True)
         assert fork(name, root, "kill", at) == KILLED
+        if name == "reduce":
+            nothing_unrecorded_is_out(root)
         if name == "provision" and (root / "enclaves").exists():
             visible_enclaves_are_whole(root)
         keys = {path: path.read_bytes() for path in root.glob("enclaves/**/key.pem")}
         _complete(name, root)
         assert wrong(root) == [], f"after being killed at step {at} of {total} and running again"
         assert not list((root / ".staging").glob("*")), "nothing unpublished lies about"
+        everything_is_on_record(root)
         # The one deletes keys, the others replace them: as was asked, or because SROS2 had left them readable.
         if name not in ("remove", "renew", "repair"):
             assert all(path.read_bytes() == content for path, content in keys.items()), "keys stay"
         shutil.rmtree(root)
+
+
+def nothing_unrecorded_is_out(root: Path) -> None:
+    """The moment of death itself: the register may know more than is there, never less."""
+    register = read_register(root)
+    assert register is not None
+    for enclave in KeystoreView(root).enclaves():
+        cert = (root / layout.enclave_directory(enclave) / layout.CERT).read_bytes()
+        assert read_pem(cert).serial in register.certificates
+
+
+def everything_is_on_record(root: Path) -> None:
+    """Whatever the step at which the run died: no certificate is out that the register does not know as the last."""
+    register = read_register(root)
+    assert register is not None
+    for enclave in KeystoreView(root).enclaves():
+        cert = (root / layout.enclave_directory(enclave) / layout.CERT).read_bytes()
+        held = register.in_force(enclave)
+        assert held is not None and held.serial == read_pem(cert).serial, enclave
 
 
 def _complete(name: str, root: Path) -> None:

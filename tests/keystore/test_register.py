@@ -333,6 +333,19 @@ class TestIncidents:
         renew(root, ["/a"], options=RenewOptions(new_keys=True, provisioning=options()))
         assert is_revoked(root, old) and codes(root) == set()
 
+    def test_a_key_that_others_could_read_does_not_come_back_after_a_roll_over(self, tmp_path: Path) -> None:
+        """Its certificate by the old CA was never revoked, and need not be: nobody trusts it."""
+        root = filled(tmp_path / "ks", ["/a"])
+        for step in Step:
+            roll_over(root, step, options=options())
+        shutil.copytree(root / "enclaves/a", tmp_path / "exposed", symlinks=True)
+        (root / "enclaves/a/key.pem").chmod(0o644)
+        provision(root, [policy("/a")], options=options())
+        for name in ("key.pem", "cert.pem"):
+            shutil.copy(tmp_path / "exposed" / name, root / "enclaves/a" / name)
+        provision(root, [policy("/a")], options=options())
+        assert (root / "enclaves/a/key.pem").read_bytes() != (tmp_path / "exposed/key.pem").read_bytes()
+
     def test_an_earlier_governance_put_back_is_signed_anew(self, tmp_path: Path) -> None:
         root = tmp_path / "ks"
         lax = Governance((DomainRule(domains=Domains.single(0), rtps_protection_kind=Protection.NONE),))
