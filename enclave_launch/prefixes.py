@@ -14,9 +14,7 @@ from nodl.ament_index import PREFIX_VARIABLE
 def ament_prefixes(prefixes: Sequence[Path | str]) -> Iterator[None]:
     """Within the block ``prefixes`` come before the rest of ``AMENT_PREFIX_PATH``, for us and for what we start."""
     previous = os.environ.get(PREFIX_VARIABLE)
-    if prefixes:
-        listed = [os.path.abspath(prefix) for prefix in prefixes]
-        os.environ[PREFIX_VARIABLE] = os.pathsep.join([*listed, *([previous] if previous else [])])
+    prepend_prefixes(prefixes)
     try:
         yield
     finally:
@@ -24,3 +22,11 @@ def ament_prefixes(prefixes: Sequence[Path | str]) -> Iterator[None]:
             os.environ[PREFIX_VARIABLE] = previous
         elif prefixes:
             del os.environ[PREFIX_VARIABLE]
+
+
+def prepend_prefixes(prefixes: Sequence[Path | str]) -> None:
+    """Put ``prefixes`` before the rest of ``AMENT_PREFIX_PATH``, for good."""
+    if prefixes:
+        previous = os.environ.get(PREFIX_VARIABLE)
+        listed = [os.path.abspath(prefix) for prefix in prefixes]
+        os.environ[PREFIX_VARIABLE] = os.pathsep.join([*listed, *([previous] if previous else [])])

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Union
 from enclave_launch.boundary.terminal import printable_lines
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
-from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
 from enclave_launch.runtime.run_events import Observer
 from enclave_launch.runtime.service import LaunchService, RunOptions, run_launch, run_launch_async
@@ -35,7 +34,7 @@ def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -
     ``LaunchFileError`` for a program that is not there."""
     source = _source(launch)
     gate, options = _gate(launch, settings), _options(launch, settings)
-    with ament_prefixes(source.prefixes), _expiry_watch(launch):
+    with _expiry_watch(launch):
         _check_programs(launch)
         return run_launch(source.launch_file, source.arguments, gate=gate, options=options, warden=warden)
 
@@ -44,7 +43,7 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     """The same inside a running event loop."""
     source = _source(launch)
     gate, options = _gate(launch, settings), _options(launch, settings)
-    with ament_prefixes(source.prefixes), _expiry_watch(launch):
+    with _expiry_watch(launch):
         _check_programs(launch)
         return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
 
@@ -58,7 +57,7 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     _check_programs(launch)
 
     async def main(observe: Observer, hold: Callable[[LaunchService], None]) -> int:
-        with ament_prefixes(source.prefixes), _expiry_watch(launch):
+        with _expiry_watch(launch):
             service = LaunchService(
                 source.launch_file, source.arguments, gate=gate, options=options, observe=observe
             )
@@ -127,6 +126,7 @@ def _options(launch: Launch, settings: RunSettings) -> RunOptions:
         debug=settings.debug,
         secrets=settings.secrets | own,
         log_limit=settings.log_limit,
+        prefixes=source.prefixes,
         needs_ros_services=_needs_ros_services(launch),
         launch_configurations=source.launch_configurations,
         host_options=source.host_options,

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import gc
 import os
-import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.location import OUTSIDE, place_of
 from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
+from enclave_launch.evaluation.stage import STAGE
 from enclave_launch.host.current import active_host
 from enclave_launch.host.environment import environment_untouched
 from enclave_launch.host.plan_host import PlanHost
@@ -25,9 +25,6 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_description import LaunchDescription
 
 Arguments = Sequence[tuple[str, str]]
-
-_one_at_a_time = threading.RLock()  # the environment and sys.modules belong to the whole process
-
 
 _evaluated = False
 
@@ -113,12 +110,12 @@ def evaluation_surroundings(host: Host) -> Iterator[None]:
     from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
 
     with ExitStack() as stack:
-        stack.enter_context(_one_at_a_time)
+        stack.enter_context(STAGE.cleared())
         stack.enter_context(environment_untouched())
         stack.enter_context(active_host(host))
         stack.enter_context(installed(host.prefixes()))
         stack.enter_context(libyaml_for_launch_files())
-        stack.callback(_forget_elements_of_launch_files)
+        stack.callback(forget_elements_of_launch_files)
         yield
 
 
@@ -145,7 +142,8 @@ def _collector_paused() -> Iterator[None]:
             gc.enable()
 
 
-def _forget_elements_of_launch_files() -> None:
+def forget_elements_of_launch_files() -> None:
+    """What a launch file exposed (``expose_action``) is its own."""
     from enclave_launch.description.markup import expose
     from enclave_launch.frontend.python_file import MODULE_NAME
 

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from enclave_launch.boundary.terminal import printable, printable_lines
+from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
@@ -105,27 +106,44 @@ class LaunchLog:
 
 
 @contextmanager
-def captured_logging(log: LaunchLog) -> Iterator[None]:
+def captured_logging(log: LaunchLog, ours: Callable[[], bool] = lambda: True) -> Iterator[None]:
     """Within the block, what launch files and launch's own actions log (``launch.logging.get_logger``, and Python's
-    ``logging``) goes where the launch's own lines go."""
+    ``logging``) goes where the launch's own lines go, as far as it is ``ours`` and not another launch's."""
     import logging
 
     class Forward(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
-            level: Level = next(
-                (name for name in reversed(LEVELS) if record.levelno >= LEVELS[name]), "DEBUG"
-            )
-            log.log(level, record.name, record.getMessage())
+            if ours():
+                level: Level = next(
+                    (name for name in reversed(LEVELS) if record.levelno >= LEVELS[name]), "DEBUG"
+                )
+                log.log(level, record.name, record.getMessage())
 
     root, handler = logging.getLogger(), Forward()
+    with _talkative():
+        if log.debug:
+            root.setLevel(logging.DEBUG)
+        root.addHandler(handler)
+        try:
+            yield
+        finally:
+            root.removeHandler(handler)
+
+
+@contextmanager
+def _root_level() -> Iterator[None]:
+    import logging
+
+    root = logging.getLogger()
     before = root.level
-    root.addHandler(handler)
-    root.setLevel(logging.DEBUG if log.debug else logging.INFO)
+    root.setLevel(logging.INFO)
     try:
         yield
     finally:
-        root.removeHandler(handler)
         root.setLevel(before)
+
+
+_talkative = Overlap(_root_level)
 
 
 def _plain(level: Level, name: str, message: str) -> str:

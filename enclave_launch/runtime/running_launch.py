@@ -93,6 +93,7 @@ class RunningLaunch:
         self._events: deque[RunEvent] = deque()
         self._first = 0  # number of the oldest event that is remembered
         self._output_remembered = 0  # bytes
+        self._version = 0  # rises with each change
         self._exit_status: int | None = None
         self._error: BaseException | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
@@ -114,6 +115,11 @@ class RunningLaunch:
     def exit_status(self) -> int | None:
         """As ``run`` gives it; ``None`` while the launch runs."""
         return self._exit_status
+
+    @property
+    def warden_pid(self) -> int | None:
+        """The process that all others of this launch hang on (``runtime.warden``); ``None`` before it is there."""
+        return self._service.warden_pid if self._service is not None else None
 
     def wait(self, timeout: float | None = None) -> int:
         """Until all has ended. Returns the exit status.
@@ -191,6 +197,7 @@ class RunningLaunch:
             error = raised
         with self._changed:
             self._exit_status, self._error = status, error
+            self._version += 1
             self._changed.notify_all()
 
     def _hold(self, service: LaunchService) -> None:
@@ -201,6 +208,7 @@ class RunningLaunch:
         with self._changed:
             self._remember(event)
             self._follow(event)
+            self._version += 1
             self._changed.notify_all()
 
     def _remember(self, event: RunEvent) -> None:
@@ -217,13 +225,16 @@ class RunningLaunch:
             self._processes[event.name] = _after(self._processes[event.name], event)
 
     def _wait_for(self, condition: Callable[[], bool], timeout: float | None, what: str) -> None:
+        """``condition`` is asked without the lock: it may do anything, resolve another launch file for instance."""
         deadline = None if timeout is None else time.monotonic() + timeout
-        with self._changed:
-            while not condition():
-                left = None if deadline is None else deadline - time.monotonic()
-                if left is not None and left <= 0:
+        while True:
+            seen = self._version
+            if condition():
+                return
+            left = None if deadline is None else deadline - time.monotonic()
+            with self._changed:
+                if not self._changed.wait_for(lambda: self._version != seen, left):  # noqa: B023
                     raise TimeoutError(f"{what} after {timeout:g} s")
-                self._changed.wait(left)
 
 
 def _output_of(event: RunEvent) -> int:

@@ -30,18 +30,22 @@ from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.evaluation.evaluate import (
     Arguments,
-    evaluation_surroundings,
+    forget_elements_of_launch_files,
     launch_file_error,
     top_description,
 )
+from enclave_launch.evaluation.stage import STAGE, Actor
+from enclave_launch.host.current import active_host
 from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
+from enclave_launch.prefixes import prepend_prefixes
 from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.gate import EnclaveGate
 from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging
 from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
+from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.process_tree import ProcessTree
 from enclave_launch.runtime.ros_services import RosServices
 from enclave_launch.runtime.run_events import (
@@ -59,9 +63,9 @@ from enclave_launch.runtime.warden_process import WardenProcess
 class RunOptions(NamedTuple):
     """How to run; what to run is decided elsewhere.
 
-    ``log_limit``: bytes after which a log file is begun anew. ``host_options`` go to the evaluation's host
-    (distribution, seed of anonymous names, ...), the same as the plan's. ``secrets``: environment variables no child
-    may see. ``notices`` are said once, at the start.
+    ``prefixes`` come before ``AMENT_PREFIX_PATH``. ``log_limit``: bytes after which a log file is begun anew.
+    ``host_options`` go to the evaluation's host (distribution, seed of anonymous names, ...), the same as the plan's.
+    ``secrets``: environment variables no child may see. ``notices`` are said once, at the start.
     """
 
     noninteractive: bool = False
@@ -73,6 +77,7 @@ class RunOptions(NamedTuple):
     notices: tuple[str, ...] = ()
     needs_ros_services: bool | None = False
     log_limit: int | None = None
+    prefixes: tuple[str, ...] = ()
     companion: LaunchCompanion | None = None
     host_options: HostOptions = HostOptions()
     outcomes: Outcomes | None = None
@@ -116,11 +121,6 @@ async def run_launch_async(
     return await LaunchService(launch_file, arguments, gate=gate, options=options or RunOptions()).run()
 
 
-_running = (
-    threading.Lock()
-)  # one at a time: launch files change the environment, which belongs to the process
-
-
 class LaunchService:
     """One run. ``shut_down`` may be called from the loop at any time."""
 
@@ -146,27 +146,26 @@ class LaunchService:
         self._interrupted = False
         self._failed = False
         self._services: RosServices | None = None
+        self.warden_pid: int | None = None
+        self._actor = Actor(lambda: prepend_prefixes(options.prefixes), lambda: self._host.prefixes())
         self._log: LaunchLog
         self._host: LiveHost
         self._context: LaunchContext
 
     async def run(self) -> int:
         """:raises RuntimeFailure: before anything was started."""
-        if not _running.acquire(blocking=False):
-            raise RuntimeFailure(
-                "another launch is running in this process; run each in a process of its own"
-            )
         async with AsyncExitStack() as stack:
-            stack.callback(_running.release)
             tree = ProcessTree(self._warden)  # first: the warden starts up while we go on
+            self.warden_pid = tree.warden_pid
             tree.on_interrupt = lambda: self.on_signal(SIGINT)
             await stack.enter_async_context(tree)
             stack.enter_context(_many_descriptors())
-            self._services = self._ros_services()
-            stack.callback(self._close_services)
-            self._log = self._open_log(tree)
+            with STAGE.cleared():
+                self._services = self._ros_services()
+                stack.callback(self._close_services)
+                self._log = self._open_log(tree)
             stack.callback(self._log.close)
-            stack.enter_context(captured_logging(self._log))
+            stack.enter_context(captured_logging(self._log, lambda: STAGE.is_on(self._actor)))
             companion = self._options.companion
             if companion is not None:
                 companion.opened(self)
@@ -185,7 +184,9 @@ class LaunchService:
                 outcomes=self._outcomes(),
             )
             stack.push_async_callback(self._host.close)
-            stack.enter_context(evaluation_surroundings(self._host))
+            stack.enter_context(active_host(self._host))
+            stack.callback(forget_elements_of_launch_files)
+            stack.callback(STAGE.leave, self._actor)
             return await self._run_until_over(tree)
 
     def shut_down(self, reason: str, *, due_to_sigint: bool = False) -> None:
@@ -218,7 +219,8 @@ class LaunchService:
         for notice in self._options.notices:
             self._say("WARNING", notice)
         self._observe(LaunchStarted(str(self._log.directory)))
-        self._begin()
+        with STAGE.turn(self._actor):
+            self._begin()
         if tree.lost is not None:
             tree.lost.add_done_callback(self._on_warden_lost)
         cancelled: asyncio.CancelledError | None = None
@@ -257,7 +259,8 @@ class LaunchService:
         if not queue.empty():
             if self._options.debug:
                 self._say_event(queue.next)
-            self._futures += [future for _, future in handle_next(self._context, lambda *_: None)]
+            with STAGE.turn(self._actor):
+                self._futures += [future for _, future in handle_next(self._context, lambda *_: None)]
             await asyncio.sleep(0)
             return
         pending = self._pending()
@@ -371,7 +374,7 @@ class LaunchService:
 
 
 @contextmanager
-def _many_descriptors() -> Iterator[None]:
+def _raised_limit() -> Iterator[None]:
     """Each process costs us three. The warden runs already: its children keep the limit we were given."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
@@ -392,6 +395,9 @@ def _told_to(companion: LaunchCompanion | None, observe: Observer) -> Observer:
         observe(event)
 
     return both
+
+
+_many_descriptors = Overlap(_raised_limit)
 
 
 class _Over(Exception):

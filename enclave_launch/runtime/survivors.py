@@ -12,8 +12,10 @@ import contextlib
 import os
 import signal
 import time
+from collections.abc import Iterator
 from pathlib import Path
 
+from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.warden import (
     PR_SET_CHILD_SUBREAPER,
     children_by_parent,
@@ -32,9 +34,10 @@ class Survivors:
     """Ready from its making until ``close``; ``end`` is for the day on which the warden was killed."""
 
     def __init__(self, warden: int) -> None:
-        self._libc = load_libc()
-        self._was_subreaper = self._subreaper()
-        self._set_subreaper(1)
+        self._warden = warden
+        _wardens.add(warden)
+        self._reaping = _subreaping()
+        self._reaping.__enter__()
         self._own = children_by_parent().get(os.getpid(), set())
         self._cgroup = Cgroup.below_ours()
         if self._cgroup is not None:
@@ -57,27 +60,38 @@ class Survivors:
 
     def close(self) -> None:
         """Once nothing of the launch is left."""
-        if not self._was_subreaper:
-            self._set_subreaper(0)
+        _wardens.discard(self._warden)
+        self._reaping.__exit__(None, None, None)
         if self._cgroup is not None:
             self._cgroup.remove()
 
     def _adopted(self) -> set[int]:
-        children = children_by_parent().get(os.getpid(), set()) - self._own
+        children = children_by_parent().get(os.getpid(), set()) - self._own - _wardens
         return {pid for pid in children if session_of(pid) not in (os.getsid(0), -1)}
 
-    def _subreaper(self) -> bool:
-        if self._libc is None:
-            return False
-        import ctypes
 
-        value = ctypes.c_int()
-        self._libc.prctl(PR_GET_CHILD_SUBREAPER, ctypes.byref(value), 0, 0, 0)
-        return bool(value.value)
+_wardens: set[int] = set()  # of every launch that runs in this program
 
-    def _set_subreaper(self, value: int) -> None:
-        if self._libc is not None:
-            self._libc.prctl(PR_SET_CHILD_SUBREAPER, value, 0, 0, 0)
+
+@contextlib.contextmanager
+def _subreaper() -> Iterator[None]:
+    """Processes below us that lose their parent become our children; not told where there is no prctl."""
+    libc = load_libc()
+    if libc is None:
+        yield
+        return
+    import ctypes
+
+    before = ctypes.c_int()
+    libc.prctl(PR_GET_CHILD_SUBREAPER, ctypes.byref(before), 0, 0, 0)
+    libc.prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    try:
+        yield
+    finally:
+        libc.prctl(PR_SET_CHILD_SUBREAPER, before.value, 0, 0, 0)
+
+
+_subreaping = Overlap(_subreaper)
 
 
 class Cgroup:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import re
 import subprocess
 import sys
 import textwrap
@@ -95,7 +96,8 @@ with open(f"/proc/self/task/{{os.getpid()}}/children") as children:
     assert children.read() == ""
 """
     result = python(script, str(launch_file(tmp_path, "sleep 60")), options=STRICT)
-    assert (result.returncode, result.stderr) == (0, "")
+    slow = r"(?m)^Executing <.*> took [\d.]+ seconds\n"  # asyncio's debug mode on a busy machine
+    assert (result.returncode, re.sub(slow, "", result.stderr)) == (0, "")
     assert result.stdout.count("process started") == result.stdout.count("process has died") > 0
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
 import threading
 from pathlib import Path
 
 import pytest
 
 from enclave_launch import RunningLaunch, RuntimeFailure, evaluate_launch, printed, start, started
+from enclave_launch.plan import LaunchSource
 from enclave_launch.runtime import run_events
 from enclave_launch.runtime.run_events import LaunchOver, ProcessOutput, RunEvent
 from tests.runtime.conftest import alive
@@ -149,3 +152,70 @@ def test_an_error_of_the_launch_file_ends_it_with_the_reason(tmp_path: Path) -> 
     assert launch.wait(20) == 1
     failed = [event for event in launch.events() if isinstance(event, run_events.LaunchFailed)]
     assert "no such robot" in failed[0].reason
+
+
+SEES = """
+import os
+from launch import LaunchDescription
+from launch.actions import ExecuteProcess, OpaqueFunction, RegisterEventHandler, SetEnvironmentVariable
+from launch.event_handlers import OnProcessExit
+from launch.substitutions import EnvironmentVariable
+
+def generate_launch_description():
+    first = ExecuteProcess(cmd=["sh", "-c", "echo first sees $ROBOT; while [ ! -e {go} ]; do sleep 0.02; done"])
+    return LaunchDescription([
+        SetEnvironmentVariable("ROBOT", "{robot}"),
+        first,
+        RegisterEventHandler(OnProcessExit(target_action=first, on_exit=[
+            ExecuteProcess(cmd=["echo", "then", EnvironmentVariable("ROBOT")], name="second"),
+            OpaqueFunction(function=lambda context: [ExecuteProcess(cmd=["echo", os.environ["ROBOT"]], name="third")]),
+        ])),
+    ])
+"""
+
+
+def sees(directory: Path, robot: str) -> RunningLaunch:
+    directory.mkdir()
+    file = directory / "sees.launch.py"
+    file.write_text(SEES.replace("{robot}", robot).replace("{go}", str(directory / "go")))
+    return start(LaunchSource(str(file)))
+
+
+def test_several_launches_in_one_program_each_with_an_environment_of_its_own(tmp_path: Path) -> None:
+    """What one sets is there again when its next event comes, though the others were there in between."""
+    before = dict(os.environ)
+    launches = {robot: sees(tmp_path / robot, robot) for robot in ("red", "green", "blue")}
+    for robot, launch in launches.items():
+        launch.wait_until(printed("sh-1", f"first sees {robot}"), 20)
+    for robot in ("green", "red", "blue"):
+        (tmp_path / robot / "go").touch()
+    for robot, launch in launches.items():
+        assert launch.wait(20) == 0
+        assert launch.processes["second-2"].output == f"then {robot}\n".encode()
+        assert launch.processes["third-3"].output == f"{robot}\n".encode()
+    assert dict(os.environ) == before
+
+
+def test_a_launch_file_can_be_resolved_while_a_launch_runs(tmp_path: Path) -> None:
+    launch = sees(tmp_path / "red", "red")
+    launch.wait_until(started("sh-1"), 20)
+    other = tmp_path / "other.launch.xml"
+    other.write_text('<launch><executable cmd="echo $(env ROBOT none)"/></launch>')
+    (process,) = evaluate_launch(other).evaluation.processes
+    assert process.cmd == ("echo", "none")
+    (tmp_path / "red" / "go").touch()
+    assert launch.wait(20) == 0
+    assert launch.processes["second-2"].output == b"then red\n"
+
+
+def test_a_launch_that_loses_its_warden_takes_no_other_with_it(tmp_path: Path) -> None:
+    for name in ("one", "two"):
+        (tmp_path / name).mkdir()
+    one, two = (launched(tmp_path / name, "exec sleep 60") for name in ("one", "two"))
+    for launch in (one, two):
+        launch.wait_until(started("a-1"), 20)
+    assert one.warden_pid is not None
+    os.kill(one.warden_pid, signal.SIGKILL)
+    assert one.wait(20) == 1
+    assert two.exit_status is None
+    assert two.stop(timeout=20) == 0
