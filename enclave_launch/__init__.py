@@ -1,83 +1,41 @@
 """enclave-launch: a launch file in, secured processes out.
 
 ``resolve`` → ``LaunchPlan`` → ``provision`` → ``ProvisionedLaunch`` → ``run``; see ``enclave_launch.flow``.
-The names below are the public interface; they are imported when first used, so that ``import enclave_launch``
+The public names are listed in ``__init__.pyi``; each is imported when first used, so that ``import enclave_launch``
 costs nothing.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 __version__ = "0.1.0"
 
-if TYPE_CHECKING:
-    from enclave_launch.enclave import EnclaveScope
-    from enclave_launch.errors import (
-        EnclaveLaunchError,
-        LaunchFileError,
-        ManifestError,
-        ProvisionError,
-        RuntimeFailure,
-    )
-    from enclave_launch.flow import evaluate_launch, provision, resolve, run, run_async, start
-    from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
-    from enclave_launch.plan import LaunchPlan
-    from enclave_launch.runtime.running_launch import RunningLaunch, RunningProcess, printed, started
-    from enclave_launch.secured import ProvisionedLaunch
 
-_HOMES = {
-    "EnclaveScope": "enclave",
-    "EnclaveLaunchError": "errors",
-    "LaunchFileError": "errors",
-    "ManifestError": "errors",
-    "ProvisionError": "errors",
-    "RuntimeFailure": "errors",
-    "ResolveOptions": "options",
-    "RunSettings": "options",
-    "SecurityOptions": "options",
-    "evaluate_launch": "flow",
-    "provision": "flow",
-    "resolve": "flow",
-    "run": "flow",
-    "run_async": "flow",
-    "start": "flow",
-    "LaunchPlan": "plan",
-    "RunningLaunch": "runtime.running_launch",
-    "RunningProcess": "runtime.running_launch",
-    "printed": "runtime.running_launch",
-    "started": "runtime.running_launch",
-    "ProvisionedLaunch": "secured",
-}
+def _homes() -> dict[str, str]:
+    """Each public name and the module that has it, as the stub says."""
+    import re
+    from pathlib import Path
 
-__all__ = [
-    "EnclaveLaunchError",
-    "EnclaveScope",
-    "LaunchFileError",
-    "LaunchPlan",
-    "ManifestError",
-    "ProvisionError",
-    "ProvisionedLaunch",
-    "ResolveOptions",
-    "RunSettings",
-    "RunningLaunch",
-    "RunningProcess",
-    "RuntimeFailure",
-    "SecurityOptions",
-    "evaluate_launch",
-    "printed",
-    "provision",
-    "resolve",
-    "run",
-    "run_async",
-    "start",
-    "started",
-]
+    stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+    return {
+        name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \w+$", stub, re.MULTILINE)
+    }
 
 
 def __getattr__(name: str) -> Any:
-    if name not in _HOMES:
+    if name.startswith("__") and name != "__all__":
+        raise AttributeError(f"module 'enclave_launch' has no attribute {name!r}")
+    homes = _homes()
+    if name == "__all__":
+        return sorted(homes)
+    if name not in homes:
         raise AttributeError(f"module 'enclave_launch' has no attribute {name!r}")
     from importlib import import_module
 
-    return getattr(import_module(f"enclave_launch.{_HOMES[name]}"), name)
+    value = globals()[name] = getattr(import_module(homes[name]), name)
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(["__version__", *_homes()])

@@ -23,6 +23,8 @@ class EnclaveLaunchError(Exception):
 
 
 class UsageError(EnclaveLaunchError):
+    """The command line asks for what it cannot have."""
+
     exit_status = 2
 
 
@@ -47,12 +49,12 @@ class LaunchFileError(EnclaveLaunchError):
 
 
 class ManifestError(EnclaveLaunchError):
-    pass
+    """What a node talks to is not known, or its NoDL document cannot be used."""
 
 
 class ProvisionError(EnclaveLaunchError):
-    pass
+    """The keystore cannot be made what the plan wants."""
 
 
 class RuntimeFailure(EnclaveLaunchError):
-    pass
+    """A process, or what a launch needs to run, could not be started or ended badly."""

@@ -1,6 +1,25 @@
-"""For all tests: a property is about values, never about how fast a busy machine makes them."""
+"""For all tests: which of them one runs while working (``./dev test --fast``), and how properties are tried.
 
+A property is about values, never about how fast a busy machine makes them.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
 from hypothesis import HealthCheck, settings
 
 settings.register_profile("unhurried", deadline=None, suppress_health_check=[HealthCheck.too_slow])
 settings.load_profile("unhurried")
+
+FAST = ("description", "evaluation", "frontend", "launch_ros", "nodl", "policy")
+"""Folders whose tests start no node, make no key and need no network."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    tests = Path(__file__).parent
+    for item in items:
+        folder = item.path.relative_to(tests).parts[0]
+        if folder in FAST or item.path.parent == tests:
+            item.add_marker(pytest.mark.fast)

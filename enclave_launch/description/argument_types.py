@@ -10,6 +10,7 @@ from typing import Any, Union
 
 
 def isclassinstance(obj: object) -> bool:
+    """Has ``obj`` a class? Every object has; upstream's name for it."""
     return hasattr(obj, "__class__")
 
 

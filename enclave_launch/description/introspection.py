@@ -22,6 +22,7 @@ _INDENT = "    "
 
 
 def indent(lines: Iterable[str], indention: str = _INDENT) -> list[str]:
+    """Each line with ``indention`` before it."""
     return [f"{indention}{line}" for line in lines]
 
 
@@ -40,10 +41,12 @@ def tree_like_indent(lines: Iterable[str]) -> list[str]:
 
 
 def format_substitutions(substitutions: SomeSubstitutionsType) -> str:
+    """The descriptions of substitutions, joined."""
     return " + ".join(sub.describe() for sub in normalize_to_list_of_substitutions(substitutions))
 
 
 def format_entities(entities: Iterable[Any]) -> list[str]:
+    """The lines of each entity in turn."""
     lines: list[str] = []
     for entity in entities:
         lines += format_action(entity) if isinstance(entity, Action) else [f"Unknown entity('{entity}')"]
@@ -51,12 +54,14 @@ def format_entities(entities: Iterable[Any]) -> list[str]:
 
 
 def format_event_handler(event_handler: BaseEventHandler) -> list[str]:
+    """One line about the handler, then its entities, indented."""
     text, entities = event_handler.describe()
     items = [entities] if isinstance(entities, LaunchDescriptionEntity) else entities
     return [text, *indent(format_entities(items))]
 
 
 def format_action(action: Action) -> list[str]:
+    """The lines of one action."""
     if isinstance(action, LogInfo):
         return [f"LogInfo({format_substitutions(action.msg)})"]
     if isinstance(action, EmitEvent):

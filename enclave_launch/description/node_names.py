@@ -22,11 +22,11 @@ class NameValidationException(ValueError):
 
 
 class InvalidNodeNameException(NameValidationException):
-    pass
+    """A node name that rmw would refuse."""
 
 
 class InvalidNamespaceException(NameValidationException):
-    pass
+    """A namespace that rmw would refuse."""
 
 
 def validate_node_name(name: str) -> None:
@@ -46,10 +46,12 @@ def validate_namespace(namespace: str) -> None:
 
 
 def is_root_namespace(ns: str) -> bool:
+    """Is it ``/``?"""
     return ns == "/"
 
 
 def is_namespace_absolute(ns: str) -> bool:
+    """Does it begin with ``/``?"""
     return ns.startswith("/")
 
 
@@ -59,10 +61,12 @@ _GLOBAL = "unique_ros_node_names"
 
 
 def add_node_name(context: LaunchContext, node_name: str) -> None:
+    """Count one more node with this fully qualified name."""
     _counts(context)[node_name] += 1
 
 
 def get_node_name_count(context: LaunchContext, node_name: str) -> int:
+    """How many nodes with this fully qualified name were counted."""
     return _counts(context)[node_name]
 
 

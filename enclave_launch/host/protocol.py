@@ -44,6 +44,8 @@ class HostOptions(NamedTuple):
 
 
 class CommandResult(NamedTuple):
+    """What a command gave: its exit status and what it wrote."""
+
     returncode: int
     stdout: str
     stderr: str

@@ -91,4 +91,5 @@ def matches_action(target_action: Action) -> Callable[[Action], bool]:
 
 
 def event_named(name: str) -> Callable[[Event], bool]:
+    """A matcher of the events with this name."""
     return lambda event: event.name == name

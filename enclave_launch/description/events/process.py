@@ -68,10 +68,14 @@ class RunningProcessEvent(Event):
 
 
 class ProcessStarted(RunningProcessEvent):
+    """The process runs."""
+
     name = "launch.events.process.ProcessStarted"
 
 
 class ProcessExited(RunningProcessEvent):
+    """The process has ended with ``returncode``; negative is the number of a signal."""
+
     name = "launch.events.process.ProcessExited"
 
     def __init__(self, *, returncode: int, **kwargs: Any) -> None:
@@ -111,6 +115,8 @@ class ProcessIO(RunningProcessEvent):
 
 
 class ProcessStdin(ProcessIO):
+    """``text`` goes to the standard input of the process."""
+
     name = "launch.events.process.ProcessStdin"
 
     def __init__(self, *, text: bytes, **kwargs: Any) -> None:
@@ -118,6 +124,8 @@ class ProcessStdin(ProcessIO):
 
 
 class ProcessStdout(ProcessIO):
+    """``text`` came from the standard output of the process."""
+
     name = "launch.events.process.ProcessStdout"
 
     def __init__(self, *, text: bytes, **kwargs: Any) -> None:
@@ -125,6 +133,8 @@ class ProcessStdout(ProcessIO):
 
 
 class ProcessStderr(ProcessIO):
+    """``text`` came from the standard error output of the process."""
+
     name = "launch.events.process.ProcessStderr"
 
     def __init__(self, *, text: bytes, **kwargs: Any) -> None:
@@ -158,6 +168,7 @@ def _matches(test: Callable[[dict[str, Any]], bool]) -> Matcher:
 
 
 def matches_pid(pid: int) -> Matcher:
+    """The process with this id."""
     return _matches(lambda details: bool(details["pid"] == pid))
 
 

@@ -152,7 +152,7 @@ def _substituted(context: LaunchContext, path: Path) -> Path:
         return path  # told where it is used
     text = perform_substitutions(context, parse_substitution(read_text(path)))
     try:
-        yaml_text.load(text)
+        yaml_text.load_shared(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
     return Path(context.host.write_parameter_file(text))

@@ -10,7 +10,6 @@ from __future__ import annotations
 import pathlib
 import warnings
 from collections.abc import Iterator, Mapping
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 from enclave_launch.boundary.files import read_text
@@ -72,13 +71,7 @@ def _read(context: LaunchContext, path: pathlib.Path) -> Any:
     if generated is None and context.host.allow_missing_packages and not path.is_file():
         context.host.warn(parameter_file_missing(str(path)))
         return {}
-    return _parse(read_text(path) if generated is None else generated)
-
-
-@lru_cache(maxsize=256)
-def _parse(text: str) -> Any:
-    """Shared by the components that name the same file; nobody changes it."""
-    return yaml_text.load(text)
+    return yaml_text.load_shared(read_text(path) if generated is None else generated)
 
 
 def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:

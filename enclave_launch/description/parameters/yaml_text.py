@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 from enclave_launch.description.substitution import TextSubstitution
@@ -38,6 +39,12 @@ def load(text: str) -> Any:
     from enclave_launch.frontend.yaml_tree import parse_yaml
 
     return parse_yaml(text).root
+
+
+@lru_cache(maxsize=256)
+def load_shared(text: str) -> Any:
+    """As ``load``, read once for all who read the same text; do not modify the values."""
+    return load(text)
 
 
 def dump(value: Any) -> str:

@@ -41,6 +41,8 @@ def _text(value: bool) -> str:
 
 @expose_substitution("not")
 class NotSubstitution(TemplateSubstitution):
+    """``true`` when the value is false."""
+
     value = template()
     refusal = (TypeError, "not substitution expects 1 argument")
 
@@ -67,12 +69,16 @@ class _Binary(TemplateSubstitution):
 
 @expose_substitution("and")
 class AndSubstitution(_Binary):
+    """``true`` when both are."""
+
     def perform(self, context: LaunchContext) -> str:
         return _text(all(self._operands(context)))
 
 
 @expose_substitution("or")
 class OrSubstitution(_Binary):
+    """``true`` when one of two is."""
+
     def perform(self, context: LaunchContext) -> str:
         return _text(any(self._operands(context)))
 
@@ -105,6 +111,8 @@ class _Variadic(Substitution):
 
 @expose_substitution("any", feature=Feature.EQUALS_IF)
 class AnySubstitution(_Variadic):
+    """``true`` when at least one is."""
+
     def __init__(self, *args: SomeSubstitutionsType) -> None:
         super().__init__(*args)
 
@@ -114,6 +122,8 @@ class AnySubstitution(_Variadic):
 
 @expose_substitution("all", feature=Feature.EQUALS_IF)
 class AllSubstitution(_Variadic):
+    """``true`` when each is."""
+
     def __init__(self, *args: SomeSubstitutionsType) -> None:
         super().__init__(*args)
 

@@ -34,12 +34,16 @@ class FindPackage(PathOperator, TemplateSubstitution):
 
 @expose_substitution("find-pkg-prefix")
 class FindPackagePrefix(FindPackage):
+    """The prefix in which a package is installed."""
+
     def find(self, package_name: str) -> str:
         return packages.get_package_prefix(package_name)
 
 
 @expose_substitution("find-pkg-share")
 class FindPackageShare(FindPackage):
+    """The share directory of a package: ``<prefix>/share/<package>``."""
+
     def find(self, package_name: str) -> str:
         return packages.get_package_share_directory(package_name)
 
