@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -184,3 +185,14 @@ def test_a_dry_run_imports_only_what_its_path_needs(form: str) -> None:
     assert {"nodl.document.v1", "enclave_launch.plan"} <= loaded
     heavy = {"cryptography", "pydantic", "asyncio", "yaml", "lxml", "hashlib", "cyclonedds", "tree_sitter"}
     assert loaded.isdisjoint(heavy)
+
+
+def named_in_architecture() -> list[str]:
+    """Every module and folder that the table "Where a rule lives" and the decisions name."""
+    text = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8").partition("## Where a rule lives")[2]
+    return sorted(set(re.findall(r"`((?:[a-z_]+/)*[a-z_]+(?:\.py|/))`", text)))
+
+
+@pytest.mark.parametrize("named", named_in_architecture())
+def test_what_architecture_md_names_exists(named: str) -> None:
+    assert (ROOT / "enclave_launch" / named).exists() or (ROOT / named).exists()
