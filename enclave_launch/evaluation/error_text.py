@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator
 from types import TracebackType
 
+from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.description.conditions import InvalidConditionExpressionError
 from enclave_launch.errors import EnclaveLaunchError
@@ -35,6 +36,8 @@ def error_text(error: BaseException) -> str:
 def _text(error: BaseException) -> str:
     if isinstance(error, UnicodeDecodeError):
         return f"not UTF-8 text: byte 0x{error.object[error.start]:02x} at offset {error.start}"
+    if isinstance(error, ImportError) and (missing := missing_dependency(error)):
+        return missing
     if isinstance(error, OSError) and error.strerror and error.filename is not None:
         return f"{error.strerror}: '{os.fsdecode(error.filename)}'"
     if isinstance(error, SyntaxError):
@@ -81,7 +84,7 @@ def _next_step(error: BaseException, text: str) -> str:
         return "\ngive it as NAME:=VALUE after the launch file (--show-args lists all), or in the include"
     if isinstance(error, OSError) and f"'{MISSING_PREFIX}/" in text:
         return "\nthat file is part of a package that is not installed here; this launch file reads it itself"
-    if isinstance(error, ModuleNotFoundError):
+    if isinstance(error, ModuleNotFoundError) and not missing_dependency(error):
         folders = (
             f"Python {sys.version_info.major}.{sys.version_info.minor}, PYTHONPATH and the install prefixes"
         )

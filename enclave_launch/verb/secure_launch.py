@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.terminal import printable, safe_output
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
@@ -45,6 +46,12 @@ def _guarded_main(argv: Sequence[str] | None) -> int:
     except EnclaveLaunchError as error:
         print(f"secure-launch: error: {error}", file=sys.stderr)
         return error.exit_status
+    except ImportError as error:
+        text = missing_dependency(error)
+        if text is None:
+            raise
+        print(f"secure-launch: error: {text}", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:

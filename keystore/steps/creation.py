@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
+from enclave_launch.boundary.dependencies import require
 from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.governance_file import covers, governance_stands
@@ -84,6 +85,7 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
 
     Raises NotAKeystoreError for a directory with other things in it, InvalidInputError for a CA that cannot serve.
     """
+    require("cryptography", "lxml")
     chosen = options or CreateOptions()
     root = resolve_root(keystore)
     _refuse_foreign(root)

@@ -8,6 +8,7 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
+from enclave_launch.boundary.dependencies import require
 from keystore.disk import store
 from keystore.disk.authorities import refuse_foreign_authorities
 from keystore.disk.governance_file import governance_domains
@@ -36,6 +37,7 @@ def reconcile(
     root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions, now: datetime
 ) -> ProvisionReport:
     """Complete the keystore, then every enclave that is not as wanted."""
+    require("cryptography", "lxml")
     # An impossible validity is refused before a keystore is made for it.
     lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
     Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)

@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.terminal import safe_output
 from keystore.errors import KeystoreError
 from keystore.formats.policy import PolicyError
@@ -37,6 +38,12 @@ def _main(argv: Sequence[str] | None) -> int:
     except (KeystoreError, PolicyError) as error:
         print(f"secure-keystore: error: {error}", file=sys.stderr)
         return error.exit_status if isinstance(error, KeystoreError) else 2
+    except ImportError as error:
+        text = missing_dependency(error)
+        if text is None:
+            raise
+        print(f"secure-keystore: error: {text}", file=sys.stderr)
+        return 1
     except BrokenPipeError:
         # The reader of our output left; without this the interpreter complains again at exit.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

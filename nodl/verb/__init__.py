@@ -10,6 +10,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.terminal import safe_output
 
 VERBS = ("check_record", "convert", "infer", "library", "show", "validate")
@@ -30,6 +31,11 @@ def _main(argv: Sequence[str] | None) -> int:
         return status
     except NoDLError as error:
         message = str(error)
+    except ImportError as error:
+        text = missing_dependency(error)
+        if text is None:
+            raise
+        message = text
     except OSError as error:
         message = f"{error.filename}: {error.strerror}"
     print(f"secure-nodl {arguments.verb}: {message}", file=sys.stderr)
