@@ -112,7 +112,10 @@ class Grants:
         return Description(named[0] if named else None, planned.origin, planned.missing)
 
     def rules_of(self, enclave: str) -> Iterable[Rule]:
-        """What the plan allows in ``enclave``, without what every node has."""
+        """What the plan allows in ``enclave``, without what every node has; nothing of the launcher's own, which is not
+        recorded."""
+        if self._plan.launcher is not None and enclave == self._plan.launcher.enclave:
+            return
         built_in = self._plan.derived.built_in_names(enclave)
         for rule in self._plan.derived.reasons.get(enclave, {}):
             asked_for = (LIST_NAMES[rule.operation], rule.expression) not in built_in

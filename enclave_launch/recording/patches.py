@@ -100,6 +100,9 @@ def _diff(file: str, before: str, after: str) -> str:
 def _into_v2(text: str, asked: Asked) -> str | None:
     category = _LISTS[asked.kind]
     head = re.search(rf"^{category}:[ \t]*(#.*)?$", text, re.MULTILINE)
+    empty = re.search(rf"^{category}:[ \t]*\[[ \t]*\][ \t]*$", text, re.MULTILINE)
+    if empty is not None:
+        return f"{text[: empty.start()]}{category}:\n  - {_v2_entry(asked)}{text[empty.end() :]}"
     if head is None:
         if re.search(rf"^[\"']?{category}[\"']?[ \t]*:", text, re.MULTILINE) or text.lstrip()[:1] == "{":
             return None  # written inline, or JSON

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, split_fqn
-from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
+from nodl.node_interface import RANDOM_ENDING, Endpoint, EndpointKind, NodeInterface
 from nodl.record.asked import LOGGER_SERVICES, Asked, AskedNode
 from nodl.record.origins import arguments_as_inputs
 from nodl.remap import NodeNames
@@ -96,10 +96,18 @@ def _logger_services(node: AskedNode) -> tuple[str, ...]:
 
 
 def _matching(node: AskedNode, interfaces: Sequence[NodeInterface]) -> NodeInterface | None:
-    same = [each for each in interfaces if each.name == node.name]
+    same = [each for each in interfaces if _is_named(node, each.name)]
     if len(same) > 1:
         same = [each for each in same if (each.namespace or "") == node.namespace] or same
     return same[0] if same else (interfaces[0] if len(interfaces) == 1 else None)
+
+
+def _is_named(node: AskedNode, described: str | None) -> bool:
+    """A name with a random ending is the source's own, or the one that rules inside the program give."""
+    if described is None or not described.endswith(RANDOM_ENDING):
+        return described == node.name
+    stem = described.removesuffix(RANDOM_ENDING) + "_"
+    return node.name.startswith(stem) or split_fqn(node.fqn)[1].startswith(stem)
 
 
 def _granted(node: AskedNode) -> list[Asked]:
@@ -109,7 +117,7 @@ def _granted(node: AskedNode) -> list[Asked]:
 
 
 def _about_the_node(node: AskedNode, interface: NodeInterface) -> Iterable[Difference]:
-    if interface.name and node.name and interface.name != node.name:
+    if interface.name and node.name and not _is_named(node, interface.name):
         yield Difference(
             Verdict.WRONG, node.fqn, None, f"node name {interface.name}", f"recorded: {node.name}"
         )

@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from nodl.record.asked import AskedNode
     from nodl.record.checking import Comparison
 
+_MOST_NODES = 32  # of one program: descriptions may refer to each other
 JUDGED = ("manifest", "inference", "library")
 
 
@@ -101,7 +102,8 @@ def _judge(
 
     for judge in judges:
         interfaces, why = _SAYS[judge](node, lookup, prefixes)
-        yield Judgement(node, judge, compare(node, interfaces) if interfaces else None, why)
+        described = _at_this_start(node, interfaces)
+        yield Judgement(node, judge, compare(node, described) if described else None, why)
 
 
 def _described(
@@ -123,21 +125,30 @@ def _inferred(
 def _of_library(
     node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str]
 ) -> tuple[Sequence[NodeInterface], str]:
-    """As the document is for this start: with the parameters and words that the launch gave it."""
-    from nodl.dependence import Situation
-    from nodl.dependence.apply import applied
     from nodl.library import Library
 
-    library = Library()
-    hit = library.find(node.package, node.plugin or node.executable, distro=node.distro)
-    if hit is None:
-        return (), "the library has no document of it"
+    hit = Library().find(node.package, node.plugin or node.executable, distro=node.distro)
+    return ((), "the library has no document of it") if hit is None else ((hit.document.interface,), "")
+
+
+def _at_this_start(node: AskedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
+    """Descriptions that depend on parameters and words, as they are with those that the launch gave; with the further
+    nodes that they bring."""
+    from nodl.dependence import Situation
+    from nodl.dependence.apply import applied, own_name
+    from nodl.library import Library
+
     namespace, name = split_fqn(node.fqn)
     situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)
-    documents = _Documents(library, node.distro)
-    done = applied(hit.document.interface, situation, documents)
-    further = [applied(each, situation, documents).interface for each in done.further]
-    return (done.interface, *further), ""
+    documents = _Documents(Library(), node.distro)
+    found: list[NodeInterface] = []
+    waiting = list(interfaces)
+    while waiting and len(found) < _MOST_NODES:
+        interface = waiting.pop(0)
+        done = applied(interface._replace(name=own_name(interface, situation)), situation, documents)
+        found.append(done.interface)
+        waiting += done.further
+    return found
 
 
 class _Documents(NamedTuple):

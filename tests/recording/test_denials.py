@@ -227,7 +227,13 @@ def test_a_patch_of_a_v1_manifest_goes_into_the_right_node(tmp_path: Path) -> No
     assert [len(node.interface.endpoints) for node in read_document(file)] == [1, 2]
 
 
-@pytest.mark.parametrize("text", ["{nodl_version: 2}", "nodl_version: 2\npublishers: []\n"])
+def test_a_patch_fills_an_empty_list() -> None:
+    patch = manifest_patch("f", "nodl_version: 2\npublishers: []\n", 1, asked("publisher", "x"))
+    assert patch is not None
+    assert [line for line in patch.diff.splitlines() if line.startswith("-p")] == ["-publishers: []"]
+
+
+@pytest.mark.parametrize("text", ["{nodl_version: 2}", "nodl_version: 2\npublishers: [{name: y}]\n"])
 def test_a_manifest_of_another_shape_is_left_alone(text: str) -> None:
     assert manifest_patch("f", text, 1, asked("publisher", "x")) is None
 
