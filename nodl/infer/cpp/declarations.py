@@ -331,6 +331,10 @@ class _Collector:
             kind = node.child_by_field_name("type")
             if kind is not None and kind.type in ("struct_specifier", "class_specifier"):
                 self.class_(kind, scope, [])
+            if kind is not None and kind.type == "enum_specifier":
+                self.enum(kind, scope)
+                self.index.enums |= {text(name) for name in names}
+                return
             if names and kind is not None:
                 self.index.aliases["::".join((*scope, text(names[-1])))] = (text(kind), scope)
             return

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.declarations import Class, Field, FileIndex, Function
@@ -17,6 +17,8 @@ from nodl.infer.cpp.syntax import text
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
+    from tree_sitter import Node
+
     from nodl.infer.cpp.machine import Machine
 
 CREATES = re.compile(
@@ -199,11 +201,13 @@ class Reach:
         self.waiting: list[Function] = []
         self.idle: dict[str, list[Function]] = {}  # class -> methods that wait for somebody to speak of it
         self.used |= run.used_classes()
+        self.followed = False  # whether functions that ran count with what was not followed in them alone
 
     def from_functions(self, functions: Iterable[Function]) -> Reach:
         for cls in sorted(self.used):
             self._use_class(cls)
         self.waiting += functions
+        self.followed = True
         return self._finish()
 
     def from_words(self, words: Iterable[str]) -> Reach:
@@ -224,7 +228,14 @@ class Reach:
             self.idle.setdefault(owner, []).append(function)
             return
         self.reached.add(function)
-        self._mention(function.words)
+        if not self.followed or function not in self.run.called:
+            self._mention(function.words)
+            return
+        calls, types = open_words(self.run, function, self.by_name)
+        self._mention(calls)
+        for name in types:
+            if name in self.run.names.classes:
+                self._use(name)
 
     def _mention(self, words: Iterable[str]) -> None:
         for word in words:
@@ -267,6 +278,71 @@ class Reach:
 
 _POINTER = re.compile(r"_ptr\b|Ptr\b|\*|&|\bweak_|optional")
 _WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def open_words(
+    run: Machine, function: Function, by_name: Mapping[str, Sequence[Function]]
+) -> tuple[set[str], set[str]]:
+    """What a function that ran mentions without the call having been followed: functions; classes only spoken of."""
+    calls: set[str] = set()
+    types: set[str] = set()
+    source = function.node.text or b""
+    start = function.node.start_byte
+    handled = run.handled.get(function.file.file, set())
+    for match in _TOKEN.finditer(source):
+        word = match[0].decode("utf-8", "replace")
+        if word not in by_name and word not in run.names.classes:
+            continue
+        offset = start + match.start()
+        found = function.node.descendant_for_byte_range(offset, offset + len(match[0]))
+        how = _mentioned_how(found, handled)
+        if how == "type":
+            types.add(word)
+        elif how == "open" and not _is_dead(run, function.file.file, offset):
+            calls.add(word)
+    return calls, types
+
+
+_TOKEN = re.compile(rb'(?<!["\w])[A-Za-z_]\w*')
+_TYPES = ("parameter_declaration", "optional_parameter_declaration", "type_descriptor", "alias_declaration",
+          "using_declaration", "trailing_return_type", "for_range_loop")  # fmt: skip
+
+
+def _mentioned_how(node: Node | None, handled: set[int]) -> str:
+    """``followed``, ``type`` (nothing is made or called) or ``open``."""
+    inside_type = False
+    while node is not None and node.parent is not None:
+        parent = node.parent
+        if parent.type == "call_expression":
+            is_callee = parent.child_by_field_name("function") == node
+            return "followed" if is_callee and parent.start_byte in handled else "open"
+        if parent.type in ("new_expression", "compound_literal_expression"):
+            is_made = parent.child_by_field_name("type") == node
+            return "followed" if is_made and parent.start_byte in handled else "open"
+        if parent.type in ("declaration", "field_initializer"):
+            arguments = parent.named_children[-1].start_byte if parent.named_children else 0
+            if parent.start_byte in handled or arguments in handled:
+                return "followed"
+            return (
+                "type"
+                if inside_type
+                or (parent.child_by_field_name("type") == node
+                and _POINTER.search((parent.text or b"").decode("utf-8", "replace")))
+                else "open"
+            )
+        if parent.type in ("string_literal", "function_definition"):
+            return "type"
+        if parent.type in _TYPES[:2]:
+            return "type"
+        inside_type = inside_type or parent.type in _TYPES
+        if parent.type in ("compound_statement", "argument_list"):
+            return "type" if inside_type else "open"
+        node = parent
+    return "open"
+
+
+def _is_dead(run: Machine, file: str, offset: int) -> bool:
+    return any(where == file and start <= offset < end for where, start, end in run.dead)
 
 
 def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
