@@ -326,8 +326,10 @@ def _mentioned_how(node: Node | None, handled: set[int]) -> str:
             return (
                 "type"
                 if inside_type
-                or (parent.child_by_field_name("type") == node
-                and _POINTER.search((parent.text or b"").decode("utf-8", "replace")))
+                or (
+                    parent.child_by_field_name("type") == node
+                    and _POINTER.search((parent.text or b"").decode("utf-8", "replace"))
+                )
                 else "open"
             )
         if parent.type in ("string_literal", "function_definition"):

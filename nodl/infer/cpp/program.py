@@ -307,17 +307,19 @@ def _one(value: Value) -> int:
 
 
 def _overrides(run: Machine) -> None:
-    """Methods that the library's base class calls: overrides of classes whose base is not in reach."""
-    for obj in list(run.made_objects()):
-        if obj.cls is None or not (obj.foreign_base or obj.is_node):
+    """Destructors, and what a base in a library calls: overrides of classes whose base is not in reach."""
+    for obj in run.made_objects():
+        if obj.cls is None:
             continue
+        hosted = bool(obj.foreign_base or obj.is_node)
         for cls in run.names.ancestry(obj.cls):
             for name, methods in run.names.methods.get(cls, {}).items():
+                in_force = hosted and methods == run.names.find_methods(obj.cls, name)
                 for method in methods:
-                    if (method.virtual or name in HOOKS) and method in run.names.find_methods(obj.cls, name):
-                        run.callbacks.setdefault(
-                            (method, obj), (Bound(method, obj), Frame(method.file, method.scope, None, obj))
-                        )
+                    hook = in_force and (method.virtual or name in HOOKS)
+                    if hook or name.startswith("~"):
+                        frame = Frame(method.file, method.scope, None, obj)
+                        run.callbacks.setdefault((method, obj), (Bound(method, obj), frame))
 
 
 def _findings(run: Machine, sources: Sources) -> Findings:
