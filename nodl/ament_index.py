@@ -106,9 +106,17 @@ def package_version(package: str, prefixes: Sequence[str]) -> str | None:
     """What the installed ``package.xml`` says; ``None`` when the package or its version is not known."""
     try:
         share = package_share_directory(package, prefixes)
-        with open(os.path.join(share, "package.xml"), encoding="utf-8") as file:
+    except (PackageNotFoundError, ValueError):
+        return None
+    return package_file_version(os.path.join(share, "package.xml"))
+
+
+def package_file_version(path: str) -> str | None:
+    """What a ``package.xml`` says; ``None`` when it does not, or cannot be read."""
+    try:
+        with open(path, encoding="utf-8", errors="replace") as file:
             found = _PACKAGE_VERSION.search(file.read())
-    except (PackageNotFoundError, ValueError, OSError):
+    except OSError:
         return None
     return found[1] if found else None
 

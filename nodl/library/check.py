@@ -10,12 +10,15 @@ import os
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
+from nodl.ament_index import package_file_version
 from nodl.infer.packages import read_package
-from nodl.library import Library
+from nodl.library import Library, fits
 from nodl.library.document import LibraryDocument
-from nodl.node_interface import EndpointKind, NodeInterface
+from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 
 _Name = tuple[EndpointKind, str]
+_BUILT_IN = frozenset(("clock", "parameter_events", "rosout"))
+_MOST = 10_000
 
 
 class Verdict(NamedTuple):
@@ -63,26 +66,32 @@ def check(library: Library, folder: str) -> list[Verdict]:
         source = packages.get(document.package)
         if source is None:
             continue
+        version = package_file_version(os.path.join(source, "package.xml"))
+        if not fits(document.versions, "", version):
+            verdicts.append(Verdict(document, not_compared=f"these sources are of version {version}"))
+            continue
         if document.package not in inferred:
             inferred[document.package] = infer_paths([source]).nodes
-        verdicts.append(compare(document, inferred[document.package]))
+        verdicts.append(compare(document, inferred[document.package], library))
     return verdicts
 
 
-def compare(document: LibraryDocument, nodes: Iterable[NodeInterface]) -> Verdict:
-    """``document`` with what inference found in its package."""
+def compare(document: LibraryDocument, nodes: Iterable[NodeInterface], library: Library) -> Verdict:
+    """``document`` with what inference found in its package; what its default plugins and further nodes have, which
+    ``library`` describes, may be found too."""
     if document.classes or document.transport:
         return Verdict(document, not_compared="a plugin, whose node is made by those who load it")
     same = [node for node in nodes if _is_same(document, node)]
     if not same:
         return Verdict(document, not_compared="inference found no such node in the sources")
-    theirs = {(e.kind, _key(e.name.text)) for node in same for e in node.endpoints if "*" not in e.name.text}
+    theirs = {(e.kind, _key(e.name.text)) for node in same for e in node.endpoints if _is_known(e)}
     unknown = any("*" in e.name.text for node in same for e in node.endpoints)
     ours = {(e.kind, _key(e.name.text)) for e in document.interface.endpoints}
     depends = document.interface.depends
     varied = {(kind, _key(name)) for kind, name in depends.variations} if depends else set()
     only_document = () if unknown else _shown(ours - theirs - varied)
-    return Verdict(document, only_document, _shown(theirs - ours))
+    brought = _brought(document.interface, library)
+    return Verdict(document, only_document, _shown(theirs - ours - brought))
 
 
 def _is_same(document: LibraryDocument, node: NodeInterface) -> bool:
@@ -91,7 +100,50 @@ def _is_same(document: LibraryDocument, node: NodeInterface) -> bool:
 
 
 def _key(name: str) -> str:
-    return name.removeprefix("/") if name.startswith(("/tf", "/clock")) else name
+    """``{node}/x``, ``get_name() + "/x"`` in the source, is ``~/x``; tf's names are written with and without slash."""
+    private = f"~/{name.removeprefix('{node}/')}" if name.startswith("{node}/") else name
+    return private.removeprefix("/") if private.startswith("/tf") else private
+
+
+def _is_known(endpoint: Endpoint) -> bool:
+    """A name of the node's own: known, and none that every node has anyway."""
+    name = endpoint.name.text
+    return bool(name) and "*" not in name and name.lstrip("/") not in _BUILT_IN
+
+
+def _brought(interface: NodeInterface, library: Library) -> set[_Name]:
+    """The names of the plugins, transports and further nodes of a start without parameters."""
+    from nodl.dependence import Situation
+    from nodl.dependence.apply import applied
+
+    transports = frozenset(package for _, package, _ in library.transports())
+    situation = Situation("rolling", interface.name or "node", "/", installed=transports)
+    names: set[_Name] = set()
+    waiting = [interface]
+    while waiting and len(names) < _MOST:
+        current = waiting.pop()
+        done = applied(current, situation._replace(node=current.name or "node"), _Documents(library))
+        names |= {(e.kind, _key(e.name.text)) for e in done.interface.endpoints}
+        waiting.extend(done.further)
+    return names
+
+
+class _Documents:
+    """A library as ``apply`` asks it."""
+
+    def __init__(self, library: Library):
+        self._library = library
+
+    def of_class(self, plugin_class: str) -> NodeInterface | None:
+        hit = self._library.of_class(plugin_class)
+        return hit.document.interface if hit else None
+
+    def named(self, name: str) -> NodeInterface | None:
+        hit = self._library.named(name)
+        return hit.document.interface if hit else None
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
+        return self._library.transports()
 
 
 def _shown(names: Iterable[_Name]) -> tuple[str, ...]:
