@@ -36,7 +36,7 @@ ENTRY_POINTS = {
 }
 
 if int(setuptools.__version__.split(".")[0]) >= 61 and Path("pyproject.toml").is_file():
-    distribution = setuptools.setup(data_files=DATA_FILES)
+    distribution = setuptools.setup(data_files=DATA_FILES, license="Apache-2.0")
     # colcon reads this object's attributes as Python literals, which setuptools' SpecifierSet is not.
     for holder in (distribution, distribution.metadata):
         holder.python_requires = str(holder.python_requires)
