@@ -11,24 +11,25 @@ from keystore.formats.role import Role
 
 
 def foreign_authorities(view: KeystoreView, register: Register | None) -> list[tuple[Role, CertificateFacts]]:
-    """Trusted CAs that this keystore did not make and was not given; none can be told without a register."""
+    """Trusted CAs that this keystore did not make and was not given, or has retired; none can be told without a
+    register."""
     if register is None:
         return []
     return [
         (role, ca)
         for role in Role
         for ca in view.ca_bundle(role)
-        if not register.knows_authority(role, ca.der)
+        if not register.trusts_authority(role, ca.der)
     ]
 
 
 def refuse_foreign_authorities(view: KeystoreView, register: Register | None) -> None:
     """Raises UnsafeKeystoreError: whoever holds the key of such a CA can make enclaves that Fast DDS lets in."""
     for role, ca in foreign_authorities(view, register):
+        place = printable(view.root / layout.ca_cert(role))
         raise UnsafeKeystoreError(
-            f"{printable(view.root / layout.ca_cert(role))} holds a CA that this keystore did not make: "
-            f"{describe(ca)}. Find out who put it there; to remove it: secure-keystore renew "
-            f"{printable(view.root)}"
+            f"{place} holds a CA that this keystore did not make, or has retired: {describe(ca)}. Find out who put it "
+            f"there; to remove it: secure-keystore renew {printable(view.root)}"
         )
 
 

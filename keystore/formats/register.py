@@ -31,11 +31,12 @@ UNKNOWN = ""
 
 
 class AuthorityState(str, Enum):
-    """Of a CA: whether it is to come, signs, or has signed."""
+    """Of a CA over its life. All but the retired may stand in a trust file."""
 
-    WAITING = "waiting"
+    WAITING = "waiting"  # made, to sign after the switch
     IN_USE = "in use"
-    RETIRED = "retired"
+    LEAVING = "leaving"  # signs no more; trusted until the roll-over is finished
+    RETIRED = "retired"  # trusted no more
 
 
 class IssuedCertificate(NamedTuple):
@@ -102,9 +103,9 @@ class Register:
         """The document signed last for the enclave."""
         return self._latest_documents.get(enclave)
 
-    def knows_authority(self, role: Role, ca: bytes) -> bool:
-        """Whether this keystore made the CA with this certificate, or was given it."""
-        return (role, ca) in self.authorities
+    def trusts_authority(self, role: Role, ca: bytes) -> bool:
+        """Whether the CA with this certificate may stand in the trust file: made here or given, and not retired."""
+        return self.authorities.get((role, ca), AuthorityState.RETIRED) is not AuthorityState.RETIRED
 
     def revoked(self, issuer: str) -> dict[int, datetime]:
         """Serial -> date of revocation, of the certificates that this CA issued."""
@@ -115,13 +116,22 @@ class Register:
         }
 
     def with_authority(self, role: Role, ca: bytes, state: AuthorityState) -> Register:
-        """A CA in use retires the one that was."""
+        """With a new CA in use the one that was is leaving."""
         known = dict(self.authorities)
         if state is AuthorityState.IN_USE:
             for (its, other), was in self.authorities.items():
                 if its is role and was is AuthorityState.IN_USE:
-                    known[its, other] = AuthorityState.RETIRED
+                    known[its, other] = AuthorityState.LEAVING
         known[role, ca] = state
+        return replace(self, authorities=known)
+
+    def with_retired(self, roles: Iterable[Role]) -> Register:
+        """No CA that is leaving one of these roles is trusted any more."""
+        ended = set(roles)
+        known = {
+            (role, ca): AuthorityState.RETIRED if role in ended and state is AuthorityState.LEAVING else state
+            for (role, ca), state in self.authorities.items()
+        }
         return replace(self, authorities=known)
 
     def with_certificates(self, issued: Iterable[IssuedCertificate]) -> Register:

@@ -69,8 +69,10 @@ def _authorities(view: KeystoreView) -> Register:
         for facts in _certificates_in(view, f"{layout.NEXT}/{role.value}", ""):
             register = register.with_authority(role, facts.der, AuthorityState.WAITING)
         for facts in _certificates_in(view, layout.RETIRED, f"{role.value}-"):
-            if not register.knows_authority(role, facts.der):
-                register = register.with_authority(role, facts.der, AuthorityState.RETIRED)
+            leaving = any(ca.der == facts.der for ca in view.ca_bundle(role))
+            state = AuthorityState.LEAVING if leaving else AuthorityState.RETIRED
+            if not register.trusts_authority(role, facts.der):
+                register = register.with_authority(role, facts.der, state)
     return register
 
 

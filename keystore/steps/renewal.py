@@ -150,14 +150,14 @@ def _drop_foreign_authorities(opened: Store) -> list[str]:
             ca for (its, ca), state in opened.register.authorities.items()
             if its is role and state is AuthorityState.IN_USE
         ]  # fmt: skip
-        kept = [ca.der for ca in view.ca_bundle(role) if opened.register.knows_authority(role, ca.der)]
+        kept = [ca.der for ca in view.ca_bundle(role) if opened.register.trusts_authority(role, ca.der)]
         bundle = dict.fromkeys((*known, *kept))
         with opened.batch() as batch:
             batch.file(layout.ca_cert(role), b"".join(map(pem_certificate, bundle)))
     if foreign:
         refresh_copies(opened)
     return [
-        f"CA that this keystore did not make removed from {layout.ca_cert(role)}: {describe(ca)}"
+        f"CA that this keystore did not make, or has retired, removed from {layout.ca_cert(role)}: {describe(ca)}"
         for role, ca in foreign
     ]
 

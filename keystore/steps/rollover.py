@@ -145,6 +145,7 @@ def _switch(opened: Store, role: Role, options: ProvisionOptions, now: datetime,
         install_incoming(opened)
     if role is Role.IDENTITY and view.has_crl:
         drop_crl(opened)
+        _retire_for_good(opened, role)
     _forget_next(opened, role)
     return f"{_title(role)} replaced"
 
@@ -183,7 +184,17 @@ def _finish(opened: Store, role: Role, options: ProvisionOptions, now: datetime,
         raise InvalidInputError(
             f"everything is still signed by the old {_title(role)}: first --ca switch, and deploy"
         )
-    return _trust(opened, role, pem_certificate(KeystoreView(opened.root).ca(role).der))
+    said = _trust(opened, role, pem_certificate(KeystoreView(opened.root).ca(role).der))
+    _retire_for_good(opened, role)
+    return said
+
+
+def _retire_for_good(opened: Store, role: Role) -> None:
+    """After the trust file: whoever puts the old CA back there is found."""
+    retired = opened.register.with_retired([role])
+    if retired != opened.register:
+        with opened.batch() as batch:
+            batch.record(retired)
 
 
 def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
@@ -226,6 +237,7 @@ def separate_permissions_ca(
     made, key = new_ca(Role.PERMISSIONS, options, now, encrypt)
     put_incoming(opened, Role.PERMISSIONS, made.pem(), layout.KEY, key)
     install_incoming(opened)
+    _retire_for_good(opened, Role.PERMISSIONS)
 
 
 def _waiting(role: Role) -> str:

@@ -44,8 +44,8 @@ def check_anchors(
     for role, ca in foreign_authorities(view, register):
         yield Finding(
             Severity.ERROR, "foreign-ca", layout.ca_cert(role),
-            f"holds a CA that this keystore did not make: {describe(ca)}; whoever has its key can make enclaves "
-            "that Fast DDS lets in", repair.run(view.root, "renew", note="once it is known who put it there"),
+            f"holds a CA that this keystore did not make, or has retired: {describe(ca)}; whoever has its key can make "
+            "enclaves that Fast DDS lets in", repair.run(view.root, "renew", note="once it is known who put it there"),
         )  # fmt: skip
     wanted = {one.replace(":", "").lower() for one in required}
     for role in Role:

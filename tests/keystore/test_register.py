@@ -370,7 +370,7 @@ class TestAuthorities:
         trusted = root / layout.ca_cert(role)
         ours = trusted.read_bytes()
         trusted.write_bytes(ours + (other / layout.ca_cert(role)).read_bytes())
-        with pytest.raises(UnsafeKeystoreError, match=r"a CA that this keystore did not make: .*SHA-256 "):
+        with pytest.raises(UnsafeKeystoreError, match=r"a CA that this keystore did not make.*: .*SHA-256 "):
             provision(root, [policy("/a")], options=options())
         report = renew(root, options=RenewOptions(provisioning=options()))
         assert f"removed from {layout.ca_cert(role)}" in report.created[0]
@@ -387,6 +387,29 @@ class TestAuthorities:
         for step in Step:
             roll_over(root, step, options=options())
             assert not provision(root, [policy("/a")], options=options()).changed
+
+    @pytest.mark.parametrize("role", Role)
+    def test_one_that_was_retired_does_not_come_back(self, tmp_path: Path, role: Role) -> None:
+        """It may have been replaced because its key was stolen."""
+        root = filled(tmp_path / "ks", ["/a"])
+        old = (root / layout.ca_cert(role)).read_bytes()
+        for step in Step:
+            roll_over(root, step, options=options())
+        trusted = root / layout.ca_cert(role)
+        trusted.write_bytes(trusted.read_bytes() + old)
+        with pytest.raises(UnsafeKeystoreError, match="or has retired"):
+            provision(root, [policy("/a")], options=options())
+
+    def test_with_revocations_the_old_one_goes_at_the_switch(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks")
+        old = (root / "public/identity_ca.cert.pem").read_bytes()
+        remove(root, ["/b"], options=QUICK)
+        for step in (Step.START, Step.SWITCH):
+            roll_over(root, step, options=options())
+        trusted = root / "public/identity_ca.cert.pem"
+        trusted.write_bytes(trusted.read_bytes() + old)
+        with pytest.raises(UnsafeKeystoreError, match="or has retired"):
+            provision(root, [policy("/a")], options=options())
 
     def test_finishing_does_not_strand_what_an_interrupted_switch_left(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
