@@ -11,7 +11,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Union
 
-from enclave_launch.boundary.terminal import printable_lines
+from enclave_launch.boundary.terminal import message
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
@@ -77,7 +77,7 @@ def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
 
 
 def _say(text: str) -> None:
-    print(f"secure-launch: warning: {printable_lines(text)}", file=sys.stderr)
+    print(f"secure-launch: warning: {message(text)}", file=sys.stderr)
 
 
 def _check_programs(launch: Launch) -> None:

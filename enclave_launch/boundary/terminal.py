@@ -29,6 +29,12 @@ def printable_lines(text: str) -> str:
     return _PERHAPS_UNSAFE.sub(lambda match: _escaped(match[0]), text)
 
 
+def message(text: object) -> str:
+    """What a person is told in one or more lines: as ``printable_lines``, later lines indented, so that no name in it
+    can begin a line that looks like one of ours."""
+    return printable_lines(str(text)).replace("\n", "\n    ")
+
+
 def quoted(text: str | PathLike[str]) -> str:
     """``text`` in quotes, as it is or as a Python literal where it holds a quote or is not printable."""
     plain = str(text)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from collections.abc import Iterator, Sequence
 
-from enclave_launch.boundary.terminal import printable
+from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.plan_json import allowed_names
@@ -33,7 +33,7 @@ def plan_tree(plan: LaunchPlan) -> str:
     if outside:
         lines += ["without an enclave", *_draw(outside)]
     for kind, texts in (("error under --secure", plan.problems), ("warning", plan.warnings)):
-        lines += [f"{kind}: {text}" for text in texts]
+        lines += [f"{kind}: {message(text)}" for text in texts]
     return "\n".join(lines) + "\n"
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 from ros2launch.option import OptionExtension
 
-from enclave_launch.boundary.terminal import printable_lines
+from enclave_launch.boundary.terminal import message
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import add_policy_options, add_security_options, build_parser
@@ -107,4 +107,4 @@ def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...
 
 def _say(*texts: object) -> None:
     for text in texts:
-        print(f"ros2 launch: warning: {printable_lines(str(text))}", file=sys.stderr)
+        print(f"ros2 launch: warning: {message(text)}", file=sys.stderr)

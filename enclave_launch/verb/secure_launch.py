@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.dependencies import missing_dependency
-from enclave_launch.boundary.terminal import printable, safe_output
+from enclave_launch.boundary.terminal import message, printable, safe_output
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 from enclave_launch.verb.usage import check_options, read_command_line, unsecured_notice
@@ -323,4 +323,4 @@ def _run_settings(options: argparse.Namespace, companion: LaunchCompanion | None
 
 def _warn(texts: Iterable[object]) -> None:
     for text in texts:
-        print(f"secure-launch: warning: {text}", file=sys.stderr)
+        print(f"secure-launch: warning: {message(text)}", file=sys.stderr)
