@@ -46,10 +46,10 @@ def resolve(
 
     chosen = options or ResolveOptions()
     evaluated = evaluate_launch(launch_file, arguments, options=chosen)
-    with ament_prefixes(evaluated.source.prefixes):
-        evaluation = evaluated.evaluation
-        finder = InterfaceFinder(search_prefixes(), chosen, evaluation.distro, launched(evaluation))
-        plan = Planner(evaluated.source, finder, chosen.plan_options()).plan(evaluated.evaluation)
+    source, evaluation = evaluated.source, evaluated.evaluation
+    prefixes = search_prefixes(source.prefixes)
+    finder = InterfaceFinder(prefixes, chosen, evaluation.distro, launched(evaluation))
+    plan = Planner(source, finder, chosen.plan_options()).plan(evaluation)
     return plan._replace(warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)))
 
 
