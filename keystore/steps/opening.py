@@ -16,7 +16,7 @@ from keystore.disk.store import Store
 from keystore.disk.superseded import superseded
 from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import KeystoreError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.der import DerError
@@ -35,7 +35,21 @@ def opened_for_change(
     with store.opened(root, timeout=timeout, durable=durable) as opened:
         if needs_register(KeystoreView(root)):
             take_over(opened, now)
+        elif opened.has_register:
+            _adopt_newer_crl(opened)
         yield opened
+
+
+def _adopt_newer_crl(opened: Store) -> None:
+    """Where ``private/`` was restored from a backup, the CRL may know more than the register: nobody who was revoked
+    comes back. One that our CA did not sign says nothing."""
+    view = KeystoreView(opened.root)
+    with suppress(DamagedKeystoreError):
+        if view.has_crl and crl_number(view) > opened.register.crl_number:
+            newer = _with_crl(view, opened.register)
+            with opened.batch() as batch:
+                batch.record(newer)
+            opened.notes.append("the CRL is newer than the register: what it revokes was recorded")
 
 
 def take_over(opened: Store, now: datetime) -> None:
@@ -131,7 +145,8 @@ def _with_crl(view: KeystoreView, register: Register) -> Register:
         if serial not in register.certificates
     }
     known = {
-        serial: one._replace(revoked=revoked.get(serial)) for serial, one in register.certificates.items()
+        serial: one._replace(revoked=one.revoked or revoked.get(serial))
+        for serial, one in register.certificates.items()
     }
     return replace(
         register, certificates={**unknown, **known}, crl_number=crl_number(view), crl_published=True

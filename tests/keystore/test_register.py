@@ -182,6 +182,19 @@ class TestRevocations:
         assert not provision(root, [policy("/a")], options=options()).changed
         assert snapshot(root) == before
 
+    def test_a_register_from_a_backup_does_not_bring_anybody_back(self, tmp_path: Path) -> None:
+        """private/ restored, public/ not: the CRL, signed here, knows more than the register."""
+        root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
+        shutil.copytree(root / "private", tmp_path / "backup")
+        gone = serial(root, "/b")
+        remove(root, ["/b"], options=QUICK)
+        shutil.rmtree(root / "private")
+        shutil.copytree(tmp_path / "backup", root / "private")
+        report = provision(root, [policy("/a")], options=options())
+        assert report.created == ("the CRL is newer than the register: what it revokes was recorded",)
+        remove(root, ["/c"], options=QUICK)
+        assert is_revoked(root, gone) and len(crl(root)) == 2
+
     def test_a_crl_that_nobody_published_is_left_for_a_person(self, tmp_path: Path) -> None:
         _, old = self.removed(tmp_path)
         other = filled(tmp_path / "other", ["/a"])
