@@ -229,7 +229,7 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
         if made_value is not None:
             return made_value
     kind = run.type_of(text(callee), frame)
-    known = kind.name in LIBRARY_CLASSES or is_plain_type(kind.name)
+    known = kind.name in LIBRARY_CLASSES or is_plain_type(kind.name) or kind.last.endswith("Options")
     if known or run.names.class_of(kind, frame.scope, frame.file) is not None:
         return made(run, node, kind, given, frame)
     if head:

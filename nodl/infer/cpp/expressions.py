@@ -257,6 +257,9 @@ def field(run: Machine, node: Node, frame: Frame) -> Value:
     for atom in owners:
         if isinstance(atom, Obj):
             value = member(run, atom, name, frame)
+            if value is None and atom.cls is None and name.endswith(("options", "callbacks")):
+                value = (run.obj(("field", atom, name), Type("")),)  # options in options
+                run.store.set((atom, name), value)
             found.append(value if value is not None else unknown(f"the value of {name}"))
         elif isinstance(atom, Group) and name in ("first", "second") and len(atom.items) == 2:
             found.append(atom.items[name == "second"])

@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 CREATES = re.compile(
     r"create_(?:publisher|subscription|service|client|server|generic_\w+|sub_node|lifecycle_publisher|camera_publisher|"
     r"camera_subscription|subscriber)|advertise\w*|createPublisher|createSubscription|createService|createClient|"
-    r"create(?:Shared|Unique|Unmanaged)?Instance|wait_for_message|createSubscriber|subscribeCamera|advertiseCamera|add_publisher"
+    r"create(?:Shared|Unique|Unmanaged)?Instance|wait_for_message|createSubscriber|subscribeCamera|advertiseCamera|add_publisher|"
+    r"configure_introspection"
 )
 _SITE = re.compile(rf"(?<![\w])({CREATES.pattern})(?=\s*[<(])")
 _STRINGS = re.compile(r'"(?:\\.|[^"\\\n])*"')

@@ -6,7 +6,7 @@ create_generic_*.hpp, generic_*.hpp, wait_for_message.hpp (humble to rolling).
 
 from __future__ import annotations
 
-from nodl.infer.cpp.libraries import Call, library_function, node_method
+from nodl.infer.cpp.libraries import Call, library_function, library_method, node_method
 from nodl.infer.cpp.machine import Machine
 from nodl.infer.cpp.names import NO_TYPE, Type, ros_type
 from nodl.infer.cpp.objects import nodes_in
@@ -34,11 +34,25 @@ def add(run: Machine, owner: Obj, kind: EndpointKind, name: Value, type_name: st
         Type(f"rclcpp::{kind.value}"),
     )
     made.heap = True
-    made.data.update(name=name, kind=kind, type=type_name)
+    made.data.update(name=name, kind=kind, type=type_name, record=record)
     for value in call.values:
         for atom in value:
             run.later(atom, call.frame)
     return (made,)
+
+
+def _introspection(run: Machine, call: Call) -> Value:
+    """rcl/src/rcl/service_event_publisher.c: a publisher beside the service, made when introspection is switched on."""
+    made = call.receiver
+    if made is not None and made.data.get("record") is not None:
+        name = concatenated(made.data["name"], literal("/_service_event"))
+        kind = f"{made.data['type']}_Event" if made.data["type"] else ""
+        run.endpoint(made.data["record"], EndpointKind.PUBLISHER, name, kind, call.node, call.frame)
+    return BOTTOM
+
+
+for _made in (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT):
+    library_method(f"rclcpp::{_made.value}", "configure_introspection")(_introspection)
 
 
 def _below(prefix: Value, name: Value) -> Value:
@@ -106,14 +120,14 @@ def _statistics(run: Machine, owner: Obj, call: Call) -> None:
         for atom in value:
             if not isinstance(atom, Obj) or not atom.type.last.startswith("SubscriptionOptions"):
                 continue
-            options = run.store.get((atom, "topic_stats_options")) or BOTTOM
-            state = run.store.get((atom, "topic_stats_options.state")) or BOTTOM
-            topic = run.store.get((atom, "topic_stats_options.publish_topic")) or literal("/statistics")
-            if state or options:
+            inner = [o for o in run.store.get((atom, "topic_stats_options")) or BOTTOM if isinstance(o, Obj)]
+            state = [a for o in inner for a in run.store.get((o, "state")) or BOTTOM]
+            topic = [a for o in inner for a in run.store.get((o, "publish_topic")) or BOTTOM]
+            if any("Disable" not in str(getattr(a, "why", a)) for a in state):
                 run.endpoint(
                     record,
                     EndpointKind.PUBLISHER,
-                    topic,
+                    tuple(topic) or literal("/statistics"),
                     "statistics_msgs/msg/MetricsMessage",
                     call.node,
                     call.frame,

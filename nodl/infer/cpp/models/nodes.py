@@ -32,6 +32,7 @@ from nodl.infer.cpp.values import (
     truth,
     unknown,
 )
+from nodl.node_interface import EndpointKind
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -87,15 +88,23 @@ def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, fr
             )
     if truth(run.store.get((options, "use_global_arguments")) or BOTTOM) is False:
         record.use_global_arguments = False
-    statistics = run.store.get((options, "enable_topic_statistics"))
-    if statistics and truth(statistics) is not False:
-        record.gap(
-            run.place(node, frame), "topic statistics of the whole node: give them with each subscription"
-        )
+    _asked_for(run, record, options, node, frame)
     for atom in run.store.get((options, "overrides")) or BOTTOM:
         if isinstance(atom, Seq):
             for item in atom.items:
                 _override(record, item)
+
+
+def _asked_for(run: Machine, record: NodeRecord, options: Obj, node: Node, frame: Frame) -> None:
+    """What rclcpp makes when the options ask for it: topic statistics, logger services (node_logging.cpp)."""
+    statistics = run.store.get((options, "enable_topic_statistics"))
+    if statistics and truth(statistics) is not False:
+        kind = "statistics_msgs/msg/MetricsMessage"
+        run.endpoint(record, EndpointKind.PUBLISHER, literal("/statistics"), kind, node, frame)
+    logger = run.store.get((options, "enable_logger_service"))
+    for name in ("get_logger_levels", "set_logger_levels") if logger and truth(logger) is not False else ():
+        kind = f"rcl_interfaces/srv/{name.title().replace('_', '')}"
+        run.endpoint(record, EndpointKind.SERVICE_SERVER, literal(f"~/{name}"), kind, node, frame)
 
 
 def _word(run: Machine, item: Value) -> str | None:
