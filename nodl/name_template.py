@@ -61,7 +61,9 @@ class ParameterPart(NamedTuple):
 
     def may_be_none(self, parameters: Mapping[str, object]) -> bool:
         """It certainly stands for no text at all: an empty list, a condition that does not hold."""
-        listed = self.item == "each" or any(method in ("split", "range") for method, _ in self.edits)
+        listed = self.item == "each" or any(
+            method in ("split", "range", "unless empty") for method, _ in self.edits
+        )
         known = self.name in parameters or self.default is not None
         return self.is_condition or self.name.endswith(".**") or (listed and known)
 
@@ -101,6 +103,8 @@ def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
         first = int(arguments[0]) if arguments else 0
         is_number = text.removeprefix("-").isdigit() and len(text) < 6
         return [str(number) for number in range(first, int(text))] if is_number else ()
+    if method == "unless empty":
+        return (text,) if text else ()  # the default is an empty list
     if method == "key":
         return (text.removeprefix(arguments[0]),)
     if method in CONDITIONS:

@@ -185,11 +185,18 @@ def _parts(piece: Piece, first: bool) -> list[Part]:
 def _input_parts(piece: Input) -> list[Part]:
     """The symbolic part once per default."""
     assert isinstance(piece.owner, NodeRecord | OptionDefaults)
-    defaults = _default_texts(piece.owner.default(piece.name), piece.item)
+    declared = piece.owner.default(piece.name)
+    if piece.item == "each" and declared and all(_is_empty_list(atom) for atom in declared):
+        return [ParameterPart(piece.name, "", piece.item, (("unless empty", ()), *piece.edits))]
+    defaults = _default_texts(declared, piece.item)
     parts: list[Part] = [
         ParameterPart(piece.name, default, piece.item, piece.edits) for default in defaults or [None]
     ]
     return parts
+
+
+def _is_empty_list(atom: object) -> bool:
+    return isinstance(atom, Sequence) and atom.items.exact == () and not atom.escaped
 
 
 def _default_texts(value: Value, item: int | str | None) -> list[str | None]:

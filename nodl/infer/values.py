@@ -446,7 +446,7 @@ def _limited(value: Value) -> Value:
     texts = [atom for atom in value if isinstance(atom, str | Text)]
     others = tuple(atom for atom in value if not isinstance(atom, str | Text))
     if len(texts) > MAX_STRINGS:
-        return (*others, widened_texts(texts))
+        return join(others, (widened_texts(texts),))
     if len(value) > MAX_ATOMS:
         return unknown(TOO_MANY)
     return value
@@ -470,6 +470,8 @@ def _join_items(items: list[Items]) -> Items:
 
 def widen(old: Value, new: Value, texts_too: bool) -> Value:
     """``join`` for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
+    if texts_too and any(type(atom) is Unknown for atom in old):  # it may be any text already
+        new = tuple(atom for atom in new if not isinstance(atom, str | Text) or contains(old, atom))
     joined = join(old, new)
     if joined is old:
         return old
@@ -485,7 +487,7 @@ def widen(old: Value, new: Value, texts_too: bool) -> Value:
         kept = [atom for atom in kept if not isinstance(atom, Sequence)]
         return join((*kept, *texts), unknown(TOO_MANY))  # containers in containers, without end
     if texts_too and len(texts) > 1 and any(not contains(old, text) for text in texts):
-        return (*kept, widened_texts(texts))
+        return join(tuple(kept), (widened_texts(texts),))
     return joined
 
 

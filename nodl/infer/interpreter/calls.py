@@ -104,7 +104,7 @@ def _decided_recursion(run: Run, node: ast.AST) -> bool:
     level = run.stack.count(node)
     if level > MAX_RECURSION:
         run.entries[node] = (-1, -1)  # it may never end: from here on its calls are joined
-    return run.turns > 0 and level <= MAX_RECURSION and len(run.stack) < MAX_DEPTH - 8
+    return run.fuel > 0 and level <= MAX_RECURSION and len(run.stack) < MAX_DEPTH - 8
 
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:

@@ -134,7 +134,7 @@ def _for(run: Run, node: ast.For, frame: Frame, call: Call) -> Steps:
 def _while(run: Run, node: ast.While, frame: Frame, call: Call) -> Steps:
     while True:
         outcome = decide(run, node.test, frame)
-        if outcome is None or run.turns <= 0:
+        if outcome is None or run.fuel <= 0:
             raise NotConcrete
         if not outcome:
             return (yield from _body(run, node.orelse, frame, call))

@@ -108,7 +108,7 @@ def _of_program(run: Run, obj: Instance, node: ast.AST, frame: Frame) -> Items:
         for element in own_elements(run, obj, node, frame):
             found.append(element)
             run.turns -= 1
-            if run.turns <= 0:
+            if run.fuel <= 0:
                 break
         else:
             return Items(tuple(found))

@@ -90,7 +90,7 @@ def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Fr
     run.state.depth += 1
     start = run.state.mark()
     certain = not run.repeated and not run.state.forks
-    limit = run.turns if certain else max(1, MAX_UNROLLED // run.unrolled)
+    limit = run.fuel if certain else max(1, MAX_UNROLLED // run.unrolled)
     unrolled = run.unrolled
     for index in itertools.count():
         run.unrolled = unrolled if certain else unrolled * (index + 1)
@@ -171,7 +171,7 @@ def _limit(run: Run, exact: tuple[Value, ...], node: ast.For | ast.AsyncFor) -> 
         return MAX_UNROLLED
     if not run.repeated and not run.state.forks:
         followed = not numbers or len(exact) <= MAX_UNROLLED or _may_name(node)
-        return run.turns if followed else MAX_UNROLLED
+        return run.fuel if followed else MAX_UNROLLED
     if not numbers:
         return MAX_UNROLLED
     return MAX_UNROLLED_NUMBERS if _may_name(node) else 1
@@ -283,7 +283,7 @@ def _fuel(run: Run, node: ast.While, turn: int) -> bool:
     if run.repeated:
         return turn * run.unrolled < MAX_UNROLLED_NUMBERS and _may_name(node)
     run.turns -= 1
-    return run.turns > 0
+    return run.fuel > 0
 
 
 def _repeated_while(run: Run, node: ast.While, frame: Frame, broken: bool) -> tuple[bool, bool]:
@@ -404,7 +404,7 @@ def _generate(
         return True
     generator = generators[index]
     items = elements(run, run.evaluate(generator.iter, frame), generator.iter, frame)
-    if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.turns):
+    if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.fuel):
         run.repeated += 1
         element = items.any_element()
         if element:

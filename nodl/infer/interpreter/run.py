@@ -47,6 +47,7 @@ from nodl.source_ref import SourceRef
 MAX_STEPS = 800_000
 MAX_DEPTH = 120  # analysed calls inside calls
 MAX_FORKS = 4  # undecided tests of which each outcome is followed by itself
+MAX_FOLLOWED_STEPS = 100_000  # after these, loops and recursion are joined
 MAX_TURNS = 3_000  # of loops that are followed turn by turn, in one run
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
@@ -253,6 +254,11 @@ class Run:
         self._tuples: dict[object, Value] = {}
         self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
         self._allocated: dict[tuple[object, ...], HeapObject] = {}
+
+    @property
+    def fuel(self) -> int:
+        """How many more turns are followed one by one; none once the run has cost much."""
+        return self.turns if self.steps < MAX_FOLLOWED_STEPS else 0
 
     # --- syntax -----------------------------------------------------------------------------------------
 

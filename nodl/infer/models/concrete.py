@@ -301,6 +301,6 @@ def lose(run: Run, obj: NativeObject) -> Value:
     """The object is used where it cannot be followed: from now on nobody knows what it gives."""
     if not obj.lost:
         obj.lost = True
-        run.state.learned += 1
+        run.state.pulled += 1
     run.escape(Arguments(list(obj.sources)), objects=True)
     return unknown("an element of an iterator that is used in more than one place")
