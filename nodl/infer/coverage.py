@@ -15,6 +15,7 @@ This is the net under the models: semantics that lose a function on its way to i
 from __future__ import annotations
 
 import ast
+import functools
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
@@ -24,6 +25,7 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
 from nodl.infer.models.foreign import is_node_class
 from nodl.infer.models.signatures import NODE_ENDPOINTS
+from nodl.infer.program import SourceModule
 from nodl.infer.values import ClassValue, External, ModuleValue
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
@@ -70,70 +72,34 @@ class _Audit:
 
     def module(self, module: ModuleValue) -> None:
         self._file = module.source.path
-        self._body(module.source.tree.body, None)
+        for place in _places_of(module.source):
+            self._place(place)
+        for node, cls in self._run.classes.items():
+            if (
+                cls.module is module
+                and _is_node(cls)
+                and not self._is_made(cls.node)
+                and self._referred(cls.name)
+            ):
+                self._gap(node, f"class {cls.name} {_LOST}")
 
-    # --- reached code -----------------------------------------------------------------------------------
-
-    def _body(self, body: list[ast.stmt], cls: ast.ClassDef | None) -> None:
-        for statement in body:
-            if statement in self._run.executed:
-                self._statement(statement, cls)
-
-    def _statement(self, node: ast.stmt, cls: ast.ClassDef | None) -> None:
-        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
-            self._function(node, cls)
-            return
-        if isinstance(node, ast.ClassDef):
-            self._class(node)
-            self._body(node.body, node)
-            return
-        for _, value in ast.iter_fields(node):
-            for part in value if isinstance(value, list) else (value,):
-                if isinstance(part, ast.stmt):
-                    self._body([part], cls)
-                elif isinstance(part, ast.ExceptHandler | ast.match_case):
-                    self._body(part.body, cls)
-                elif isinstance(part, ast.withitem):
-                    self._expression(part.context_expr)
-                elif isinstance(part, ast.expr):
-                    self._expression(part)
-
-    def _expression(self, node: ast.expr) -> None:
-        """Places in an expression that was evaluated; parts that may be skipped are passed over."""
-        if isinstance(node, ast.Lambda):
-            self._function(node, None)
-            return
-        if isinstance(node, ast.Call) and _last_name(node.func) in _CREATING_NAMES:
-            if node not in self._run.evaluated:
-                return  # skipped by ``and``, ``or``, a conditional expression or an empty loop
-            if node not in self._run.understood:
-                self._gap(node, f"{_last_name(node.func)}() is called on something that is not understood")
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.expr):
-                self._expression(child)
-            elif isinstance(child, ast.keyword):
-                self._expression(child.value)
-            elif isinstance(child, ast.comprehension):
-                self._expression(child.iter)
-
-    def _function(self, node: Function, cls: ast.ClassDef | None) -> None:
-        if node in self._called:
-            if isinstance(node, ast.Lambda):
-                self._expression(node.body)
-            else:
-                self._body(node.body, None)
-            return
-        place = next(_places(node), None)
-        if place is not None and self._may_be_called(node, cls):
-            name = getattr(node, "name", "a lambda")
-            self._gap(place, f"{name} {_LOST}")
-
-    def _class(self, node: ast.ClassDef) -> None:
-        cls = self._run.classes.get(node)
-        if cls is None or not _is_node(cls) or self._is_made(node):
-            return
-        if self._referred(node.name):
-            self._gap(node, f"class {node.name} {_LOST}")
+    def _place(self, place: _Place) -> None:
+        """Follow what surrounds the place from outside in, to where control does not go on, or to the place."""
+        cls: ast.ClassDef | None = None
+        for around in place.around:
+            if isinstance(around, ast.stmt) and around not in self._run.executed:
+                return  # control certainly does not get there
+            if isinstance(around, ast.ClassDef):
+                cls = around
+            elif isinstance(around, Function):
+                if around not in self._called:
+                    if self._may_be_called(around, cls):
+                        self._gap(place.node, f"{getattr(around, 'name', 'a lambda')} {_LOST}")
+                    return
+                cls = None
+        node = place.node
+        if isinstance(node, ast.Call) and node in self._run.evaluated and node not in self._run.understood:
+            self._gap(node, f"{_last_name(node.func)}() is called on something that is not understood")
 
     # --- code that was not reached ----------------------------------------------------------------------
 
@@ -191,11 +157,30 @@ def _last_name(function: ast.expr) -> str:
     return function.id if isinstance(function, ast.Name) else ""
 
 
-def _places(node: ast.AST) -> Iterator[ast.AST]:
-    """Mentions of what makes interfaces, anywhere below ``node``."""
-    for part in ast.walk(node):
-        if isinstance(part, ast.Name | ast.Attribute) and _last_name(part) in _CREATING_NAMES:
-            yield part
+@dataclass(frozen=True, slots=True)
+class _Place:
+    """A mention of what makes interfaces, with the statements, classes and functions around it from outside in."""
+
+    node: ast.AST
+    around: tuple[ast.AST, ...]
+
+
+@functools.lru_cache(maxsize=256)
+def _places_of(module: SourceModule) -> tuple[_Place, ...]:
+    return tuple(_places_below(module.tree, ()))
+
+
+def _mentioned(node: ast.Call | ast.Name | ast.Attribute) -> str:
+    return _last_name(node.func if isinstance(node, ast.Call) else node)
+
+
+def _places_below(node: ast.AST, around: tuple[ast.AST, ...]) -> Iterator[_Place]:
+    if isinstance(node, ast.stmt | ast.Lambda):
+        around = (*around, node)
+    if isinstance(node, ast.Call | ast.Name | ast.Attribute) and _mentioned(node) in _CREATING_NAMES:
+        yield _Place(node, around)
+    for child in ast.iter_child_nodes(node):
+        yield from _places_below(child, around)
 
 
 def _is_list_of_exports(statement: ast.stmt) -> bool:

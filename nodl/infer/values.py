@@ -93,6 +93,14 @@ def external(path: str) -> Value:
     return value
 
 
+RESULT = ".()"
+
+
+def result_of(path: str) -> Value:
+    """What a library gives that keeps its hands off the program's objects: one value for each such library."""
+    return external(path.partition(".")[0] + RESULT)
+
+
 class LocalCells(dict[object, Value]):
     """The variables of one function call.
 

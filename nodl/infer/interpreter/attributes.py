@@ -13,6 +13,7 @@ from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
+    RESULT,
     Absent,
     BoundMethod,
     ClassMethod,
@@ -187,6 +188,8 @@ def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: F
 def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Frame) -> Value:
     if name == "__name__":
         return (atom.path.rpartition(".")[2],)
+    if atom.path.endswith(RESULT) and not foreign.is_asked_of(name):
+        return (atom,)
     if atom.path.count(".") > MAX_DOTS:
         return unknown(f"an attribute of {atom.path}")  # ``x = x.next`` in a loop would go on without end
     path = f"{atom.path}.{name}"

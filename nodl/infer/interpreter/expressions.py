@@ -22,6 +22,7 @@ from nodl.infer.values import (
     NONE,
     OTHER,
     OTHER_KEYS,
+    RESULT,
     ClassValue,
     Dictionary,
     External,
@@ -244,7 +245,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     if isinstance(atom, External) and atom.path == "os.environ":
         return run.call(external("os.environ.get"), Arguments([key]), node, frame)
     if isinstance(atom, External):
-        if atom.path.startswith(("typing.", "builtins.")) or atom.path.endswith("[]"):
+        if atom.path.startswith(("typing.", "builtins.")) or atom.path.endswith(("[]", RESULT)):
             return (atom,)
         return external(f"{atom.path}[]")
     return (atom,) if isinstance(atom, Unknown) else ANY

@@ -17,6 +17,7 @@ from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenate, conc
 from nodl.infer.values import (
     ANY,
     BOTTOM,
+    RESULT,
     Dictionary,
     External,
     Instance,
@@ -217,7 +218,7 @@ def _text_of_atom(atom: object) -> TextAtom:
     if isinstance(atom, Unknown):
         return make_text((Hole(atom.why),))
     if isinstance(atom, External):
-        return make_text((Hole(f"{atom.path} of a library"),))
+        return make_text((Hole(f"a result of {atom.path.removesuffix(RESULT)}"),))
     if isinstance(atom, NativeObject) and isinstance(atom.object, PurePath):
         return str(atom.object)
     if isinstance(atom, Instance) and "_value_" in atom.cells:

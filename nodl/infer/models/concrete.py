@@ -182,6 +182,8 @@ def _constant(found: Any) -> Value:
         return unknown("a very long text")
     if isinstance(found, int) and abs(found) > _LARGE:
         return ANY
+    if found != found:
+        return ANY  # not a number: no two are equal, so that they would pile up
     return (found,)
 
 

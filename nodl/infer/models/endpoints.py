@@ -17,8 +17,8 @@ from nodl.infer.values import (
     Instance,
     Unknown,
     Value,
-    external,
     join,
+    result_of,
 )
 from nodl.node_interface import EndpointKind
 
@@ -49,7 +49,6 @@ def endpoint_object(
 
 def method(run: Run, receiver: Instance, name: str, call: Call) -> Value:
     """A method of such an object."""
-    path = receiver.cls.path if isinstance(receiver.cls, External) else ""
     if name == "configure_introspection":
         _introspect(receiver, call)
         return NONE
@@ -60,7 +59,7 @@ def method(run: Run, receiver: Instance, name: str, call: Call) -> Value:
         )
         return ANY
     run.escape(call.args, opened=False, objects=False)
-    return external(f"{path}.{name}()")
+    return result_of("rclpy")
 
 
 def _introspect(receiver: Instance, call: Call) -> None:

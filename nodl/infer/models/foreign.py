@@ -27,6 +27,7 @@ from nodl.infer.values import (
     Value,
     external,
     join_all,
+    result_of,
     unknown,
 )
 
@@ -86,8 +87,10 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     if name in _WAITS and run.callbacks:
         run.settle(run)
     _hand_over(run, path, call)
-    if ros.interface_type(path) or path.partition(".")[0] in _KEEPS_OFF:
-        return external(f"{path}()" if "(" not in path else f"{path.partition('.')[0]}.()")
+    if ros.interface_type(path):
+        return external(path + "()")
+    if keeps_off(path):
+        return result_of(path)
     return unknown(f"the result of {path}()")
 
 
@@ -103,6 +106,11 @@ def _computed(run: Run, path: str, call: Call) -> Value | None:
             if isinstance(atom, NativeObject):
                 atom.sources = tuple(call.args.all_values())
     return result
+
+
+def is_asked_of(name: str) -> bool:
+    """A method that matters even on an object that a library made."""
+    return name in NODE_METHODS or name in _WAITS
 
 
 def may_fail(atom: object) -> bool:
@@ -221,7 +229,7 @@ def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: 
     if model is not None:
         return model(run, ros.record_of_instance(run, receiver, call), call)
     run.escape(call.args, opened=False, objects=name in ("add_waitable", "add_rate"))
-    return external(f"rclpy.node.Node.{name}()")
+    return result_of(path)
 
 
 def _initialise_other_bases(run: Run, receiver: Instance, path: str, call: Call) -> None:

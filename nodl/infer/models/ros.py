@@ -30,6 +30,7 @@ from nodl.infer.values import (
     NONE,
     OTHER,
     OTHER_KEYS,
+    RESULT,
     Dictionary,
     External,
     Instance,
@@ -164,7 +165,7 @@ def records_of(run: Run, value: Value | None, call: Call) -> list[NodeRecord]:
         if isinstance(atom, Instance):
             records.append(record_of_instance(run, atom, call))
         elif isinstance(atom, Unknown | External):
-            why = atom.why if isinstance(atom, Unknown) else atom.path
+            why = atom.why if isinstance(atom, Unknown) else f"a result of {atom.path.removesuffix(RESULT)}"
             run.findings.gap(call.source, f"the node of this endpoint is not known: {why}")
             records.append(run.findings.unknown_node(call.source))
     return records
