@@ -13,7 +13,12 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
-MODULES = {"secure-launch": "enclave_launch", "secure-nodl": "nodl.verb", "secure-keystore": "keystore.verb"}
+MODULES = {
+    "secure-launch": "enclave_launch",
+    "secure-plan": "enclave_launch.verb.secure_plan",
+    "secure-nodl": "nodl.verb",
+    "secure-keystore": "keystore.verb",
+}
 
 CONSOLE = re.findall(r"^```console\n\$ (.*?)\n(.*?)\n```$", README, re.S | re.M)
 
