@@ -18,8 +18,10 @@ from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_plan_arguments(parser)
-    parser.add_argument("--from", dest="source", metavar="ENCLAVE|NODE", help="where the influence begins")
-    parser.add_argument("--to", dest="target", metavar="ENCLAVE|NODE", help="where it would arrive")
+    parser.add_argument(
+        "--from", dest="influence_from", metavar="ENCLAVE|NODE", help="where the influence begins"
+    )
+    parser.add_argument("--to", dest="influence_to", metavar="ENCLAVE|NODE", help="where it would arrive")
     parser.add_argument("--built-in", action="store_true", help="count what every node has, too")
 
 
@@ -28,21 +30,21 @@ def run(options: argparse.Namespace) -> int:
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.review.information_flow import flow_graph, shortest_paths
 
-    if (options.source is None) is not (options.target is None):
+    if (options.influence_from is None) is not (options.influence_to is None):
         raise UsageError("flow: give both --from and --to, or neither")
     plan = plan_from_document(read_plan(options.words, options))
     graph = flow_graph(plan, built_in=options.built_in)
-    if options.source is None:
+    if options.influence_from is None:
         sys.stdout.write(reach_text(plan, graph))
         return 0
     homes = {**{node.fqn: node.enclave for node in plan.nodes}, **{path: path for path in plan.enclaves}}
-    for end in (options.source, options.target):
+    for end in (options.influence_from, options.influence_to):
         if end not in homes:
             known = " ".join(sorted(homes))
             raise UsageError(f"flow: {end} is neither an enclave nor a node of this plan; it has: {known}")
-    source, target = homes[options.source], homes[options.target]
+    source, target = homes[options.influence_from], homes[options.influence_to]
     if source == target:
-        ends = f"{options.source} and {options.target}"
+        ends = f"{options.influence_from} and {options.influence_to}"
         sys.stdout.write(f"{ends} are both in enclave {source}: nothing separates them\n")
         return 0
     sys.stdout.write(paths_text(source, target, shortest_paths(graph, source, target)))
