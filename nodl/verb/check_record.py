@@ -5,7 +5,8 @@ from __future__ import annotations
 import argparse
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -13,6 +14,7 @@ from nodl.names import split_fqn
 from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
+    from nodl.infer.cpp.reach import SourcesInReach
     from nodl.library import Library
     from nodl.lookup import ManifestLookup
     from nodl.node_interface import NodeInterface
@@ -39,6 +41,14 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         choices=(*JUDGED, "all"),
         default="all",
         help="what to hold against the records: manifests, inference from source, the library, or each that speaks",
+    )
+    parser.add_argument(
+        "--source",
+        metavar="DIR",
+        action="append",
+        type=Path,
+        default=[],
+        help="sources of compiled nodes, for inference (repeatable; default: the workspaces of the prefixes)",
     )
     parser.add_argument("--format", choices=("text", "json"), default="text")
     add_prefix_argument(parser)
@@ -67,8 +77,9 @@ def run(arguments: argparse.Namespace) -> int:
         print(f"the record is not complete: {text}", file=sys.stderr)
     prefixes = search_prefixes(arguments.prefix)
     lookup = ManifestLookup(prefixes, arguments.nodl)
+    folders = tuple(map(str, arguments.source))
     judges = JUDGED if arguments.judge == "all" else (arguments.judge,)
-    judgements = [each for node in nodes for each in _judge(node, lookup, prefixes, judges)]
+    judgements = [each for node in nodes for each in _judge(node, lookup, prefixes, folders, judges)]
     sys.stdout.write(_json(judgements) if arguments.format == "json" else _text(judgements))
     fits = all(each.comparison is not None and each.comparison.fits for each in _counted(judgements))
     return 0 if fits else 1
@@ -96,34 +107,68 @@ def _recorded(files: Iterable[Path]) -> tuple[list[AskedNode], list[str]]:
 
 
 def _judge(
-    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], judges: Iterable[str]
+    node: AskedNode,
+    lookup: ManifestLookup,
+    prefixes: Sequence[str],
+    folders: tuple[str, ...],
+    judges: Iterable[str],
 ) -> Iterable[Judgement]:
     from nodl.record.checking import compare
 
     for judge in judges:
-        interfaces, why = _SAYS[judge](node, lookup, prefixes)
+        interfaces, why = _SAYS[judge](node, lookup, prefixes, folders)
         described = _at_this_start(node, interfaces)
         yield Judgement(node, judge, compare(node, described) if described else None, why)
 
 
 def _described(
-    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str]
+    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], folders: tuple[str, ...]
 ) -> tuple[Sequence[NodeInterface], str]:
     found = lookup.find(node.package, executable=node.executable or None, plugin=node.plugin or None)
     return found.found, f"no manifest; looked at {', '.join(found.searched)}"
 
 
 def _inferred(
-    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str]
+    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], folders: tuple[str, ...]
 ) -> tuple[Sequence[NodeInterface], str]:
     from nodl.infer.executable import infer_executable
 
-    inferred = infer_executable(node.package, node.executable or None, node.plugin or None, prefixes=prefixes)
+    inferred = infer_executable(
+        node.package,
+        node.executable or None,
+        node.plugin or None,
+        prefixes=prefixes,
+        sources=_sources(tuple(prefixes), folders),
+        start_of=_RecordedStart(node),
+    )
     return inferred.interfaces, inferred.why
 
 
+class _RecordedStart(NamedTuple):
+    """What the launch decided about the recorded node (``nodl.infer.start.Start``)."""
+
+    node: AskedNode
+
+    def parameters(self, node: str | None) -> Mapping[str, object]:
+        return self.node.parameters
+
+    def final_name(self, node: str | None) -> tuple[str | None, str | None]:
+        """Of the recorded node; another one of its program has the name that the launch's rules give it."""
+        namespace, name = split_fqn(self.node.fqn)
+        if node is None or node == self.node.name:
+            return name, namespace
+        return self.node.rules.node_name(node).name, namespace
+
+
+@lru_cache(maxsize=4)
+def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInReach:
+    from nodl.infer.cpp.reach import SourcesInReach
+
+    return SourcesInReach(prefixes, folders)
+
+
 def _of_library(
-    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str]
+    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], folders: tuple[str, ...]
 ) -> tuple[Sequence[NodeInterface], str]:
     from nodl.library import Library
 

@@ -446,8 +446,11 @@ def _complete(function: Function, declared: Iterable[Function]) -> None:
 
 
 def ros_type(kind: Type) -> str:
-    """``std_msgs::msg::String`` as ``std_msgs/msg/String``; empty for what is not an interface type."""
+    """``std_msgs::msg::String`` as ``std_msgs/msg/String``; empty for what is not an interface type.
+
+    Where generated headers are in reach the name leads to their template, ``String_<...>`` (rosidl_generator_cpp).
+    """
     steps = kind.name.split("::")
     if len(steps) == 3 and steps[1] in ("msg", "srv", "action") and steps[2]:
-        return "/".join(steps)
+        return "/".join(steps).removesuffix("_")
     return ""
