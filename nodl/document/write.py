@@ -83,6 +83,10 @@ def v1_xml(nodes: Sequence[ManifestNode]) -> Written:
             notes.append(
                 f"{node.interface.name}: QoS, descriptions and details of parameters have no place in v1"
             )
+        if node.interface.depends is not None:
+            notes.append(
+                f"{node.interface.name}: what depends on how launch starts it has no place in v1; defaults were written"
+            )
     return Written("\n".join([*lines, "</interface>", ""]), tuple(notes))
 
 
