@@ -127,7 +127,14 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
         return run.evaluate(given[0], frame) if given else default_value(run, node, kind, frame)
     if cls is not None and is_aggregate(run, cls) and given:
         return _aggregate(run, node, kind, cls, given, frame)
-    return construct(run, kind, [run.evaluate(each, frame) for each in given], node, frame)
+    values = [run.evaluate(each, frame) for each in given]
+    if cls is None and len(values) == 1 and _all_of(kind, values[0]):
+        return values[0]  # a copy of a library's object
+    return construct(run, kind, values, node, frame)
+
+
+def _all_of(kind: Type, value: Value) -> bool:
+    return bool(value) and all(isinstance(atom, Obj) and atom.type.name == kind.name for atom in value)
 
 
 def as_map(items: Sequence[Value]) -> Value:
