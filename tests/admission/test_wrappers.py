@@ -128,3 +128,9 @@ def test_an_executable_that_starts_another_program_is_asked_about_it(
     cmd: str, expected: list[str], enclave: str, plan: Plan
 ) -> None:
     assert refused(plan(f"<executable cmd={quoteattr(cmd)} {enclave}/>")) == expected
+
+
+def test_a_shell_cuts_the_words_of_an_executable_anew(plan: Plan) -> None:
+    text = "entities = [ExecuteProcess(cmd=['{} talker --flag'], shell=True)]"
+    assert refused(plan(text.format("env -u ROS_SECURITY_ENABLE"))) == ["env"]
+    assert refused(plan(text.format("nice -n 5"))) == []

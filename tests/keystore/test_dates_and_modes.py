@@ -1,4 +1,4 @@
-"""Two lines that no test held: a certificate that has not begun is none, the key of a waiting CA is for its owner alone."""
+"""Held since a search for lines that no test noticed: certificates that have not begun, keys of waiting CAs."""
 
 from __future__ import annotations
 
