@@ -1,8 +1,8 @@
 """What the user's code gave in a dry run, so that the live run that follows need not run it again.
 
-A secured launch evaluates its file twice: first to know what will start, then to start it. Files with side effects
-break by that: a folder made twice, a port taken twice, a prompt asked twice, another random name. So the first
-evaluation notes what each piece of user code gave and changed, in order, and the second takes it from there:
+A secured launch visits its file twice: first to know what will start, then to start it. Running user code twice would
+break files with side effects: a folder made twice, a port taken twice, a prompt asked twice, another random name.
+So the first visit notes what each piece of user code gave and changed, in order; the second takes it from there:
 
 - a Python launch file is run once; its description is put back as it was before the first visit, and visited again;
 - a function of the visit (``OpaqueFunction``, an action or a substitution of the user's own class) is called once;
