@@ -156,7 +156,7 @@ def test_tampered_permissions_are_refused_and_the_status_tells(launch: Launcher,
     prefix.chmod(0o755)
     launch_file = tmp_path / "tampered.launch.xml"
     launch_file.write_text(TAMPERED_LAUNCH.format(prefix=prefix), encoding="utf-8")
-    launched = launch.secured(str(launch_file))
+    launched = launch.secured("--accept-prefix", prefix.name, str(launch_file))
     assert "<topic>rt/rosout</topic>" not in _permissions(launch), "the document was not tampered with"
     assert "DDS refuses the participant of enclave /intruder" in launched.output, launched.output
     assert launched.status != 0
