@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
+from enclave_launch.enclave import EnclaveAssignment, Reason
 from enclave_launch.errors import UsageError
-from enclave_launch.security_environment import environment_domains
+from enclave_launch.plan import PlannedProcess
+from enclave_launch.process import EnclaveRequest, ProcessKind, ResolvedProcess
+from enclave_launch.security_environment import (
+    SecuritySettings,
+    environment_domains,
+    secured_environment,
+)
+from enclave_launch.source_location import SourceLocation
 from keystore.formats.domains import Domains
 
 
@@ -25,3 +35,27 @@ def test_what_no_process_would_take_signs_nothing(text: str) -> None:
     """Permissions for more domains than one are somebody's decision, never a slip of a variable."""
     with pytest.raises(UsageError, match="ROS_DOMAIN_ID"):
         environment_domains({"ROS_DOMAIN_ID": text})
+
+
+def planned(kind: ProcessKind, enclave: str | None) -> PlannedProcess:
+    process = ResolvedProcess(
+        1, kind, None, "x", "x-1", None, None, None, ("x",), (), {}, {}, EnclaveRequest(), SourceLocation("a")
+    )
+    return PlannedProcess(process, EnclaveAssignment(enclave, Reason.ABSOLUTE) if enclave else None, ())
+
+
+@pytest.mark.parametrize("strategy", ["Enforce", "Permissive"])
+def test_what_each_kind_of_process_is_told(strategy: str) -> None:
+    settings = SecuritySettings("/ks", strategy)
+    ours = {
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_KEYSTORE": "/ks",
+        "ROS_SECURITY_STRATEGY": strategy,
+    }
+    assert secured_environment(planned("node", "/a"), settings) == ours
+    tool = secured_environment(planned("executable", "/a"), settings)
+    assert tool == {**ours, "ROS_SECURITY_ENCLAVE_OVERRIDE": "/a"}
+    nowhere = secured_environment(planned("executable", None), settings)
+    assert nowhere["ROS_SECURITY_ENABLE"] == "true" and nowhere["ROS_SECURITY_STRATEGY"] == "Enforce"
+    assert not Path(nowhere["ROS_SECURITY_KEYSTORE"]).parent.is_dir(), "nothing can ever be there"
+    assert secured_environment(planned("node", "/a"), None) == {}
