@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from functools import lru_cache
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
@@ -10,6 +11,9 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import printable
 from keystore.formats.register import Register, parse_register
 from keystore.formats.role import Role
+
+_parsed = lru_cache(maxsize=2)(parse_register)
+"""By content: a launch asks before each of its processes."""
 
 
 def read_register(root: Path) -> Register | None:
@@ -21,7 +25,7 @@ def read_register(root: Path) -> Register | None:
     if not os.path.lexists(f"{root}/{layout.REGISTER}"):
         return None
     text = safe_files.read_private(root, layout.REGISTER)
-    return parse_register(text, printable(root / layout.REGISTER))
+    return _parsed(text, printable(root / layout.REGISTER))
 
 
 def needs_register(view: KeystoreView) -> bool:
