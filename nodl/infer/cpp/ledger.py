@@ -25,9 +25,21 @@ CREATES = re.compile(
     r"create_(?:publisher|subscription|service|client|server|generic_\w+|sub_node|lifecycle_publisher|camera_publisher|"
     r"camera_subscription|subscriber)|advertise\w*|createPublisher|createSubscription|createService|createClient|"
     r"create(?:Shared|Unique|Unmanaged)?Instance|wait_for_message|createSubscriber|subscribeCamera|advertiseCamera|add_publisher|"
-    r"configure_introspection"
+    r"configure_introspection|subscribe|on_parameter_event"
 )
-_SITE = re.compile(rf"(?<![\w])({CREATES.pattern})(?=\s*[<(])")
+MAKERS = frozenset({
+    "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond",
+    "ImageTransport", "Subscriber",
+    "SubscriberFilter", "BufferServer", "BufferClient", "AsyncParametersClient", "SyncParametersClient",
+    "ParameterEventHandler",
+    "InteractiveMarkerServer", "SimpleActionServer", "SimpleActionClient", "ServiceClient", "CameraInfoManager",
+})  # fmt: skip
+"""Classes of libraries whose objects make interfaces."""
+_MADE = rf"(?:make_shared|make_unique)\s*<\s*(?:\w+::)*(?:{'|'.join(sorted(MAKERS))})\b"
+_MAKING = ("call_expression", "field_initializer", "argument_list", "new_expression")
+_SITE = re.compile(
+    rf"(?<![\w])({CREATES.pattern})(?=\s*[<(])|(?<![\w])({_MADE})|(?<![\w])(new\s+(?:\w+::)*(?:{'|'.join(sorted(MAKERS))}))\b"
+)
 _STRINGS = re.compile(r'"(?:\\.|[^"\\\n])*"')
 
 
@@ -59,7 +71,14 @@ def sites_of(index: FileIndex) -> list[Site]:
     blanked = _STRINGS.sub(lambda m: '"' + "_" * (len(m[0]) - 2) + '"', source)
     for match in _SITE.finditer(blanked):
         offset = len(source[: match.start()].encode())
-        found.append(Site(index.file, offset, source.count("\n", 0, match.start()) + 1, match[1]))
+        found.append(
+            Site(
+                index.file,
+                offset,
+                source.count("\n", 0, match.start()) + 1,
+                next(filter(None, match.groups())),
+            )
+        )
     return found
 
 
@@ -156,10 +175,7 @@ def _is_handled(index: FileIndex, site: Site, handled: list[int]) -> bool:
         "function_definition",
         "argument_list",
     ):
-        if (
-            node.type in ("call_expression", "field_initializer", "argument_list")
-            and node.start_byte in starts
-        ):
+        if node.type in _MAKING and node.start_byte in starts:
             return True
         node = node.parent
     return False
@@ -354,12 +370,3 @@ def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
         return True
     reach = Reach(run).from_words(words)
     return any(CREATES.fullmatch(w) or w in MAKERS for function in reach.reached for w in function.words)
-
-
-MAKERS = frozenset({
-    "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond",
-    "ImageTransport", "Subscriber",
-    "SubscriberFilter", "BufferServer", "BufferClient", "AsyncParametersClient", "SyncParametersClient",
-    "ParameterEventHandler",
-    "InteractiveMarkerServer", "SimpleActionServer", "SimpleActionClient", "ServiceClient", "CameraInfoManager",
-})  # fmt: skip

@@ -35,6 +35,11 @@ ROWS = {
         in_class('s_.subscribe(this, "image");', "message_filters::Subscriber<sensor_msgs::msg::Image> s_;"),
         {("subscription", "image")},
     ),
+    "a filter's subscriber that a callback of the options starts": (
+        in_class('rclcpp::PublisherOptions o; o.event_callbacks.matched_callback = [this](auto &) { s_.subscribe(this, "image"); }; '
+                 'create_publisher<sensor_msgs::msg::Image>("out", 1, o);', "message_filters::Subscriber<sensor_msgs::msg::Image> s_;"),
+        {("subscription", "image"), ("publisher", "out")},
+    ),
     "a filter's subscriber that never subscribes": (
         in_class("", "message_filters::Subscriber<sensor_msgs::msg::Image> s_;"), set(),
     ),
