@@ -108,7 +108,12 @@ class InterfaceFinder:
     def _without_manifest(
         self, subject: _Subject, manifest: Lookup, started: StartedProgram
     ) -> tuple[Found | Missing, bool]:
-        """The analysis where it leaves nothing open, else the library, else what the analysis has."""
+        """What the user recorded, else the analysis where it leaves nothing open, else the library, else what the
+        analysis has."""
+        name = subject.executable or subject.plugin or ""
+        recorded = self._library.recorded(subject.package, name)
+        if recorded:
+            return Found((recorded.document.interface,), InterfaceOrigin.RECORDED, recorded.doubt), False
         searched = ["looked at " + ", ".join(manifest.searched)]
         analysed = self._inferred(subject, started)
         searched += [analysed.why] if analysed is not None and analysed.why else []
@@ -116,7 +121,7 @@ class InterfaceFinder:
         of_this_start = analysed is not None and analysed.of_this_start
         if inferred and all(map(_complete, inferred)):
             return Found(inferred, InterfaceOrigin.ANALYSIS), of_this_start
-        hit = self._library.find(subject.package, subject.executable or subject.plugin or "")
+        hit = self._library.find(subject.package, name)
         if hit:
             return Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt), of_this_start
         if inferred:

@@ -40,6 +40,7 @@ FOR_SECURE = frozenset(
 FOR_PLAN = frozenset(
     {
         "nodl",
+        "library",
         "missing_nodl",
         "accept_patterns",
         "also",

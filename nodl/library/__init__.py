@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 from nodl.errors import NoDLError
@@ -36,6 +35,7 @@ class Library:
                 raise NoDLError(f"--library {folder}: no such directory")
         self._shipped = shipped
         self._indexes: dict[str, tuple[IndexEntry, ...]] = {}
+        self._documents: dict[str, LibraryDocument] = {}
 
     def find(self, package: str, name: str, *, distro: str = "", version: str | None = None) -> Hit | None:
         """The document of executable or plugin ``name``. ``version``: of the installed package, if known.
@@ -45,7 +45,7 @@ class Library:
         for folder in self._all():
             entries = [e for e in self._entries(folder) if e.package == package and name in e.programs]
             if entries:
-                return _chosen(folder, entries, distro, version)
+                return self._chosen(folder, entries, distro, version)
         return None
 
     def of_class(self, plugin_class: str, *, distro: str = "") -> Hit | None:
@@ -53,7 +53,7 @@ class Library:
         for folder in self._all():
             entries = [e for e in self._entries(folder) if plugin_class in e.classes]
             if entries:
-                return _chosen(folder, entries, distro, None)
+                return self._chosen(folder, entries, distro, None)
         return None
 
     def named(self, name: str, *, distro: str = "") -> Hit | None:
@@ -61,7 +61,7 @@ class Library:
         for folder in self._all():
             entries = [e for e in self._entries(folder) if e.stem == name]
             if entries:
-                return _chosen(folder, entries, distro, None)
+                return self._chosen(folder, entries, distro, None)
         return None
 
     def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
@@ -91,12 +91,14 @@ class Library:
             self._indexes[folder] = read_index(folder) if folder == SHIPPED else scanned(folder)
         return self._indexes[folder]
 
-
-def _chosen(folder: str, entries: Sequence[IndexEntry], distro: str, version: str | None) -> Hit:
-    """The entry for this version, else the last, with a doubt that names both."""
-    fitting = [entry for entry in entries if fits(entry.versions, distro, version)]
-    document = _read(os.path.join(folder, (fitting or entries)[-1].file))
-    return Hit(document, "" if fitting else _doubt(document, distro, version))
+    def _chosen(self, folder: str, entries: Sequence[IndexEntry], distro: str, version: str | None) -> Hit:
+        """The entry for this version, else the last, with a doubt that names both."""
+        fitting = [entry for entry in entries if fits(entry.versions, distro, version)]
+        path = os.path.join(folder, (fitting or entries)[-1].file)
+        if path not in self._documents:
+            self._documents[path] = read_library_document(path)
+        document = self._documents[path]
+        return Hit(document, "" if fitting else _doubt(document, distro, version))
 
 
 def fits(versions: dict[str, str], distro: str, version: str | None) -> bool:
@@ -121,11 +123,6 @@ def series_of(versions: dict[str, str], distro: str, version: str | None) -> str
 
 def _in_series(version: str, series: str) -> bool:
     return version.split(".")[: len(series.split("."))] == series.split(".")
-
-
-@lru_cache(maxsize=256)
-def _read(path: str) -> LibraryDocument:
-    return read_library_document(path)
 
 
 def _doubt(document: LibraryDocument, distro: str, version: str | None) -> str:

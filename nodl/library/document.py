@@ -27,7 +27,8 @@ class Evidence(NamedTuple):
 
 class LibraryDocument(NamedTuple):
     """``stem``: ``package/name`` of the file. ``programs``: executables and plugins that run this node;
-    ``classes``: names of the class if other nodes load it. ``versions``: a series by distribution."""
+    ``classes``: names of the class if other nodes load it. ``versions``: a series by distribution. ``recorded``: learnt
+    from runs."""
 
     interface: NodeInterface
     stem: str
@@ -37,6 +38,7 @@ class LibraryDocument(NamedTuple):
     versions: dict[str, str]
     evidence: Evidence
     transport: str = ""
+    recorded: bool = False
 
     @property
     def package(self) -> str:
@@ -63,6 +65,7 @@ def read_library_document(path: str) -> LibraryDocument:
         versions=given.get("versions") or {},
         evidence=_evidence(given.get("evidence") or {}),
         transport=given.get("transport") or "",
+        recorded=bool(given.get("runs")) or (given.get("evidence") or {}).get("how") == "recorded",
     )
 
 

@@ -107,6 +107,9 @@ def test_the_sources_of_interfaces_have_an_order(
     assert allowed(launch(NODE, library_folders=own), "publish") == ["/from_library"]
     install("pkg", "prog", source=PYTHON.format(topic="'from_source'"))
     assert allowed(launch(NODE, library_folders=own), "publish") == ["/from_source"]
+    document("pkg/prog", "from_record", "{runs: [{id: a}]}")
+    plan = launch(NODE, library_folders=own)
+    assert allowed(plan, "publish") == ["/from_record"] and str(plan.processes[0].origin) == "recorded"
     manifest = (
         '<interface version="1"><node name="n" executable="prog"><topic name="{}" type="p/msg/T" '
         'role="publisher"/></node></interface>'
