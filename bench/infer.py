@@ -1,5 +1,6 @@
 """Inference on the projects of the LiSA4ROS2 paper (tables 2 and 3): speed against its floor, and the counts.
 
+    python bench/infer.py --share FOLDER...     any sources: files that import rclpy and have every name known
     python bench/infer.py FOLDER [--counts]     FOLDER: ``ros-tests`` of lisa-analyzer/lisa4ros2
     LISA4ROS2_TESTS=FOLDER python bench/infer.py
 
@@ -27,6 +28,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
 from nodl.infer import InferredSystem, infer_paths  # noqa: E402
+from nodl.infer.report.expanded import expand  # noqa: E402
 from nodl.names import expand_name  # noqa: E402
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface  # noqa: E402
 
@@ -72,7 +74,12 @@ def main() -> int:
     )
     parser.add_argument("folder", nargs="?", default=os.environ.get("LISA4ROS2_TESTS"))
     parser.add_argument("--counts", action="store_true")
+    parser.add_argument("--share", nargs="+", metavar="FOLDER", help="sources of your choice")
     args = parser.parse_args()
+    if args.share:
+        for given in args.share:
+            share(Path(given))
+        return 0
     if args.folder is None or not Path(args.folder, "virtuoso").is_dir():
         print("not available: name the folder ros-tests of lisa-analyzer/lisa4ros2 (or LISA4ROS2_TESTS)")
         return 0
@@ -98,6 +105,33 @@ def measure(folder: Path) -> None:
 
 def row(project: str, floor: float, ours: float, paper: int) -> None:
     print(f"{project:32}{floor * 1e3:10.1f}{ours * 1e3:10.1f}{ours / floor:8.1f}{paper:10}")
+
+
+# --- share of programs with every name known ------------------------------------------------------------------
+
+
+def share(folder: Path) -> None:
+    """Strictly: a file counts when it imports rclpy and nothing in it is open."""
+    sources = {str(path.absolute()): path.read_bytes() for path in sorted(folder.rglob("*.py"))}
+    programs = {
+        path for path, source in sources.items() if b"import rclpy" in source or b"from rclpy" in source
+    }
+    floor = best(lambda: [_parsed(source) for source in sources.values()])
+    started = CLOCK()
+    system = infer_paths([folder])
+    ours = CLOCK() - started
+    unknown = {question.source.file for question in expand(system).unresolved}
+    row(folder.name, floor, ours, 0)
+    print(
+        f"    {len(programs - unknown)} of {len(programs)} files have every name known; {len(system.nodes)} nodes"
+    )
+
+
+def _parsed(source: bytes) -> ast.Module | None:
+    try:
+        return ast.parse(source)
+    except (SyntaxError, ValueError):
+        return None
 
 
 # --- counts -------------------------------------------------------------------------------------------------

@@ -218,7 +218,17 @@ class FunctionValue:
     """A function with what it closes over. ``owner`` is the class whose body defines it."""
 
     __slots__ = (
-        "attributes", "closure", "context_manager", "defaults", "kw_defaults", "module", "name", "node", "owner",
+        "attributes",
+        "cached",
+        "closure",
+        "context_manager",
+        "defaults",
+        "kw_defaults",
+        "module",
+        "name",
+        "node",
+        "owner",
+        "shared",
     )  # fmt: skip
 
     def __init__(
@@ -238,6 +248,8 @@ class FunctionValue:
         self.kw_defaults: tuple[Value | None, ...] = ()
         self.context_manager = False
         self.attributes: Cells = {}
+        self.cached = False  # by functools.cache
+        self.shared = False  # it stands for several, made at the same place
 
 
 class NativeObject:

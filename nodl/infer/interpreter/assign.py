@@ -54,7 +54,8 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
         if isinstance(owner, Instance) and _set_by_class(run, owner, name, value, node, frame):
             continue
         if isinstance(owner, FunctionValue):
-            run.state.write(owner.attributes, name, join(owner.attributes.get(name, BOTTOM), value))
+            kept = BOTTOM if certain and not owner.shared else owner.attributes.get(name, BOTTOM)
+            run.state.write(owner.attributes, name, join(kept, value))
         elif isinstance(owner, Instance | ClassValue | ModuleValue):
             plain_store(run, owner, name, value, certain)
         else:

@@ -68,6 +68,8 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     cells = bind(run, function, call)
     run.called.setdefault(node)
     run.understood.add(call.node)
+    if function.cached and not function.shared:
+        return _cached(run, function, cells, call)
     if generators.is_generator(node):
         return _generator(run, function, cells, call)
     if node not in run.stack or _decided_recursion(run, node):
@@ -78,6 +80,21 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
         _run_recursive(run, function, summary, call)
     result: Value = summary.result
     return result  # nothing yet: this path ends in a call that has not come back so far
+
+
+def _cached(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
+    """``functools.cache``: the same constant arguments give the first result again."""
+    key = ("cached", *cells.values())
+    constant = all(len(value) == 1 and isinstance(value[0], str | int | float) for value in cells.values())
+    held = function.attributes.get(key)
+    if constant and held and not run.repeated:
+        return held
+    if function.node in run.stack:
+        return _remembered(run, function, cells, call) if _decided_recursion(run, function.node) else ANY
+    result = _remembered(run, function, cells, call)
+    if constant:
+        run.state.write(function.attributes, key, result)
+    return result
 
 
 def _generator(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:

@@ -56,6 +56,7 @@ def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> Func
     kw_defaults = tuple(
         None if default is None else run.evaluate(default, frame) for default in arguments.kw_defaults
     )
+    function.shared = known is not None
     if known is not None and known.closure is closure:  # made again in a loop: one function for all
         defaults = tuple(join(a, b) for a, b in zip(known.defaults, defaults, strict=True))
         kw_defaults = tuple(
@@ -97,6 +98,9 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
         return (ClassMethod(value, path == "builtins.staticmethod"),)
     if path in ("contextlib.contextmanager", "contextlib.asynccontextmanager"):
         function.context_manager = True
+        return value
+    if path in ("functools.cache", "functools.lru_cache"):
+        function.cached = True
         return value
     if path in _TRANSPARENT:
         return value

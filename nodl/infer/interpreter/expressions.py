@@ -423,7 +423,10 @@ def _lambda(run: Run, node: ast.Lambda, frame: Frame) -> Value:
 
 def _walrus(run: Run, node: ast.NamedExpr, frame: Frame) -> Value:
     value = run.evaluate(node.value, frame)
-    assign(run, node.target, value, frame)
+    owner = frame
+    while owner.is_comprehension and owner.closure is not None:
+        owner = owner.closure
+    assign(run, node.target, value, owner)
     return value
 
 

@@ -386,6 +386,7 @@ def _inner_frame(run: Run, frame: Frame) -> Frame:
         cells.update(frame.cells)
     inner = Frame(frame.module, cells, closure, run.state.depth)
     inner.function = frame.function
+    inner.is_comprehension = True
     return inner
 
 

@@ -38,6 +38,9 @@ _ARITHMETIC: dict[type, Callable[[object, object], object]] = {
     ast.Div: operator.truediv,
     ast.FloorDiv: operator.floordiv,
     ast.Mod: operator.mod,
+    ast.Pow: operator.pow,
+    ast.LShift: operator.lshift,
+    ast.RShift: operator.rshift,
     ast.BitOr: operator.or_,
     ast.BitAnd: operator.and_,
     ast.BitXor: operator.xor,
@@ -97,6 +100,8 @@ def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: o
         if isinstance(op, ast.Mult) and isinstance(a, str) and isinstance(b, int) and len(a) * b < 300:
             return (a * b,)
         return (b,) if isinstance(b, Unknown) else (a,) if isinstance(a, Unknown) else ANY
+    if isinstance(op, ast.Pow | ast.LShift | ast.RShift) and (abs(a) > _LARGE or not 0 <= b <= 64):
+        return ANY  # of any size
     try:
         result = _ARITHMETIC[type(op)](a, b)
     except (ArithmeticError, ValueError) as error:

@@ -93,6 +93,10 @@ def _builtin(path: str) -> type[BaseException] | None:
     return found if isinstance(found, type) and issubclass(found, BaseException) else None
 
 
+def is_builtin_exception(path: str) -> bool:
+    return path.startswith("builtins.") and _builtin(path) is not None
+
+
 def _builtin_kinds(kind: type[BaseException] | None) -> tuple[object, ...]:
     if kind is None:
         return ()

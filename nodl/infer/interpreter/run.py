@@ -69,6 +69,7 @@ class Frame:
         "function",
         "globals",
         "is_class",
+        "is_comprehension",
         "jump",
         "loop_forks",
         "module",
@@ -95,6 +96,7 @@ class Frame:
         self.loop_forks = 0
         self.again = False  # the cells also hold an earlier call, whose inner functions live on
         self.is_class = False
+        self.is_comprehension = False
         self.globals: set[str] = set()
         self.nonlocals: set[str] = set()
 

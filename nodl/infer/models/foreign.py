@@ -10,6 +10,7 @@ import sys
 
 from nodl.infer.interpreter.assign import plain_store
 from nodl.infer.interpreter.iterate import lose
+from nodl.infer.interpreter.raising import is_builtin_exception
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import builtin, concrete, endpoints, native, pure, ros, stdlib
 from nodl.infer.models.library_nodes import library_node
@@ -78,6 +79,9 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     owner, _, name = path.rpartition(".")
     if is_node_class(owner) or (owner == "builtins.object" and name.startswith("__")):
         return _unbound_method(run, owner, name, call)
+    if is_builtin_exception(path):
+        run.escape(call.args, opened=False, objects=False)
+        return (Instance(External(path), (call.source.file, call.source.line)),)
     if "(" in path and (name in NODE_METHODS):
         return call_native(run, NativeMethod(unknown(f"the result of {owner}")[0], name), call)
     if "(" not in path:
@@ -116,6 +120,8 @@ def is_asked_of(name: str) -> bool:
 def may_fail(atom: object) -> bool:
     """Whether the call that gave ``atom`` may have raised: not one that made an endpoint with a known name."""
     if not isinstance(atom, Instance) or not isinstance(atom.cls, External):
+        return False
+    if is_builtin_exception(atom.cls.path):
         return False
     names = atom.cells.get("name", ())
     return atom.cls.path not in endpoints.CLASSES or not all(isinstance(name, str) for name in names)
