@@ -158,7 +158,7 @@ def _notes(learnt: Learnt, records: Iterable[Record]) -> Iterable[str]:
             f"{node.program}, node {node.key.node}: {text}" for text in (*node.incomplete, *node.notes)
         )
     for pattern in learnt.unforeseeable:
-        yield f"nodes {pattern} have another name in each run: no manifest can name them"
+        yield f"node {pattern}: not learnt, as its name or its origin is not known beforehand"
     for record in records:
         yield from (f"run {record.run.id}: {complaint.why}" for complaint in record.complaints)
 

@@ -81,7 +81,7 @@ class AskedNode(NamedTuple):
     """What one node asked for. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
 
     ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
-    the supervisor tells them at all.
+    the supervisor tells them at all; ``started_as``: what the launch calls it (``node``, ``component`` ...).
     """
 
     package: str
@@ -103,6 +103,7 @@ class AskedNode(NamedTuple):
     process: str = ""
     location: str = ""
     distro: str = ""
+    started_as: str = ""
 
     @property
     def program(self) -> str:
@@ -168,6 +169,7 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
         container=Role.CONTAINER in roles,
         process=started.process if started else str(process.pid),
         location=origin.location if origin else "",
+        started_as="component" if component else (started.kind if started else ""),
     )
 
 

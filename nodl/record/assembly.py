@@ -2,8 +2,9 @@
 
 A process of the record belongs to the process that the supervisor started if it is in its session, or if one of its
 parents is: a shell or ``nice`` has another pid than the node behind it. Nodes of a container belong to the components
-that the launch asked it to load, by final name and, where names are equal, in the order of the requests; a node that
-no request names was made by the component before it (loads of one container run one after another).
+that the launch asked it to load, by final name and, where names are equal, in the order of the requests. A node that
+no request names is another one of a plugin that gave the same name of its own before (somebody else loaded it), or was
+made by the component before it, in its constructor (loads of one container run one after another); else it is nobody's.
 """
 
 from __future__ import annotations
@@ -170,17 +171,36 @@ class Record:
         if process.started is None or process.started.kind != "container":
             return
         taken = {id(node.component) for node in process.nodes.values() if node.component}
-        before: LoadedComponent | None = None
+        before: RecordedNode | None = None
         for node in process.nodes.values():
             if node.component is None and node.fqn and node.fqn != container:
-                node.component = self._component(node, container, taken) or before
+                node.component = self._component(node, container, taken) or _maker(node, before, process)
                 taken.add(id(node.component))
-            before = node.component
+            before = node if node.component is not None else before
 
     def _component(self, node: RecordedNode, container: str, taken: set[int]) -> LoadedComponent | None:
         """The first request with this name; a plugin may have been loaded twice under one."""
         asked = [item for item in self.components if _is(item.container, container) and _made(item, node)]
-        return next((item for item in asked if id(item) not in taken), asked[-1] if asked else None)
+        named = [item for item in asked if item.name]
+        return next((item for item in asked if id(item) not in taken), named[-1] if named else None)
+
+
+_CONSTRUCTION = 2_000_000_000
+"""Nanoseconds from a component's own node to the last one that its constructor makes."""
+
+
+def _maker(
+    node: RecordedNode, before: RecordedNode | None, process: RecordedProcess
+) -> LoadedComponent | None:
+    if node.made is None:
+        return None
+    for other in process.nodes.values():
+        if other.component is not None and other.made is not None and other.made.name == node.made.name:
+            return other.component
+    if before is None or before.made is None:
+        return None
+    in_time = 0 <= node.made.at - before.made.at <= _CONSTRUCTION
+    return before.component if in_time and node.made.thread == before.made.thread else None
 
 
 def read_record(text: bytes) -> Record:

@@ -105,7 +105,10 @@ def learn(records: Iterable[Record]) -> Learnt:
     for record in sorted(records, key=lambda record: record.run.id):
         before: dict[tuple[str, str], ProgramKey] = {}  # the last node of each program in each process
         for node in all_asked(record.attributed()):
-            if not node.known_start or node.container:
+            if not node.known_start or node.container or node.started_as == "executable":
+                continue  # no launch file can give an executable a manifest
+            if node.started_as == "container":
+                unforeseeable.add(f"{node.fqn} in a container, which this launch did not load,")
                 continue
             place, pattern = (node.process, node.program), _unforeseeable(node)
             if pattern == _TF_LISTENER and place in before:

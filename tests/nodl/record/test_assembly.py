@@ -117,6 +117,37 @@ def test_a_helper_node_of_a_component_belongs_to_it() -> None:
     assert [each.plugin for each in found] == ["", "nav::Planner", "nav::Planner"]
 
 
+def test_a_component_that_somebody_else_loads_is_that_of_the_same_plugin_or_nobodys() -> None:
+    """The record of a container in which ``ros2 component load`` was called while it ran."""
+    found = nodes(
+        CONTAINER,
+        loaded(10, 1, 10),
+        LoadedComponent("/box", "demo", "demo::Talker"),
+        LoadedComponent("/box", "demo", "demo::Listener"),
+        node(10, 1, "ComponentManager", "/box"),
+        node(10, 2, "talker", "/talker"),
+        node(10, 3, "listener", "/listener"),
+        node(10, 4, "talker", "/again"),
+        node(10, 5, "stranger", "/stranger")._replace(at=60_000_000_000),
+    )
+    assert [(each.plugin, each.fqn) for each in found[3:]] == [("demo::Talker", "/again"), ("", "/stranger")]
+
+
+def test_what_a_launch_did_not_load_and_executables_are_not_learnt() -> None:
+    lines = (
+        CONTAINER,
+        loaded(10, 1, 10),
+        node(10, 1, "ComponentManager", "/box"),
+        node(10, 2, "stranger", "/stranger"),
+        StartedProcess(11, "python3-2", "", "python3", "executable"),
+        loaded(11, 1, 11),
+        node(11, 1, "script", "/script"),
+    )
+    learnt = learn([Record([Run("r"), *lines])])
+    assert [each.key.node for each in learnt.nodes if each.key.node != "ComponentManager"] == []
+    assert any("/stranger" in text for text in learnt.unforeseeable)
+
+
 def test_the_node_of_a_transform_listener_marks_the_node_that_made_it() -> None:
     lines = (
         Run("r"),
