@@ -16,7 +16,8 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from enclave_launch.diagnostics import Diagnostic, program_not_executable
+from enclave_launch.admission.middleware import middleware_of, why_not
+from enclave_launch.diagnostics import Diagnostic, middleware_refused, program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner, mixed_enclaves
@@ -50,7 +51,24 @@ def resolve(
     prefixes = search_prefixes(source.prefixes)
     finder = InterfaceFinder(prefixes, chosen, evaluation.distro, launched(evaluation))
     plan = Planner(source, finder, chosen.plan_options()).plan(evaluation)
-    return plan._replace(warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)))
+    return plan._replace(
+        problems=(*plan.problems, *_launcher_refusals(plan)),
+        warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)),
+    )
+
+
+def _launcher_refusals(plan: LaunchPlan) -> list[Diagnostic]:
+    """Our own node is a process as well: it runs in our environment, not in one of the launch file's."""
+    if plan.launcher is None:
+        return []
+    middleware = middleware_of(os.environ, plan.distro)
+    why = why_not(middleware, plan.planner.options.admission.middlewares)
+    if why is None:
+        return []
+    place = plan.launcher.location
+    return [
+        middleware_refused("the launcher's own node", middleware, why, place, by_launch_file=False),
+    ]
 
 
 def evaluate_launch(

@@ -167,3 +167,18 @@ def test_a_dds_configuration_with_security_of_its_own_is_refused(plan: Plan, tmp
             assert codes(plan(text)) == [Code.SECURITY_CONFIGURED], value
         assert not plan(TALKER.format(f'<env name="{name}" value="{plain}"/>')).problems
     assert not plan(TALKER.format('<env name="CYCLONEDDS_URI" value="/no/such/file"/>')).problems
+
+
+def test_the_launchers_own_node_needs_such_a_middleware_too(
+    plan: Plan, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It loads components and changes states from an enclave of its own, in the launcher's environment."""
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    text = (
+        '<node_container pkg="demo_nodes" exec="component_container" name="box" namespace="">'
+        '<env name="RMW_IMPLEMENTATION" value="rmw_cyclonedds_cpp"/>{}</node_container>'
+    )
+    component = '<composable_node pkg="demo_nodes" plugin="demo_nodes::Talker" name="talker"/>'
+    refused = [one for one in plan(text.format(component)).problems if one.code is Code.MIDDLEWARE_REFUSED]
+    assert [one.subject for one in refused] == ["the launcher's own node"]
+    assert Code.MIDDLEWARE_REFUSED not in codes(plan(text.format("")))
