@@ -10,9 +10,9 @@ import time
 from collections.abc import Callable
 from typing import Any
 
+from enclave_launch.boundary.shell_words import split_words
 from enclave_launch.boundary.terminal import json_text, printable_lines
 from enclave_launch.boundary.yaml_nodes import compose
-from enclave_launch.frontend.shell_words import split_words
 from enclave_launch.frontend.substitution_grammar import parse_template
 from enclave_launch.frontend.xml_tree import parse_xml
 from enclave_launch.frontend.yaml_scalar import load as load_value

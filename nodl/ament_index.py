@@ -21,7 +21,7 @@ from enclave_launch.boundary.files import read_text
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
-_PACKAGE_VERSION = re.compile(r"<version\b[^>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
+_PACKAGE_VERSION = re.compile(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
 _PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
 
 
@@ -114,8 +114,7 @@ def package_version(package: str, prefixes: Sequence[str]) -> str | None:
 def package_file_version(path: str) -> str | None:
     """What a ``package.xml`` says; ``None`` when it does not, or cannot be read."""
     try:
-        with open(path, encoding="utf-8", errors="replace") as file:
-            found = _PACKAGE_VERSION.search(file.read())
+        found = _PACKAGE_VERSION.search(read_text(path, errors="replace"))
     except OSError:
         return None
     return found[1] if found else None

@@ -161,8 +161,13 @@ def _own_words(keeper: Keeper, words: Sequence[str]) -> tuple[list[str], list[st
     return list(words[:at]), list(words[at:])
 
 
+_LONGEST = 50_000  # characters of a shell's command line; the reader of shlex is quadratic in its words
+
+
 def _shell_operator(text: str) -> str | None:
     """The first thing in ``text`` that makes it more than one program with its words."""
+    if len(text) > _LONGEST:
+        return f"more than {_LONGEST} characters"
     lexer = shlex.shlex(text, posix=True, punctuation_chars=";&|()")
     lexer.whitespace_split = True
     lexer.commenters = ""

@@ -3,7 +3,6 @@
     launch_file.py            path -> text -> parsed tree, read and parsed once per file version
     xml_tree.py yaml_tree.py  text -> tree with line numbers; refuse what only an attacker writes
     substitution_grammar.py   the ``$(...)`` language: text <-> templates
-    shell_words.py            a command line as text -> its words
     yaml_scalar.py            text -> value by YAML 1.1 rules, mostly without loading PyYAML
     python_file.py            runs a Python launch file: foreign code, alone in its file, behind a switch
     error_location.py         exception -> file, line and element

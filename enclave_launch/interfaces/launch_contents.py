@@ -9,9 +9,9 @@ from its section in the files of ``--param-file`` and in the spawner's own param
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Sequence
 
+from enclave_launch.boundary.shell_words import split_words
 from enclave_launch.interfaces.situation import parameters_of_node
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedProcess
@@ -94,4 +94,4 @@ def _values(options: Sequence[tuple[str, str]], spellings: Sequence[str]) -> lis
 
 
 def _words(texts: Sequence[str]) -> list[str]:
-    return [word for text in texts for word in shlex.split(text)]
+    return [word for text in texts for word in split_words(text)]

@@ -10,9 +10,9 @@ from __future__ import annotations
 import re
 import time
 from collections import deque
-from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Grants, Need
@@ -189,7 +189,7 @@ def _patch(need: Need, asked: Asked, described: Description) -> Patch:
     source = described.node.interface.source if described.node is not None else None
     if source is not None and _MANIFEST.search(source.file):
         try:
-            text = Path(source.file).read_text(encoding="utf-8")
+            text = read_text(source.file)
         except (OSError, UnicodeDecodeError):
             text = ""
         found = manifest_patch(source.file, text, source.line, asked) if text else None

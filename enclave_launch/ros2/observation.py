@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import os
 import re
-import shlex
 from typing import Any
 
 import launch_ros.actions
 from launch.descriptions import executable as executable_description
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
+from enclave_launch.boundary.shell_words import split_words
 from enclave_launch.description.actions.processes import first_word
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
@@ -139,7 +139,7 @@ def _prefix(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[str, ...]:
         and re.match(perform_substitutions(context, pattern), os.path.basename(cmd[0])) is None
     ):
         return ()
-    return tuple(shlex.split(perform_substitutions(context, description.prefix)))
+    return tuple(split_words(perform_substitutions(context, description.prefix)))
 
 
 def _kind(action: Any) -> ProcessKind:

@@ -7,10 +7,10 @@ outside of them a word with ``:=`` is still taken as a remap rule (deprecated th
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from enclave_launch.boundary.shell_words import split_words
 from nodl.remap import InvalidRemapRuleError, parse_rule
 
 _REMAP = ("-r", "--remap")
@@ -68,7 +68,7 @@ def words_after_program(cmd: Sequence[str], prefix_length: int, *, shell: bool) 
 def shell_words(cmd: Sequence[str]) -> list[str]:
     """The words of a command that goes through a shell. What the shell would refuse stays as it is."""
     try:
-        return shlex.split(" ".join(cmd))
+        return split_words(" ".join(cmd))
     except ValueError:
         return list(cmd)
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 from typing import NamedTuple
 
+from enclave_launch.boundary.files import read_bytes
 from nodl.dependence import Situation
 from nodl.document.yaml_text import YamlValue, parse_yaml
 from nodl.errors import InvalidNoDLError
@@ -61,7 +62,6 @@ def _read(file: str) -> YamlValue:
     try:
         if not os.path.isfile(file):
             raise InvalidNoDLError.at(SourceRef(file), "there is no such file")
-        with open(file, "rb") as stream:
-            return parse_yaml(stream.read(), file)
+        return parse_yaml(read_bytes(file), file)
     except OSError as error:
         raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None

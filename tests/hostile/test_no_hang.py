@@ -121,9 +121,11 @@ HOSTILE: dict[str, tuple[Callable[[Path], str], str]] = {
     ),
     "an entity that grows": (
         lambda folder: (
-            '<!DOCTYPE launch [<!ENTITY a "&b;&b;"><!ENTITY b "xx">]><launch><let name="a" value="&a;"/></launch>'
+            '<!DOCTYPE launch [<!ENTITY a0 "xx">'
+            + "".join(f'<!ENTITY a{i} "&a{i - 1};&a{i - 1};">' for i in range(1, 60))
+            + ']><launch><let name="a" value="&a59;"/></launch>'
         ),
-        "more than plain text",
+        "has more than 256 characters",
     ),
     "an entity from outside": (
         lambda folder: '<!DOCTYPE launch [<!ENTITY a SYSTEM "/dev/zero">]><launch>&a;</launch>',
@@ -144,6 +146,9 @@ HARMLESS: dict[str, Callable[[Path], str]] = {
     "a megabyte in one argument": executable("x" * 1_000_000),
     "a megabyte in quotes": executable("'" + "x" * 1_000_000 + "'"),
     "a hundred thousand words": executable("x " * 100_000),
+    "a megabyte for a shell": lambda folder: (
+        f'<launch><executable cmd="true {"x" * 1_000_000}" shell="true"/></launch>'
+    ),
     "a megabyte of dollars": lambda folder: f'<launch><let name="a" value="{"$" * 1_000_000}"/></launch>',
     "a megabyte of backslashes": lambda folder: (
         f'<launch><let name="a" value="{chr(92) * 1_000_000}"/></launch>'
@@ -182,3 +187,30 @@ def test_it_takes_no_long_time(make: Callable[[Path], str], tmp_path: Path) -> N
     (tmp_path / "t.launch.xml").write_text(make(tmp_path))
     run = dry_run(tmp_path, "t.launch.xml")
     assert (run.returncode, "Traceback" in run.stderr) == (0, False), run.stderr[-2000:]
+
+
+def inferred(folder: Path, source: str) -> subprocess.CompletedProcess[str]:
+    (folder / "talker.py").write_text(f"from rclpy.node import Node\nnode = Node('talker')\n{source}\n")
+    command = [sys.executable, "-m", "nodl.verb", "infer", "talker.py"]
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.run(
+        command, cwd=folder, env=environment, preexec_fn=_bounded, capture_output=True, text=True, check=False
+    )
+
+
+HOSTILE_SOURCES = {
+    "brackets in brackets": "x = " + "(" * 50_000 + ")" * 50_000,
+    "signs": "x = " + "-" * 50_000 + "1",
+    "a long sum": "x = " + "1 + " * 50_000 + "1",
+    "a format without end": f"node.create_publisher(T, '{'%(' * 100_000}' % {{}}, 1)",
+    "a text that doubles": "s = 'a'\n" + "s = s + s\n" * 60 + "node.create_publisher(T, s, 1)",
+    "a text that is multiplied": "node.create_publisher(T, 'a' * 10**9 * 10**9, 1)",
+    "a number that grows": "node.create_publisher(T, str(9**9**9**9), 1)",
+    "branches": "s = ''\n" + "s = s + ('a' if c else 'b')\n" * 60 + "node.create_publisher(T, s, 1)",
+}
+
+
+@pytest.mark.parametrize("source", HOSTILE_SOURCES.values(), ids=HOSTILE_SOURCES.keys())
+def test_inference_of_a_foreign_source_takes_no_long_time(source: str, tmp_path: Path) -> None:
+    run = inferred(tmp_path, source)
+    assert (run.returncode in (0, 1), "Traceback" in run.stderr) == (True, False), run.stderr[-2000:]

@@ -7,9 +7,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary import shell_words
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
-from enclave_launch.frontend import shell_words
 
 if TYPE_CHECKING:
     from enclave_launch.description.action import Action

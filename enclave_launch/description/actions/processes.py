@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary import shell_words
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.events import Shutdown
 from enclave_launch.description.actions.executable import Executable
@@ -23,7 +24,6 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
-from enclave_launch.frontend import shell_words
 from enclave_launch.host.current import current_release
 from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary import shell_words
 from enclave_launch.boundary.files import read_text
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
@@ -18,7 +19,6 @@ from enclave_launch.description.substitution import (
 )
 from enclave_launch.description.templates import TemplateSubstitution, described, template
 from enclave_launch.diagnostics import command_stderr
-from enclave_launch.frontend import shell_words
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from enclave_launch.boundary.files import read_text
+
 _ARGUMENT = re.compile(r'\[(=*)\[((?:.|\n)*?)\]\1\]|"((?:\\.|[^"\\])*)"|([^\s()"]+)|([()])')
 _COMMAND = re.compile(r"[ \t]*(\w+)\s*\(")
 _VARIABLE = re.compile(r"\$\{([\w.\-]+)\}")
@@ -122,7 +124,7 @@ class _Reader:
 
     def read(self, folder: str, variables: dict[str, str]) -> None:
         try:
-            source = Path(folder, "CMakeLists.txt").read_text(encoding="utf-8", errors="replace")
+            source = read_text(Path(folder, "CMakeLists.txt"), errors="replace")
         except OSError:
             return
         variables = {**variables, "CMAKE_CURRENT_SOURCE_DIR": folder, "CMAKE_CURRENT_LIST_DIR": folder}

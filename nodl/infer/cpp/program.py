@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 import nodl.infer.cpp.calls
 import nodl.infer.cpp.models
 import nodl.infer.cpp.statements  # noqa: F401  (registers how statements run)
+from enclave_launch.boundary.files import read_text
 from nodl.infer.cpp.calls import HOOKS
 from nodl.infer.cpp.cmake import Target
 from nodl.infer.cpp.declarations import Class, FileIndex, Function, index_file
@@ -84,8 +85,7 @@ class Sources:
             if os.path.getsize(file) > MAX_FILE_SIZE:
                 self.unreadable[file] = "this file is over 2 MB and was not read"
                 return None
-            with open(file, encoding="utf-8", errors="replace") as stream:
-                return stream.read()
+            return read_text(file, errors="replace")
         except OSError as error:
             self.unreadable[file] = f"this file cannot be read: {error.strerror}"
             return None

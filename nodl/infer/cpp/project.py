@@ -5,16 +5,17 @@ from __future__ import annotations
 import json
 import os
 import re
-import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import unescape
 from pathlib import Path
 
+from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.shell_words import split_words
 from nodl.infer.cpp.cmake import Build, Target, read_build
 
-_TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^>]*)?>\s*([\w\-.]+)\s*</")
+_TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^<>]*)?>\s*([\w\-.]+)\s*</")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _EXPORT = re.compile(r'<(\w+)\s+plugin\s*=\s*"([^"]+)"')
 _CLASS = re.compile(r"<class\b((?:\s+[\w:]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))+)\s*/?>")
@@ -130,11 +131,13 @@ class Workspace:
                 *sorted(Path(folder).glob("*/compile_commands.json")),
             ):
                 try:
-                    entries = json.loads(path.read_text(encoding="utf-8"))
-                except (OSError, ValueError):
+                    entries = json.loads(read_text(path))
+                except (OSError, ValueError, RecursionError):
                     continue
                 for entry in entries if isinstance(entries, list) else []:
-                    words = entry.get("arguments") or shlex.split(entry.get("command", ""))
+                    if not isinstance(entry, dict):
+                        continue
+                    words = entry.get("arguments") or split_words(str(entry.get("command", "")))
                     file = os.path.normpath(os.path.join(entry.get("directory", ""), entry.get("file", "")))
                     found[os.path.realpath(file)] = _defined(words)
         return found
@@ -200,6 +203,6 @@ def sources_of(target: Target, build: Build) -> list[str]:
 
 def _read(path: str) -> str:
     try:
-        return Path(path).read_text(encoding="utf-8", errors="replace")
+        return read_text(path, errors="replace")
     except OSError:
         return ""

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from functools import cached_property
 from pathlib import Path
 
+from enclave_launch.boundary.files import read_text
 from nodl.infer.cpp.machine import Settings
 from nodl.infer.cpp.program import Entry, Findings, Sources, run_program
 from nodl.infer.cpp.project import SourcePackage, Workspace, find_packages, read_source_package
@@ -93,7 +94,7 @@ def _built(folder: Path) -> Iterator[SourcePackage]:
     """The source folders that a build remembers."""
     for cache in sorted(folder.glob("*/CMakeCache.txt")):
         try:
-            match = _HOME.search(cache.read_text(encoding="utf-8", errors="replace"))
+            match = _HOME.search(read_text(cache, errors="replace"))
         except OSError:
             continue
         if match and os.path.isfile(os.path.join(match[1], "package.xml")):

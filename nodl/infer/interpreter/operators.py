@@ -298,7 +298,7 @@ def percent(left: Value, right: Value) -> Value:
     return text_value(results) or ANY
 
 
-_DIRECTIVE = re.compile(r"%(?:\((?P<key>[^)]*)\))?(?P<flags>[#0\- +]*\d*(?:\.\d+)?)(?P<type>[a-zA-Z%])")
+_DIRECTIVE = re.compile(r"%(?:\((?P<key>[^)]{0,200})\))?(?P<flags>[#0\- +]*\d*(?:\.\d+)?)(?P<type>[a-zA-Z%])")
 
 
 def _percent_one(template: str, right: Value) -> list[TextAtom]:

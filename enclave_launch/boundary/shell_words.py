@@ -1,7 +1,7 @@
 """A command line as text -> its words, as a POSIX shell splits and unquotes them. Pure.
 
 ``shlex.split`` of the standard library gives the same, but in time quadratic in the longest word: a megabyte takes it
-a minute. ``tests/frontend/test_shell_words.py`` holds the two equal.
+a minute. ``tests/boundary/test_shell_words.py`` holds the two equal.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.frontend.shell_words import split_words
+from enclave_launch.boundary.shell_words import split_words
 
 
 @given(st.text(alphabet="ab \t\n\r'\"\\$()#é\x0b", max_size=20))
