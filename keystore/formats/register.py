@@ -17,7 +17,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 from keystore.errors import DamagedKeystoreError
@@ -26,6 +26,7 @@ from keystore.formats.role import Role
 from keystore.formats.validity import iso, parse_moment
 
 _VERSION = 1
+_moment = lru_cache(maxsize=1024)(parse_moment)  # what was issued together has the same dates
 UNKNOWN = ""
 """In place of an enclave, subject or key: of certificates that only a CRL of an earlier version tells of."""
 
@@ -245,15 +246,15 @@ def _certificate(row: list[Any]) -> IssuedCertificate:
         str(subject),
         str(key),
         str(issuer),
-        parse_moment(not_before),
-        parse_moment(not_after),
+        _moment(not_before),
+        _moment(not_after),
         bool(replaced),
-        parse_moment(revoked) if revoked is not None else None,
+        _moment(revoked) if revoked is not None else None,
     )
 
 
 def _document(row: list[Any]) -> SignedPermissions:
     enclave, subject, document, rules, not_after = row
     return SignedPermissions(
-        validate_enclave_name(enclave), str(subject), str(document), str(rules), parse_moment(not_after)
+        validate_enclave_name(enclave), str(subject), str(document), str(rules), _moment(not_after)
     )

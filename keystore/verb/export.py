@@ -7,6 +7,7 @@ bytes).
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 
 from keystore.verb import common
@@ -37,4 +38,17 @@ def run(arguments: argparse.Namespace) -> int:
         public=PublicFiles(arguments.public), accept_exposures=arguments.accept_exposures,
     )  # fmt: skip
     common.print_lines(names)
+    print(f"to pin its CAs where it is unpacked: {_pinned(arguments.keystore)}", file=sys.stderr)
     return 0
+
+
+def _pinned(keystore: Path) -> str:
+    """The command; a bundle has no register that could tell a foreign CA."""
+    from keystore.disk.safe_files import resolve_root
+    from keystore.disk.view import KeystoreView
+    from keystore.formats.role import Role
+    from keystore.signing.public_key import fingerprint
+
+    view = KeystoreView(resolve_root(keystore))
+    found = dict.fromkeys(fingerprint(ca.der) for role in Role for ca in view.ca_bundle(role))
+    return " ".join(("secure-keystore verify BUNDLE", *(f"--require-ca {one}" for one in found)))

@@ -12,8 +12,10 @@ import pytest
 
 from keystore.disk import layout
 from keystore.errors import DamagedKeystoreError, InvalidInputError
+from keystore.formats.role import Role
 from keystore.steps.bundle import PublicFiles, export
 from keystore.steps.removal import RemoveOptions, remove
+from keystore.verb import main
 from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, contents, filled, mode, openssl
 
@@ -139,3 +141,15 @@ def test_a_failed_export_leaves_nothing(root: Path, tmp_path: Path) -> None:
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
     assert "StorageError" in done.stderr
     assert os.listdir(place) == []
+
+
+def test_the_command_says_how_to_pin_the_cas(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    root, bundle = filled(tmp_path / "ks", ["/a"]), tmp_path / "bundle"
+    assert main(["export", str(root), "-o", str(bundle), "--enclave", "/a"]) == 0
+    words = capsys.readouterr().err.rpartition(": ")[2].split()
+    assert main(["verify", str(bundle), *words[3:]]) == 0
+    other = filled(tmp_path / "other", ["/a"])
+    for role in Role:
+        name = f"public/{role.value}.cert.pem"
+        (bundle / name).write_bytes((bundle / name).read_bytes() + (other / name).read_bytes())
+    assert main(["verify", str(bundle), *words[3:]]) == 1
