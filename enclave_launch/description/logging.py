@@ -9,6 +9,8 @@ from __future__ import annotations
 import os
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.host.current import current_host
+
 if TYPE_CHECKING:
     import logging
 
@@ -20,7 +22,11 @@ def get_logger(name: str | None = None) -> logging.Logger:
     root = logging.getLogger("launch")
     if not root.handlers:
         root.addHandler(logging.NullHandler())
-    return root if name is None else logging.getLogger(name)
+    logger = root if name is None else logging.getLogger(name)
+    outcomes = current_host().outcomes
+    if outcomes is not None:
+        outcomes.listen(logger)
+    return logger
 
 
 def get_output_loggers(process_name: str, output_config: object) -> tuple[logging.Logger, logging.Logger]:

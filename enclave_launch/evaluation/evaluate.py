@@ -67,6 +67,9 @@ def evaluate(
             raise
         except Exception as error:  # launch files run code of their own: any exception is theirs
             raise _evaluation_error(error, path, host) from error
+        finally:
+            if host.outcomes is not None:
+                host.outcomes.stop_listening()
     return _evaluation(host)
 
 

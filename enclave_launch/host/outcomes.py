@@ -18,13 +18,15 @@ from __future__ import annotations
 import os
 import sys
 from collections import deque
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator
 from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from enclave_launch.host.environment import changed, environment_snapshot
 
 if TYPE_CHECKING:
+    import logging
+
     from enclave_launch.description.launch_context import ContextState, LaunchContext
 
 T = TypeVar("T")
@@ -38,6 +40,7 @@ class Outcome(NamedTuple):
     error: Exception | None = None
     effects: Effects | None = None
     again: bool = False
+    said: tuple[logging.LogRecord, ...] = ()
 
 
 class Outcomes:
@@ -49,6 +52,8 @@ class Outcomes:
         self._states: dict[int, _ObjectState] = {}
         self._replaying = False
         self._inside = False
+        self._said: list[logging.LogRecord] = []
+        self._listeners: list[tuple[logging.Logger, logging.Handler, int]] = []
 
     def rewind(self) -> bool:
         """From now on give what was noted, to objects that are as they were before their first visit.
@@ -79,19 +84,44 @@ class Outcomes:
         if not self._replaying:
             _note_states(entity, self._states)
 
+    def listen(self, logger: logging.Logger) -> None:
+        """What user code logs while it is noted is said when its outcome is taken: once, in the log of the launch."""
+        if not self._replaying and all(known is not logger for known, *_ in self._listeners):
+            listener = _listener(self._hear)
+            logger.addHandler(listener)
+            self._listeners.append((logger, listener, logger.level))
+            logger.setLevel(1)  # what is shown is decided when it is said
+
+    def stop_listening(self) -> None:
+        """The dry run is over."""
+        for logger, listener, level in self._listeners:
+            logger.removeHandler(listener)
+            logger.setLevel(level)
+        self._listeners.clear()
+
+    def _hear(self, record: logging.LogRecord) -> None:
+        if self._inside and record not in self._said:
+            self._said.append(record)
+
     def _note(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None) -> T:
         before = _Before(context)
+        self._said = []
         self._inside = True
         try:
             result = function()
         except Exception as error:  # whatever user code raises: it raises it again
-            self._add(key, Outcome(error=error, effects=before.effects()))
+            self._add(key, Outcome(error=error, effects=before.effects(), said=tuple(self._said)))
             raise
         finally:
             self._inside = False
         again = before.something_started()
-        self._add(key, Outcome(again=True) if again else Outcome(_reusable(result), effects=before.effects()))
-        return _fresh(self._noted[key][-1].result) if not again else result
+        if again:
+            self._add(key, Outcome(again=True))
+            return result
+        kept = _reusable(result)
+        self._add(key, Outcome(kept, effects=before.effects(), said=tuple(self._said)))
+        first: T = _fresh(kept)
+        return first
 
     def _add(self, key: Hashable, outcome: Outcome) -> None:
         self._noted.setdefault(key, deque()).append(outcome)
@@ -103,6 +133,7 @@ class Outcomes:
             return function()
         if outcome.effects is not None:
             outcome.effects.apply(context)
+        _say(outcome.said)
         if outcome.error is not None:
             raise outcome.error
         result: T = _fresh(outcome.result)
@@ -156,6 +187,27 @@ def _fresh(result: Any) -> Any:
     if isinstance(result, _Items):
         return iter(list(result.items))
     return list(result) if type(result) is list else result
+
+
+def _say(records: Iterable[logging.LogRecord]) -> None:
+    for record in records:
+        from logging import getLogger
+
+        logger = getLogger(record.name)
+        if logger.isEnabledFor(record.levelno):
+            logger.handle(record)
+
+
+def _listener(hear: Callable[[logging.LogRecord], None]) -> logging.Handler:
+    import logging
+
+    class Listener(logging.Handler):
+        """Keeps records for later, and keeps them off the screen now."""
+
+        def emit(self, record: logging.LogRecord) -> None:
+            hear(record)
+
+    return Listener()
 
 
 class Effects(NamedTuple):

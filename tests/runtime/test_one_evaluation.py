@@ -126,6 +126,34 @@ def generate_launch_description():
     assert said.count("has finished cleanly") == 2
 
 
+LOGGING = """
+import launch
+
+
+def function(context):
+    launch.logging.get_logger("mine").warning("said by a function")
+    LogInfo(msg="logged by a function").execute(context)
+
+
+def generate_launch_description():
+    launch.logging.get_logger().error("said by the description")
+    return LaunchDescription([OpaqueFunction(function=function), LogInfo(msg="logged by an action"), echo("x")])
+"""
+
+
+@pytest.mark.parametrize("with_security", [False, True], ids=["plain", "secured"])
+def test_what_is_logged_is_in_the_log_of_the_launch_once(workspace: Path, with_security: bool) -> None:
+    said, told = launch(workspace, LOGGING, *(secured(workspace) if with_security else ()))
+    for words in (
+        "said by a function",
+        "logged by a function",
+        "said by the description",
+        "logged by an action",
+    ):
+        assert said.count(words) == 1, said
+        assert words not in told
+
+
 def test_scopes_and_global_rules_of_functions_hold_at_the_start_too(workspace: Path) -> None:
     text = """
 def inside(context):
