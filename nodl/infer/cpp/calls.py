@@ -334,6 +334,12 @@ def _method_call(run: Machine, node: Node, callee: Node, given: list[Node], fram
         for value in values:
             for atom in value:
                 run.later(atom, frame)
+        if receiver_node is not None and _could_make(run, receiver_node, name, frame):
+            run.unset[(frame.file.file, node.start_byte)] = (
+                run.place(node, frame),
+                text(receiver_node)[:40],
+                name,
+            )
         return BOTTOM
     found: list[Value] = []
     before = run.store.mark()
@@ -346,6 +352,17 @@ def _method_call(run: Machine, node: Node, callee: Node, given: list[Node], fram
     if alternatives:
         run.store.merge(alternatives)
     return join(*found)
+
+
+def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
+    """Whether the method, of an object that was not seen to be made, would make interfaces."""
+    written = declared_type(run, receiver, frame)
+    cls = run.names.class_of(written[0], frame.scope, frame.file) if written is not None else None
+    if cls is not None:
+        return any(map(run.makes_interfaces, run.names.find_methods(cls, name)))
+    if written is not None and written[0].name not in ("", "auto"):
+        return False
+    return any(run.makes_interfaces(f) for table in run.names.methods.values() for f in table.get(name, ()))
 
 
 def _is_pointer(run: Machine, receiver_node: Node | None, frame: Frame, receiver: Value) -> bool:

@@ -142,6 +142,9 @@ class Machine:
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
         self.plugins_used: dict[str, None] = {}
+        self.unset: dict[
+            tuple[str, int], tuple[SourceRef, str, str]
+        ] = {}  # calls on pointers that hold nothing
         self._used: tuple[int, set[str]] = (-1, set())
         self._leading: dict[tuple[object, int], bool] = {}
 

@@ -326,6 +326,11 @@ def _findings(run: Machine, sources: Sources) -> Findings:
     findings = Findings()
     findings.nodes = [record for record in run.nodes if record.created]
     findings.gaps = dict(run.gaps)
+    for (file, start), (source, what, name) in run.unset.items():
+        if start not in run.handled.get(file, ()):
+            findings.gaps.setdefault(
+                (source, f"{what} was never seen to be set: what {name}() makes is not known")
+            )
     own = list(run.names.files.values())
     findings.answers = account(run, own)
     for index in own:

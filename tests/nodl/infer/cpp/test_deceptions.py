@@ -84,6 +84,12 @@ HIDDEN = {
     "through std::any": in_class(
         "std::any x = std::function<void()>([this]() { " + PUB + " }); std::any_cast<std::function<void()>>(x)();"
     ),
+    "by a second object that is made where nobody looks": in_class(
+        'a_ = std::make_shared<H>("b"); std::tie(c_, std::ignore) = acme::pair(); a_->init(this); c_->init(this);',
+        "std::shared_ptr<H> a_, c_;",
+        before="struct H { explicit H(std::string t) : t_(t) {} void init(rclcpp::Node * n) { "
+        "n->create_publisher<std_msgs::msg::String>(t_, 1); } std::string t_; };\n",
+    ),
     "in the second overload": in_class("go(1); go(std::string{});", f"void go(int) {{}} void go(const std::string &) {{ {PUB} }}"),
     "behind an unknown macro": in_class(f"ACME_TRY({PUB[:-1]});"),
     "in an anonymous namespace": in_class("go(*this);", before=f"namespace {{ void go(rclcpp::Node & n) {{ n.{PUB} }} }}\n"),
