@@ -73,7 +73,7 @@ def plain_store(run: Run, owner: HeapObject, name: str, value: Value, certain: b
 
 def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) -> None:
     """Setting an attribute of a library's module or class changes what its other users get."""
-    if "(" not in owner.path and "[" not in owner.path:
+    if "(" not in owner.path and "[" not in owner.path and ".qos" not in owner.path:
         run.gap(node, frame, f"{owner.path}.{name} is replaced; what its users then do is not analysed")
 
 

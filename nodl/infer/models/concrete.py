@@ -94,6 +94,9 @@ class Callback:
     def __init__(self, run: Run, value: Value, call: Call) -> None:
         self.run, self.value, self.call = run, value, call
 
+    __str__ = __repr__ = __format__ = __eq__ = __lt__ = __bool__ = __len__ = __iter__ = _refuse
+    __hash__ = _refuse
+
     def __call__(self, *given: object) -> Any:
         arguments = [
             from_python(self.run, each, self.call, f"given {index}") for index, each in enumerate(given)
@@ -121,22 +124,35 @@ def to_python(run: Run, value: Value, call: Call, deep: bool = False, level: int
     if isinstance(atom, NativeObject):
         if not is_usable(run, atom):
             return Opaque(value)
-        return _bounded(atom.object) if isinstance(atom.object, _ITERATORS) else atom.object
+        return _Bounded(atom.object) if isinstance(atom.object, _ITERATORS) else atom.object
     if isinstance(atom, Sequence) and (deep or level == 0 or atom.kind == "tuple"):
         return _real_sequence(run, atom, value, call, deep, level)
     if isinstance(atom, Dictionary) and (deep or level == 0):
         return _real_dictionary(run, atom, value, call, deep, level)
-    if isinstance(atom, _CALLABLE):
+    if isinstance(atom, _CALLABLE) and not (isinstance(atom, External) and "(" in atom.path):
         return Callback(run, value, call)
     return Opaque(value)
 
 
-def _bounded(iterator: Any) -> Iterator[Any]:
-    """The iterator for someone who may ask it for everything."""
-    for index, each in enumerate(iterator):
-        if index > MAX_ELEMENTS:
+class _Bounded:
+    """An iterator for someone who may ask it for everything, and for nothing else."""
+
+    __slots__ = ("_left", "_source")
+
+    def __init__(self, source: Any) -> None:
+        self._source = source
+        self._left = MAX_ELEMENTS
+
+    def __iter__(self) -> Iterator[Any]:
+        return self
+
+    def __next__(self) -> Any:
+        self._left -= 1
+        if self._left < 0:
             raise NotConcrete
-        yield each
+        return next(self._source)
+
+    __str__ = __repr__ = __format__ = _refuse
 
 
 def _real_sequence(run: Run, atom: Sequence, value: Value, call: Call, deep: bool, level: int) -> Any:
@@ -164,6 +180,8 @@ def from_python(run: Run, found: Any, call: Call, place: str = "") -> Value:
     run.spend(1)
     if isinstance(found, Opaque | Callback):
         return found.value
+    if isinstance(found, _Bounded):
+        return (NativeObject(found._source, run.state.forks),)
     if isinstance(found, CONSTANTS):
         return _constant(found)
     if isinstance(found, dict):

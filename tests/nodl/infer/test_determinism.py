@@ -133,3 +133,43 @@ def test_no_text_or_number_grows_without_end(body: str, names: Callable[..., lis
     text = f"import rclpy\n{body}\nnode = rclpy.create_node('n')\nnode.create_publisher(object, str(x), 1)\n"
     (name,) = names(text)
     assert len(name) < 20_000
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "str(uuid.uuid4())",
+        "str(f)",
+        "f'{f}'",
+        "'%s' % f",
+        "str([f])",
+        "repr(itertools.count())",
+        "str(iter([1]))",
+        "str(g())",
+        "str(object())",
+    ],
+)
+def test_no_address_of_an_object_becomes_a_name(text: str, names: Callable[..., list[str]]) -> None:
+    before = "import itertools, uuid, rclpy\ndef f(): pass\ndef g(): yield 1\n"
+    program = f"{before}node = rclpy.create_node('n')\nnode.create_publisher(object, 'a/' + {text}, 1)\n"
+    (name,) = names(program)
+    assert "?" in name
+    assert "0x" not in name
+
+
+@pytest.mark.parametrize(
+    "statement",
+    [
+        "list(itertools.count())",
+        "sorted(itertools.repeat('x'))",
+        "sum(itertools.count())",
+        "dict(zip(g(), g()))",
+        "[each for each in g()]",
+        "re.match('(a+)+$', 'a' * 40 + 'b')",
+    ],
+)
+def test_what_never_ends_is_given_up(statement: str, names: Callable[..., list[str]]) -> None:
+    before = (
+        "import itertools, re, rclpy\ndef g():\n    while True: yield 'x'\nnode = rclpy.create_node('n')\n"
+    )
+    assert names(f"{before}node.create_publisher(object, 'a', 1)\n{statement}\n") == ["a"]
