@@ -78,6 +78,34 @@ def test_permissions_hold_in_their_domains_only(dds: Probe, domain_id: int, tmp_
     }
 
 
+def test_launches_that_share_an_enclave_each_keep_their_rights(
+    dds: Probe, domain_id: int, tmp_path: Path
+) -> None:
+    """Bring-up runs, navigation comes and goes, bring-up asks for less: what each may do, as DDS sees it."""
+    root = tmp_path / "ks"
+    holds = {name: keystore.LaunchHold(root, f"/ws/{name}.launch.xml") for name in ("bringup", "navigation")}
+
+    def start(name: str, *topics: str) -> None:
+        options = keystore.ProvisionOptions(
+            domains=Domains.single(domain_id), durable=False, launch=holds[name]
+        )
+        keystore.provision(root, our_keystore.policies({"/a": Grant(publish=topics)}), options=options)
+
+    def may() -> set[str]:
+        topics = ("rt/odom", "rt/plan", "rt/secret", "rt/neither")
+        answers = dds.try_endpoints(domain_id, [Participant("a", directory(root, "/a"), publish=topics)])
+        return {topic for topic in topics if answers.may("a", "publish", topic)}
+
+    start("bringup", "/odom", "/secret")
+    start("navigation", "/plan")
+    assert may() == {"rt/odom", "rt/plan", "rt/secret"}
+    for hold in holds.values():
+        hold.close()
+        hold.enclaves.clear()
+    start("bringup", "/odom")
+    assert may() == {"rt/odom", "rt/plan"}
+
+
 STRICTEST = DomainRule(
     discovery_protection_kind=Protection.ENCRYPT_WITH_ORIGIN_AUTHENTICATION,
     liveliness_protection_kind=Protection.ENCRYPT_WITH_ORIGIN_AUTHENTICATION,
