@@ -29,7 +29,7 @@ from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec
 from enclave_launch.runtime.run_events import ProcessExited, ProcessStarted, RunEvent
 from nodl.record.assembly import Record
-from nodl.record.lines import Line, LineReader, LoadedComponent, Run, StartedProcess, line_text
+from nodl.record.lines import Complaint, Line, LineReader, LoadedComponent, Run, StartedProcess, line_text
 
 INTERVAL = 0.1
 """Seconds between two looks at the record."""
@@ -83,6 +83,7 @@ class Recording:
         self._processes: dict[str, ResolvedProcess] = {}
         self._marked: dict[str, Marked] = {}
         self._reader = LineReader()
+        self._lost: list[str] = []
         self._untold: list[tuple[float, Line]] = []
         self._folder: Path | None = None
         self._task: asyncio.Task[None] | None = None
@@ -96,10 +97,10 @@ class Recording:
             listener.opened(launch, self)
         try:
             self._make_folder()
-        except RuntimeFailure as error:
+        except (RuntimeFailure, OSError) as error:
             self._remove_folder()
             if not self._optional:
-                raise
+                raise RuntimeFailure(f"nothing can be recorded: {error}") from error
             self.say_warning(f"a refusal of DDS will not be explained: {error}")
             return
         self._write(self.run)
@@ -153,10 +154,10 @@ class Recording:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
         try:
-            self._look()
+            self._look_once_more()
             self._tell(float("inf"))
             self._reader.close()
-            self.record.complaints = list(self._reader.complaints)
+            self.record.complaints = [*self._reader.complaints, *(Complaint(0, why) for why in self._lost)]
             self._name_the_silent()
             for listener in self._listeners:
                 listener.closed()
@@ -199,9 +200,16 @@ class Recording:
             )
 
     def _write(self, line: Run | StartedProcess | LoadedComponent) -> None:
-        if self._folder is not None:
-            with self._file.open("ab") as file:
+        """What cannot be written must not disturb the launch; it is told once."""
+        if self._folder is None:
+            return
+        try:
+            with open(
+                self._file, "ab", opener=lambda path, flags: os.open(path, flags & ~os.O_CREAT)
+            ) as file:
                 file.write(line_text(line))
+        except OSError as error:
+            self._lose(f"the record of this launch cannot be written any more: {error}")
 
     async def _watch(self) -> None:
         try:
@@ -211,7 +219,7 @@ class Recording:
                 for listener in self._listeners:
                     listener.looked()
         except OSError as error:
-            self.say_warning(f"the record of this launch cannot be read any more: {error}")
+            self._lose(f"the record of this launch cannot be read any more: {error}")
 
     def _look(self) -> None:
         with self._file.open("rb") as file:
@@ -241,6 +249,17 @@ class Recording:
             return True
         process = self.record.process_of(line.pid)
         return process is not None and process.started is not None
+
+    def _look_once_more(self) -> None:
+        try:
+            self._look()
+        except OSError as error:
+            self._lose(f"the end of the record of this launch cannot be read: {error}")
+
+    def _lose(self, why: str) -> None:
+        if why not in self._lost:
+            self._lost.append(why)
+            self.say_warning(why)
 
     def _not_recorded(self, process: str, why: str) -> None:
         if Unrecorded(process, why) not in self.unrecorded:

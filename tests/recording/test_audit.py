@@ -83,6 +83,17 @@ def test_a_process_that_cannot_be_recorded_fails_the_audit(stand_in: Path, tmp_p
     assert "env-1 is not recorded" in output
 
 
+def test_a_record_that_is_removed_while_it_grows_ends_no_launch(stand_in: Path, tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path, stand_in, [FIT])
+    file = workspace.folder / "share/stand_in_nodes/launch/all.launch.xml"
+    removes = '<executable cmd="rm $ENCLAVE_LAUNCH_RECORD" shell="true"/>'
+    file.write_text(file.read_text().replace("</launch>", f"{removes}</launch>"))
+    status, output, report = audit(workspace)
+    assert status == 1 and "process has finished cleanly" in output
+    assert "cannot be read" in output
+    assert any("cannot be read" in why for why in report["incomplete"])
+
+
 def test_a_library_of_the_launch_file_stays_beside_the_recorder(stand_in: Path, tmp_path: Path) -> None:
     library = stand_in / "librcutils.so"
     preloads = FIT._replace(inside=f'<env name="LD_PRELOAD" value="{library}"/>')
