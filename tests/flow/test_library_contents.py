@@ -218,3 +218,16 @@ def test_slam_toolbox_is_a_lifecycle_node_since_jazzy_only(launch: Launch) -> No
     (new,) = (e for e in launch(node, "jazzy").derived.policy.enclaves)
     assert "/slam_toolbox/change_state" not in allowed_names(old)["serve_services"]
     assert "/slam_toolbox/change_state" in allowed_names(new)["serve_services"]
+
+
+def test_the_service_of_a_calibration_is_private_since_iron(launch: Launch) -> None:
+    node = '<node pkg="usb_cam" exec="usb_cam_node_exe" name="front" namespace="cameras"/>'
+    assert allowed(launch(node), "serve_services") == [
+        "/cameras/front/set_camera_info",
+        "/cameras/set_capture",
+    ]
+    assert "/cameras/front/get_parameters" in allowed(launch(node), "call_services")
+    assert allowed(launch(node, distro="humble"), "serve_services") == [
+        "/cameras/set_camera_info",
+        "/cameras/set_capture",
+    ]
