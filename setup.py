@@ -18,7 +18,7 @@ VERSION = "0.1.0"
 REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "pydantic>=1.8"]
 PACKAGE_DATA = {
     "enclave_launch": ["py.typed", "__init__.pyi", "recording/recorder.c"],
-    "nodl": ["py.typed", "schemas/*", "library/documents/*", "library/documents/*/*"],
+    "nodl": ["py.typed", "schemas/*", "library/documents/*", "library/documents/*/*", "document/common/*/*"],
     "keystore": ["py.typed", "schemas/*"],
 }
 ENTRY_POINTS = {

@@ -1,7 +1,7 @@
 """The ``include`` of NoDL v2: which files a document draws in, each once, none from where it should not.
 
-``nodl://<package>/<name>`` is a resource of the ament index; ``local://<path>`` a file relative to the
-including one, inside the same package. Files are compared by their resolved path, so that neither
+``nodl://<package>/<name>`` is a resource of the ament index, else one of those in ``common``; ``local://<path>`` a file
+relative to the including one, inside the same package. Files are compared by their resolved path, so that neither
 ``x/../x`` nor a link hides a cycle. Reads files.
 """
 
@@ -22,6 +22,8 @@ from nodl.names import shown
 from nodl.source_ref import SourceRef
 
 MAX_DEPTH = 32
+COMMON = Path(__file__).parent / "common"
+"""Documents that packages of ROS bring, for machines without them: the installed ones come first."""
 _PACKAGE_OR_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.:-]*\Z")
 
 
@@ -84,6 +86,9 @@ class _Walk:
             raise IncludeError.at(source, f"{shown('nodl://' + body)} is not nodl://<package>/<name>")
         key = resource_key(package, name)
         prefix = find_resource(RESOURCE_TYPE, key, self._prefixes)
+        shipped = COMMON / package / f"{name}.nodl.yaml"
+        if prefix is None and shipped.is_file():
+            return shipped.resolve()
         if prefix is None:
             raise IncludeError.at(
                 source,

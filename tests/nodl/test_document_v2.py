@@ -251,6 +251,18 @@ def test_includes_from_the_index_and_local_ones(tmp_path: Path) -> None:
     assert read(main, tmp_path) == ["main", "imu", "time", "more"]
 
 
+def test_common_documents_resolve_without_ros(tmp_path: Path) -> None:
+    main = write(tmp_path, "main.nodl.yaml", "nodl://rclcpp_lifecycle/lifecycle_node", client="main")
+    assert {"main", "~/change_state", "~/transition_event"} <= set(read(main, tmp_path))
+    assert len(read(main, tmp_path)) == 7
+
+
+def test_an_installed_document_comes_before_the_common_one(tmp_path: Path) -> None:
+    register(tmp_path, "rclcpp_lifecycle", "lifecycle_node", client="installed")
+    main = write(tmp_path, "main.nodl.yaml", "nodl://rclcpp_lifecycle/lifecycle_node", client="main")
+    assert read(main, tmp_path) == ["main", "installed"]
+
+
 def test_every_endpoint_keeps_the_place_where_it_is_written(tmp_path: Path) -> None:
     write(tmp_path, "more.yaml", client="more")
     (node,) = read_document(write(tmp_path, "main.nodl.yaml", "local://more.yaml"))
