@@ -55,6 +55,7 @@ if TYPE_CHECKING:
     from keystore.steps.sharing import LaunchShares as LaunchShares
     from keystore.steps.sharing import list_shares as list_shares
     from keystore.verification import Finding as Finding
+    from keystore.verification import Requirements as Requirements
     from keystore.verification import Severity as Severity
     from keystore.verification import VerifyReport as VerifyReport
     from keystore.verification import verify as verify
@@ -97,6 +98,7 @@ _HOMES = {
     "SubjectScheme": "formats.subject",
     "Finding": "verification",
     "Severity": "verification",
+    "Requirements": "verification",
     "VerifyReport": "verification",
     "verify": "verification",
 }

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 
+from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.secure_plan import check, diff, flow, show, suggest
@@ -47,6 +48,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         except EnclaveLaunchError as error:
             print(f"secure-plan: error: {error}", file=sys.stderr)
             return error.exit_status
+        except ImportError as error:
+            text = missing_dependency(error)
+            if text is None:
+                raise
+            print(f"secure-plan: error: {text}", file=sys.stderr)
+            return 1
         except KeyboardInterrupt:
             return 130
         except BrokenPipeError:
