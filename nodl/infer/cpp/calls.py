@@ -622,7 +622,8 @@ def invoke(
     )  # fmt: skip
     if this_object is not None:
         inner.bindings = {**_class_bindings(run, function, this_object), **(bindings or {})}
-    inner.bindings = {**inner.bindings, **_deduced(run, function, values, types)}
+    deduced = {**_element_types(run, function, node, frame), **_deduced(run, function, values, types)}
+    inner.bindings = {**inner.bindings, **deduced}
     inner.mark = run.store.mark()
     run.active.append(function)
     bind_parameters(run, function, values, inner)
@@ -662,6 +663,23 @@ def _class_bindings(run: Machine, function: Function, this_object: Obj) -> dict[
         ):
             return bound
     return {}
+
+
+def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -> dict[str, Type]:
+    """``T`` of a parameter ``std::list<T> &``, from the container that is given."""
+    bound: dict[str, Type] = {}
+    given = children(node.child_by_field_name("arguments")) if function.templates else []
+    for parameter, argument in zip(function.parameters, given, strict=False):
+        match = re.search(r"<\s*(\w+)\s*>", parameter.type)
+        target = unwrapped(argument)
+        if target is not None and target.type == "pointer_expression":
+            target = target.child_by_field_name("argument")
+        if match is None or match[1] not in function.templates or target is None:
+            continue
+        written = declared_type(run, target, frame)
+        if written is not None and written[0].arguments:
+            bound[match[1]] = written[0].arguments[0]
+    return bound
 
 
 def _deduced(
@@ -746,6 +764,8 @@ def unknown_call(
             f"{name}() may make an interface; whose is not known",
             receiver.node if receiver else None,
         )
+    if receiver is not None and last.startswith("emplace"):  # the element that it makes may be anything
+        handed_over(run, f"an element that {last}() makes", values, node, frame)
     if harmless:
         for value in values:
             for atom in value:

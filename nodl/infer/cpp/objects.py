@@ -201,6 +201,9 @@ def construct(
 ) -> Value:
     """An object of ``kind``: by its source, by the table of libraries, or one of which nothing is known."""
     cls = run.names.class_of(kind, frame.scope, frame.file)
+    if cls is None and kind.name in _SEQUENCES | _MAPS and not arguments:
+        run.handle(node, frame)
+        return (Seq(()),) if kind.name in _SEQUENCES else (Map(()),)
     key = ("object", frame.file.file, node.start_byte, node.end_byte, frame.path, kind)
     made_object = run.obj(key, kind, cls=cls, heap=heap)
     run.handle(node, frame)

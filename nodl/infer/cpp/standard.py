@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.expressions import assign, element, with_entry
 from nodl.infer.cpp.machine import Frame, Machine
 from nodl.infer.cpp.names import Type
-from nodl.infer.cpp.objects import construct, copied, declared_value, items_of
+from nodl.infer.cpp.objects import construct, copied, declared_value, handed_over, items_of
 from nodl.infer.cpp.syntax import children, text, unwrapped
 from nodl.infer.cpp.values import (
     BOTTOM,
@@ -260,6 +260,8 @@ def _added(
         if name == "insert" and len(listed) == 3:
             return _inserted(run, atom, listed, given, receiver, frame)
         value = listed[-1] if listed else BOTTOM
+        if name.startswith("emplace") and (inner is None or not inner.pointer):
+            handed_over(run, f"an element that {name}() makes", listed, node, frame)
     run.handle(node, frame)
     if receiver is not None and isinstance(atom, Seq):
         assign(run, receiver, (Seq((*atom.items, value), atom.open),), frame)

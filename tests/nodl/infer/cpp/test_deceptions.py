@@ -90,6 +90,19 @@ HIDDEN = {
         before="struct H { explicit H(std::string t) : t_(t) {} void init(rclcpp::Node * n) { "
         "n->create_publisher<std_msgs::msg::String>(t_, 1); } std::string t_; };\n",
     ),
+    "by an element that a container makes": in_class(
+        "fill(all_);",
+        "template <typename T> void fill(std::list<T> & l) { l.emplace_back(\"a\", this); } std::list<H> all_;",
+        before="struct H { H(std::string t, rclcpp::Node * n) { n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
+    ),
+    "by an element of a list that is shared": in_class(
+        "l_ = std::make_shared<std::list<H>>(); fill(*l_);",
+        "template <typename T> void fill(std::list<T> & l) { l.emplace_back(\"a\", this); } std::shared_ptr<std::list<H>> l_;",
+        before="struct H { H(std::string t, rclcpp::Node * n) { n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
+    ),
+    "by an element of a type that is not known": in_class(
+        "l_.emplace_back(this);", "std::vector<acme::Thing> l_;",
+    ),
     "in the second overload": in_class("go(1); go(std::string{});", f"void go(int) {{}} void go(const std::string &) {{ {PUB} }}"),
     "behind an unknown macro": in_class(f"ACME_TRY({PUB[:-1]});"),
     "in an anonymous namespace": in_class("go(*this);", before=f"namespace {{ void go(rclcpp::Node & n) {{ n.{PUB} }} }}\n"),
