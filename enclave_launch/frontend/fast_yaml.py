@@ -120,7 +120,9 @@ class _Fast:
 class _Load(_Fast):
     """``yaml.load``."""
 
-    def __call__(self, stream: Any, Loader: Any) -> Any:
+    def __call__(self, stream: Any, Loader: Any = None) -> Any:
+        if Loader is None:  # PyYAML 5 warns and goes on, PyYAML 6 refuses
+            return self._original(stream)
         fast = self._fast(Loader, _LOADERS)
         if fast is None:
             return self._original(stream, Loader)
@@ -154,7 +156,6 @@ def _text_of(stream: Any) -> str | None:
 @lru_cache(maxsize=256)
 def _read(text: str, loader: Any) -> bytes | None:
     """The values of ``text``, pickled, so that each reader gets its own; ``None`` where PyYAML must read it."""
-
     import pickle
 
     from enclave_launch.boundary.yaml_nodes import refuse_deep_nesting

@@ -104,6 +104,12 @@ def test_nesting_that_ends_the_stack_of_libyaml_is_pyyamls_error() -> None:
         yaml.safe_load(deep)
 
 
+def test_without_a_loader_it_is_as_in_pyyaml() -> None:
+    plainly = outcome(lambda: yaml.load("a: 1"))  # type: ignore[call-arg]
+    with accelerated(yaml):
+        assert outcome(lambda: yaml.load("a: 1"))[0] == plainly[0]  # type: ignore[call-arg]
+
+
 def test_each_reader_has_values_of_its_own() -> None:
     with accelerated(yaml):
         first, second = yaml.safe_load("a: [1]\n"), yaml.safe_load("a: [1]\n")
