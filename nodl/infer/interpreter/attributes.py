@@ -171,12 +171,36 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
 def _enum_member(run: Run, cls: ClassValue, name: str, value: Value, node: ast.AST) -> Value:
     if isinstance(value[0], FunctionValue | ClassMethod | PropertyValue) or name.startswith("_"):
         return value
+    if isinstance(value[0], Unknown) and "enum.auto" in value[0].why:
+        value = _automatic(cls, name)
     key = ("enum", id(cls), name)
     member = run.enum_members.get(key)
     if member is None:
         member = run.enum_members[key] = Instance(cls, (cls.module.source.path, cls.node.lineno))
         member.cells.update({"value": value, "_value_": value, "name": (name,)})
     return (member,)
+
+
+def _automatic(cls: ClassValue, name: str) -> Value:
+    """``enum.auto()``: one more than the number before, from 1; the name in small letters in a ``StrEnum``."""
+    if any(isinstance(base, External) and base.path == "enum.StrEnum" for base in linearized(cls)):
+        return (name.lower(),)
+    if any(isinstance(base, External) and "Flag" in base.path for base in linearized(cls)):
+        return unknown("a flag")
+    number = 0
+    for statement in cls.node.body:
+        if not isinstance(statement, ast.Assign) or not isinstance(statement.targets[0], ast.Name):
+            continue
+        held = cls.cells.get(statement.targets[0].id, ANY)
+        if len(held) == 1 and type(held[0]) is int:
+            number = held[0]
+        elif isinstance(held[0], Unknown) and "enum.auto" in held[0].why:
+            number += 1
+        else:
+            return unknown("a number of an enumeration")
+        if statement.targets[0].id == name:
+            return (number,)
+    return unknown("a number of an enumeration")
 
 
 def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: Frame) -> Value:

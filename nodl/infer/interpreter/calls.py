@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from nodl.infer.interpreter import generators
 from nodl.infer.interpreter.define import foreign_bases, linearized
-from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.iterate import elements, enum_members
 from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Caller, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.values import (
@@ -331,10 +331,32 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     for base in linearized(cls):
         if isinstance(base, ClassValue):
             run.instantiated.setdefault(base.node)
+    found = _member_by_value(run, cls, call)
+    if found:
+        return found
     made = _made_by_new(run, cls, call)
     if made is not None:
         return made
     return (initialise(run, cls, new_instance(run, cls, call), call),)
+
+
+def _member_by_value(run: Run, cls: ClassValue, call: Call) -> Value:
+    """``Side('l')`` of an enumeration: the member with this value; nothing where that is not known."""
+    if not any(isinstance(base, External) and base.path.startswith("enum.") for base in linearized(cls)):
+        return BOTTOM
+    wanted = call.args.at(0)
+    members = enum_members(run, cls, call.node, call.frame).exact
+    if wanted is None or len(wanted) != 1 or members is None or len(call.args.positional) != 1:
+        return BOTTOM
+    for member in members:
+        atom = member[0]
+        if (
+            isinstance(atom, Instance)
+            and atom.cells.get("_value_") == wanted
+            and isinstance(wanted[0], str | int)
+        ):
+            return member
+    return BOTTOM
 
 
 def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:

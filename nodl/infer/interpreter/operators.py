@@ -259,7 +259,10 @@ def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
 def _formatted(run: Run, part: ast.FormattedValue, frame: Frame) -> list[TextAtom]:
     value = run.evaluate(part.value, frame)
     spec: Value = ("",) if part.format_spec is None else run.evaluate(part.format_spec, frame)
-    value = special.spoken(run, value, part, frame, spec if part.conversion == -1 else None)
+    said = special.spoken(run, value, part, frame, spec if part.conversion == -1 else None)
+    if said is not value and part.conversion == -1:
+        return as_texts(said)
+    value = said
     if part.conversion not in (-1, 115):  # !r and !a quote their argument
         return [make_text((Hole("text made with !r"),))]
     if part.format_spec is None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable
 
+from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import as_texts, text_value
 from nodl.infer.interpreter.run import Arguments, Call, Run
@@ -16,11 +17,13 @@ from nodl.infer.values import (
     BOTTOM,
     COMMAND_LINE,
     NONE,
+    ClassValue,
     Dictionary,
     External,
     Getter,
     Instance,
     Items,
+    Key,
     Partial,
     PartialMethod,
     Sequence,
@@ -269,6 +272,42 @@ def _product(run: Run, call: Call) -> Value:
     return run.sequence(call.node, "list", Items(pairs))
 
 
+def _field_names(atom: object) -> list[str] | None:
+    """The fields of an object of a dataclass of the program."""
+    for base in (
+        linearized(atom.cls) if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue) else ()
+    ):
+        if isinstance(base, ClassValue) and base.fields is not None:
+            return [name for name, _ in base.fields]
+    return None
+
+
+def _replaced(run: Run, call: Call) -> Value:
+    """``dataclasses.replace``: the constructor again, with the fields of the object and the given ones."""
+    atom = sole(call.args.at(0))
+    names = _field_names(atom)
+    if names is None or not isinstance(atom, Instance):
+        run.escape(call.args)
+        return ANY
+    held = {name: run.attribute((atom,), name, call.node, call.frame) for name in names}
+    return run.call((atom.cls,), Arguments([], {**held, **call.args.keywords}), call.node, call.frame)
+
+
+def _as_dictionary(run: Run, call: Call) -> Value:
+    """``dataclasses.asdict`` of an object whose fields hold no further dataclasses."""
+    atom = sole(call.args.at(0))
+    names = _field_names(atom)
+    if names is None or not isinstance(atom, Instance):
+        run.escape(call.args)
+        return ANY
+    found = run.allocate(call.node, "asdict", Dictionary)
+    for name in names:
+        value = run.attribute((atom,), name, call.node, call.frame)
+        nested = any(isinstance(each, Instance | Sequence | Dictionary) for each in value)
+        run.state.store(found, Key(name), unknown("a field as a dictionary") if nested else value)
+    return (found,)
+
+
 def _register(run: Run, call: Call) -> Value:
     run.escape(call.args, opened=False)
     return ANY
@@ -297,6 +336,8 @@ FUNCTIONS: dict[str, Model] = {
     "threading.Thread": _thread,
     "threading.Timer": _timer,
     "multiprocessing.Process": _thread,
+    "dataclasses.replace": _replaced,
+    "dataclasses.asdict": _as_dictionary,
     "collections.defaultdict": _default_dict,
     "collections.OrderedDict": builtin.FUNCTIONS["builtins.dict"],
     "collections.deque": builtin.FUNCTIONS["builtins.list"],
