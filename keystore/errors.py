@@ -1,7 +1,7 @@
 """All errors a user of the keystore can meet, cut by who must act.
 
     KeystoreError
-    ├── InvalidEnclaveNameError      the author of a launch file, policy or command: a name that is no enclave name
+    ├── InvalidEnclaveNameError      the author of a launch file, policy or command: a name that no enclave can have
     ├── InvalidInputError            the author of a YAML, policy, certificate or option value
     ├── NotAKeystoreError            the caller: the path is something else
     ├── UnsafeKeystoreError          the owner of the files: links, owners or modes that let others in

@@ -31,7 +31,7 @@ def resolve_root(keystore: Path | str) -> Path:
     try:
         return Path(os.path.realpath(keystore))
     except ValueError:
-        raise NotAKeystoreError(f"{printable(keystore)} is no path") from None
+        raise NotAKeystoreError(f"{printable(keystore)} is not a path") from None
 
 
 def read(root: Path, relative: str) -> bytes:

@@ -95,7 +95,7 @@ def read_pem(pem: bytes) -> CertificateFacts:
 
 
 def read_der(data: bytes) -> CertificateFacts:
-    """Raises DerError when ``data`` is no X.509 v3 certificate."""
+    """Raises DerError when ``data`` is not an X.509 v3 certificate."""
     try:
         return _read(data)
     except (IndexError, ValueError) as error:
@@ -107,7 +107,7 @@ def read_certificate(pem: bytes, place: str) -> CertificateFacts:
     try:
         return read_pem(pem)
     except der.DerError as error:
-        raise DamagedKeystoreError(f"{place} is no usable certificate: {error}") from None
+        raise DamagedKeystoreError(f"{place} is not a usable certificate: {error}") from None
 
 
 def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
@@ -115,7 +115,7 @@ def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
     try:
         return [read_der(block) for block in pem_blocks(pem)]
     except der.DerError as error:
-        raise DamagedKeystoreError(f"{place} is no usable certificate: {error}") from None
+        raise DamagedKeystoreError(f"{place} is not a usable certificate: {error}") from None
 
 
 def _read(data: bytes) -> CertificateFacts:

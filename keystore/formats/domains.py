@@ -23,7 +23,7 @@ class _Ranges(NamedTuple):
 class Domains(_Ranges):
     """``ranges``: pairs (first, last), both included, sorted, neither touching nor overlapping.
 
-    Raises InvalidInputError for what are no domain ids.
+    Raises InvalidInputError for what are not domain ids.
     """
 
     __slots__ = ()
@@ -35,7 +35,7 @@ class Domains(_Ranges):
         for first, last in given:
             if not LOWEST_ID <= first <= last <= HIGHEST_ID:
                 raise InvalidInputError(
-                    f"domain ids {_text(first, last)} are no range within {LOWEST_ID}..{HIGHEST_ID}"
+                    f"domain ids {_text(first, last)} are not a range within {LOWEST_ID}..{HIGHEST_ID}"
                 )
         return super().__new__(cls, tuple(_merged(given)))
 
@@ -56,7 +56,7 @@ class Domains(_Ranges):
         for part in text.split(","):
             match = re.fullmatch(r"([0-9]{1,3})(?:-([0-9]{1,3}))?", part.strip())
             if match is None:
-                raise InvalidInputError(f"{printable(text)} are no domain ids; write 0, 0-10 or 0,5,7-9")
+                raise InvalidInputError(f"{printable(text)} are not domain ids; write 0, 0-10 or 0,5,7-9")
             ranges.append((int(match[1]), int(match[2] or match[1])))
         return cls(tuple(ranges))
 

@@ -261,7 +261,7 @@ def check_can_serve(certificate_der: bytes, role: Role, now: datetime, place: st
         cert = x509.load_der_x509_certificate(certificate_der)
         extensions = cert.extensions
     except (ValueError, x509.UnsupportedGeneralNameType, x509.DuplicateExtension):
-        raise InvalidInputError(f"{place} is no usable certificate") from None
+        raise InvalidInputError(f"{place} is not a usable certificate") from None
     facts = read_certificate(pem_certificate(certificate_der), place)
     if not facts.validity.covers(now):
         raise InvalidInputError(f"{place} is not valid now")

@@ -27,7 +27,7 @@ def _load(spki: bytes) -> PublicKeyTypes:
 
 
 def _loaded(spki: bytes) -> PublicKeyTypes | None:
-    """None for what is no public key, or one of a kind that nobody knows."""
+    """None for what is not a public key, or one of a kind that nobody knows."""
     from cryptography.exceptions import UnsupportedAlgorithm
 
     try:

@@ -153,7 +153,7 @@ def _complete_ca(
         if role in options.imported:
             _refuse_other_ca(opened, role, options.imported[role])
         _record_present_ca(opened, view, role)
-        return  # a missing key is no fault: the CA may be kept elsewhere
+        return  # a key may be missing: the CA may be kept elsewhere
     _refuse_foreign_enclaves(view, role)
     if role in options.imported:
         made, key_name, key_bytes = _import_ca(role, options, warnings)
