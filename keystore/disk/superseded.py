@@ -41,7 +41,7 @@ def superseded(view: KeystoreView) -> tuple[Superseded, ...]:
         return tuple(_entry(entry) for entry in content["certificates"])
     except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise DamagedKeystoreError(
-            f"{printable(view.root / layout.SUPERSEDED)} is not a list of replaced certificates; restore it from a backup"
+            f"{printable(view.root / layout.SUPERSEDED)} is not a list of replaced certificates; restore it"
         ) from None
 
 
