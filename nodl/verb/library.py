@@ -52,7 +52,7 @@ def _list(arguments: argparse.Namespace) -> int:
     wanted = arguments.packages
     found = [each for each in Library(arguments.library).documents() if not wanted or each.package in wanted]
     for document in found:
-        print(printable("\t".join(_row(document))))
+        print("\t".join(map(printable, _row(document))))
     if not found:
         print("the library has no document of that", file=sys.stderr)
     return 0 if found else 1

@@ -108,7 +108,7 @@ def test_the_verbs_find_show_and_miss(capsys: pytest.CaptureFixture[str]) -> Non
     shown = capsys.readouterr().out
     assert "amcl_pose" in shown and "source read: github.com/ros-navigation/navigation2" in shown
     assert main(["library", "list", "nav2_amcl"]) == 0
-    assert "nav2_amcl::AmclNode" in capsys.readouterr().out
+    assert capsys.readouterr().out.startswith("nav2_amcl\tamcl nav2_amcl::AmclNode\t")
     assert main(["library", "show", "nav2_amcl", "unheard_of"]) == 1
     assert "no document of nav2_amcl/unheard_of" in capsys.readouterr().err
 
