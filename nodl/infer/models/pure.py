@@ -7,24 +7,17 @@ limits) or it gives an iterator that is consumed under a limit.
 
 from __future__ import annotations
 
-import ast
-import base64
 import builtins
 import collections
-import configparser
 import functools
-import hashlib
-import html
+import importlib
 import itertools
 import json
 import math
 import operator
 import posixpath
 import re
-import shlex
 import string
-import textwrap
-import urllib.parse
 from collections.abc import Callable
 from pathlib import PurePosixPath
 from typing import Any
@@ -85,6 +78,15 @@ def _repeats_repetition(pattern: str) -> bool:
     return re.search(r"[*+}][^()]*\)[*+{]", pattern) is not None
 
 
+def _late(module: str, name: str) -> Function:
+    """A function whose module few programs need: imported when it is called."""
+
+    def run(*given: Any, **named: Any) -> Any:
+        return getattr(importlib.import_module(module), name)(*given, **named)
+
+    return run
+
+
 def _chain(*columns: Any) -> Any:
     return itertools.chain(*columns)
 
@@ -137,15 +139,6 @@ def _json(text: Any, **named: Any) -> Any:
     return json.loads(text)
 
 
-def _digest(name: str) -> Function:
-    def run(data: Any = b"") -> Any:
-        if not isinstance(data, bytes):
-            raise NotConcrete
-        return getattr(hashlib, name)(data).hexdigest()
-
-    return run
-
-
 SHALLOW: dict[str, Function] = {
     **{f"builtins.{name}": getattr(builtins, name) for name in _BUILTINS},
     "builtins.range": _range,
@@ -169,17 +162,17 @@ SHALLOW: dict[str, Function] = {
     "pathlib.PurePosixPath": PurePosixPath,
     "string.Template": string.Template,
     "string.capwords": string.capwords,
-    "configparser.ConfigParser": configparser.ConfigParser,
-    "shlex.quote": shlex.quote,
-    "shlex.split": shlex.split,
-    "html.escape": html.escape,
-    "urllib.parse.quote": urllib.parse.quote,
-    "urllib.parse.unquote": urllib.parse.unquote,
-    "ast.literal_eval": ast.literal_eval,
-    "base64.b64encode": base64.b64encode,
-    "base64.b64decode": base64.b64decode,
+    "configparser.ConfigParser": _late("configparser", "ConfigParser"),
+    "shlex.quote": _late("shlex", "quote"),
+    "shlex.split": _late("shlex", "split"),
+    "html.escape": _late("html", "escape"),
+    "urllib.parse.quote": _late("urllib.parse", "quote"),
+    "urllib.parse.unquote": _late("urllib.parse", "unquote"),
+    "ast.literal_eval": _late("ast", "literal_eval"),
+    "base64.b64encode": _late("base64", "b64encode"),
+    "base64.b64decode": _late("base64", "b64decode"),
     **{
-        f"textwrap.{name}": getattr(textwrap, name)
+        f"textwrap.{name}": _late("textwrap", name)
         for name in ("dedent", "indent", "shorten", "wrap", "fill")
     },
 }
