@@ -13,6 +13,8 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from ros2launch.option import OptionExtension
@@ -20,7 +22,13 @@ from ros2launch.option import OptionExtension
 from enclave_launch.boundary.terminal import message
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
-from enclave_launch.verb.options import add_policy_options, add_security_options, build_parser
+from enclave_launch.verb.options import (
+    add_looking_options,
+    add_policy_options,
+    add_security_options,
+    build_parser,
+)
+from enclave_launch.verb.secure_launch import only_looking, resolve_options, show_plan
 from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, PERMISSIVE_NOTICE, check_needs_secure
 
 SECURE = "secure_enclaves"
@@ -32,22 +40,55 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         add_security_options(group)
         add_policy_options(group)
         self._of_secured = tuple(group._group_actions)
-        for action in self._of_secured:
+        add_looking_options(group)
+        for action in group._group_actions:
             action.default = argparse.SUPPRESS  # what is there then was given
             if "--secure" in action.option_strings:
                 action.dest = SECURE
+        if names_keystore(sys.argv[1:]):
+            group.add_argument("--secure", dest=SECURE, metavar="KEYSTORE", default=argparse.SUPPRESS)
         # What ros2launch_security reads: not asked for.
         parser.set_defaults(**{SECURE: False, "secure": None, "create_keystore": True})
 
     def prelaunch(self, launch_description: Any, args: argparse.Namespace) -> tuple[Any, ...]:
         """:raises RuntimeError: what ros2 shows as a message, without traceback."""
         try:
-            if not getattr(args, SECURE):
+            keystore = getattr(args, SECURE)
+            if isinstance(keystore, str):
+                args.keystore = Path(keystore)
+            if only_looking(_with_our_defaults(args)):
+                raise SystemExit(_looked_at(_with_our_defaults(args)))
+            if not keystore:
                 check_needs_secure(self._of_secured, vars(args).keys() & (FOR_SECURE | FOR_PLAN))
                 return (launch_description,)
             return (_secured(launch_description, _with_our_defaults(args)),)
         except EnclaveLaunchError as error:
             raise RuntimeError(str(error)) from error
+
+
+def names_keystore(words: Sequence[str]) -> bool:
+    """Do the words of the command line say ``--secure KEYSTORE``, as ros2launch_security has it? Only where what to
+    launch is left beside it, and ``--keystore`` does not name one already."""
+    if "--secure" not in words or any(word.partition("=")[0] == "--keystore" for word in words):
+        return False
+    where = words.index("--secure")
+    if where + 1 == len(words) or words[where + 1].startswith("-") or ":=" in words[where + 1]:
+        return False
+    others = (
+        *words[words.index("launch") + 1 if "launch" in words[:where] else 0 : where],
+        *words[where + 2 :],
+    )
+    named = [word for word in others if not word.startswith("-") and ":=" not in word]
+    return len(named) > 1 or any(os.path.isfile(word) for word in named)
+
+
+def _looked_at(args: argparse.Namespace) -> int:
+    """As ``secure-launch --dry-run`` and its like: the plan is printed, nothing starts. Gives the exit status."""
+    from enclave_launch.flow import resolve
+
+    path, arguments = target_of(args)
+    keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
+    return show_plan(resolve(path, arguments, options=resolve_options(args)), args, keystore)
 
 
 def _secured(description: Any, args: argparse.Namespace) -> Any:
@@ -56,11 +97,13 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
     from enclave_launch.ros2.session import EnclaveSession, PlannedDoor
     from enclave_launch.runtime.gate import PlannedGate
     from enclave_launch.secured import PlanProvider
-    from enclave_launch.verb.secure_launch import resolve_options
     from enclave_launch.verb.security import expiry_notices, repair_notices, security_options
 
     if args.keystore is None:
-        raise UsageError("--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE")
+        raise UsageError(
+            "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE; for one that nobody keeps, "
+            'as ros2launch_security makes it: --keystore "$(mktemp -d)/ks"'
+        )
     check_installed()
     path, arguments = target_of(args)
     plan = resolve(path, arguments, options=resolve_options(args))

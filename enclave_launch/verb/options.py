@@ -180,7 +180,8 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--policy", metavar="FILE", type=Path, help="SROS2 policy merged over the derived one")
 
 
-def _add_inspection(group: argparse._ArgumentGroup) -> None:
+def add_looking_options(group: argparse._ArgumentGroup) -> None:
+    """Also those of ``ros2 launch``."""
     group.add_argument("--dry-run", action="store_true", help="print the plan; start nothing, write nothing")
     group.add_argument(
         "--format",
@@ -196,6 +197,10 @@ def _add_inspection(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--dump-params", action="store_true", help="print every node's parameters as one YAML file"
     )
+
+
+def _add_inspection(group: argparse._ArgumentGroup) -> None:
+    add_looking_options(group)
     group.add_argument(
         "-s",
         "--show-args",

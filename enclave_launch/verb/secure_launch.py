@@ -72,8 +72,8 @@ def _main(options: argparse.Namespace) -> int:
         with ament_prefixes(options.prefix):
             return _show_file(target, options)
     keystore = _keystore(options)
-    if _only_looking(options):
-        return _show_plan(_planned(target, options, keystore), options, keystore)
+    if only_looking(options):
+        return show_plan(_planned(target, options, keystore), options, keystore)
     if options.learn is not None:
         from enclave_launch.verb.learn import learn_launch
 
@@ -113,7 +113,8 @@ def _check_prefixes(prefixes: Iterable[Path]) -> None:
             raise UsageError(f"--prefix {prefix}: no such directory")
 
 
-def _only_looking(options: argparse.Namespace) -> bool:
+def only_looking(options: argparse.Namespace) -> bool:
+    """Do ``options`` ask for the plan, or a part of it, in the place of a start?"""
     return bool(options.dry_run or options.explain or options.dump_params)
 
 
@@ -183,7 +184,8 @@ def _show_file(target: Target, options: argparse.Namespace) -> int:
     return 0
 
 
-def _show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
+def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
+    """Print the form of ``plan`` that ``options`` ask for. Gives the exit status."""
     text = _plan_text(plan, options, keystore)
     told = (*plan.problems, *plan.warnings)
     if options.explain and told:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import shutil
 import subprocess
 from pathlib import Path
@@ -358,3 +359,33 @@ def test_what_a_launch_file_sets_takes_no_enclave_away(demo: Workspace) -> None:
     for label, line in lines.items():
         expected = "files=0" if "tool" in label else "enclave=/ files=6"
         assert expected in line and "enable=true strategy=Enforce" in line
+
+
+def test_looking_first_as_with_secure_launch(demo: Workspace) -> None:
+    status, screen = launch(demo, "--dry-run", "demo", "demo.launch.xml", "where:=rover")
+    assert status == 0, screen
+    assert "subscribe: /rover/news" in screen
+    assert "enclave=" not in screen, "no process was started"
+    status, screen = launch(demo, "--dry-run", "--format", "json", "demo", "demo.launch.xml")
+    assert (status, json.loads(screen)["version"]) == (0, 1)
+    status, screen = launch(demo, "--explain", "/robot/news", "demo", "demo.launch.xml")
+    assert status == 0 and "remapped by chatter:=news" in screen
+    status, screen = launch(demo, "--dump-params", "demo", "demo.launch.xml")
+    assert status == 0, screen
+
+
+@pytest.mark.parametrize(
+    "words",
+    [("--secure", "{ks}", "demo", "demo.launch.xml"), ("demo", "demo.launch.xml", "--secure", "{ks}")],
+)
+def test_the_syntax_of_ros2launch_security_works(demo: Workspace, words: tuple[str, ...]) -> None:
+    keystore = demo.directory / "ks"
+    status, screen = launch(demo, *(word.format(ks=keystore) for word in words))
+    assert status == 0, screen
+    assert (keystore / "enclaves" / "mine" / "permissions.p7s").is_file()
+
+
+def test_without_a_keystore_its_other_form_is_explained(demo: Workspace) -> None:
+    status, screen = launch(demo, "--secure", "demo", "demo.launch.xml")
+    assert status != 0
+    assert '--keystore "$(mktemp -d)/ks"' in screen
