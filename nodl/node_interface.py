@@ -80,7 +80,9 @@ class NodeInterface(NamedTuple):
     ``None`` when unknown. ``executable`` or ``plugin`` is the key under which launch starts the node.
     ``own_rules``: remap rules in the options with which a program makes a further node beside its main one; such a
     node obeys them before the process's, and the process's even in a container; ``own_parameters`` stand in the
-    same options. ``parameter_services``: the program does not switch them off. ``depends``: what varies with its start.
+    same options. ``global_arguments``: the node listens to the arguments of its process, so that a launch can rename
+    and remap it and give it parameters; ``None``: not known. ``parameter_services``: the program does not switch them
+    off. ``depends``: what varies with its start.
     """
 
     package: str | None
@@ -96,5 +98,6 @@ class NodeInterface(NamedTuple):
     gaps: tuple[Gap, ...] = ()
     own_rules: tuple[str, ...] = ()
     own_parameters: tuple[tuple[str, object], ...] = ()
+    global_arguments: bool | None = True
     parameter_services: bool = True
     depends: Dependence | None = None

@@ -20,8 +20,10 @@ from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
-from nodl.node_interface import RANDOM_ENDING, NodeInterface
+from nodl.node_interface import RANDOM_ENDING, Gap, NodeInterface
 from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+
+_UNDECIDED = "whether the node listens to what the launch gives it (use_global_arguments) is not known"
 
 Role = Literal["node", "lifecycle_node", "container", "component", "launcher"]
 
@@ -60,11 +62,14 @@ def node_of_process(
     process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role
 ) -> RunningNode:
     """One node of ``process``. Raises ``LaunchFileError`` for a remap rule that would make rcl refuse to start."""
-    rules = RemapRules(
-        local=_own_rules(interface),
-        process=_parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location),
-    )
+    given = _parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location)
     inputs = program_inputs(process)
+    if interface.global_arguments is False:  # rcl_node_options_t.use_global_arguments
+        rules = RemapRules(local=_own_rules(interface), process=())
+        return _named(interface, rules, {}, enclave, process.location, role, inputs)
+    if interface.global_arguments is None and (given or process.parameters):
+        interface = interface._replace(gaps=(*interface.gaps, Gap(interface.source, _UNDECIDED)))
+    rules = RemapRules(local=_own_rules(interface), process=given)
     node = _named(interface, rules, process.parameters, enclave, process.location, role, inputs)
     return node._replace(process_namespace=_namespace(process))
 

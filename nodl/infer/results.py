@@ -84,6 +84,7 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) 
                 lifecycle=record.lifecycle and record.communication_interface,
                 parameters=tuple(sorted({*record.parameters, *record.assigned})),
                 gaps=tuple(dict.fromkeys(gaps)),
+                global_arguments=_hears_launch(record, findings),
             )
             interfaces.append(remapped(interface, rules) if rules.local or rules.process else interface)
     return interfaces
@@ -234,6 +235,14 @@ def _rules(record: NodeRecord, findings: Findings) -> tuple[RemapRules, list[Gap
     if record.use_global_arguments != (False,):
         everywhere = _parse_arguments(findings.global_arguments, record, gaps)
     return RemapRules(tuple(local), tuple(everywhere)), gaps
+
+
+def _hears_launch(record: NodeRecord, findings: Findings) -> bool | None:
+    """Whether the launch's arguments reach the node: not with ``use_global_arguments=False``, nor where the program
+    hands arguments of its own to ``rclpy.init``, which then does not look at the command line. ``None``: undecided."""
+    if record.use_global_arguments == (False,) or findings.global_arguments:
+        return False
+    return True if record.use_global_arguments == (True,) else None
 
 
 def _parse_arguments(value: Value, record: NodeRecord, gaps: list[Gap]) -> list[ParsedRule]:

@@ -86,7 +86,7 @@ def _of_node(
                 package=package, executable=executable, plugin=plugin, name=name, namespace=namespace,
                 endpoints=endpoints, source=record.source, library=ClientLibrary.RCLCPP, lifecycle=record.lifecycle,
                 parameters=tuple(sorted(record.parameters)), gaps=tuple(dict.fromkeys(gaps)),
-                own_rules=rules,
+                own_rules=rules, global_arguments=record.use_global_arguments,
             )  # fmt: skip
             interfaces.append(interface)
     return interfaces

@@ -50,6 +50,9 @@ def _key(node: NodeInterface) -> tuple[str | None, str | None, str | None]:
     return node.package, node.executable, node.plugin
 
 
+DEAF = "the node does not listen to the launch's arguments, or that is not known"
+
+
 def _stem(node: NodeInterface) -> str:
     name = node.executable or (node.plugin or node.name or "unknown").rpartition("::")[2]
     return name.removesuffix(".py")
@@ -63,6 +66,8 @@ def open_questions(node: NodeInterface) -> list[str]:
             what = f"{endpoint.kind.value.replace('_', ' ')} {endpoint.name}"
             questions.append(f"{endpoint.source}: {what} [{endpoint.type or 'type not known'}]")
     questions += [f"{node.source}: the program gives its node the rule {rule}" for rule in node.own_rules]
+    if not node.global_arguments:
+        questions.append(f"{node.source}: {DEAF}")
     return list(dict.fromkeys(questions))
 
 

@@ -213,3 +213,59 @@ def test_the_command_line_says_the_same(prefix: Path, tmp_path: Path, launch: La
     assert "demo/repeater" in refused.stderr
     assert "Traceback" not in refused.stderr
     assert not (tmp_path / "ks").exists()
+
+
+TALKER = """{python}import sys
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+def main(args=None):
+    rclpy.init({init})
+    node = Node('talker'{node})
+    node.create_publisher(String, 'chatter', 10)
+    rclpy.spin(node)
+
+main()
+"""
+RENAMED = """<launch><node pkg="demo" exec="repeater" name="other" namespace="r1">
+  <remap from="chatter" to="news"/></node></launch>"""
+
+
+@pytest.mark.parametrize(
+    ("init", "node", "published", "name"),
+    [
+        ("", "", "/r1/news", "/r1/other"),
+        ("args=None", "", "/r1/news", "/r1/other"),
+        ("args=args", "", "/r1/news", "/r1/other"),
+        ("args=sys.argv", "", "/r1/news", "/r1/other"),
+        ("args=[]", "", "/chatter", "/talker"),
+        ("args=['--ros-args', '-r', 'chatter:=own']", "", "/own", "/talker"),
+        ("", ", use_global_arguments=False", "/chatter", "/talker"),
+        ("", ", use_global_arguments=True", "/r1/news", "/r1/other"),
+    ],
+)
+def test_a_launchs_rules_reach_a_node_that_listens_to_them_and_no_other(
+    init: str, node: str, published: str, name: str, launch: Launch, prefix: Path
+) -> None:
+    """rclpy.init with arguments does not read the command line; ``use_global_arguments`` as in rcl_node_options_t."""
+    install_program(prefix, TALKER.format(python=PYTHON, init=init, node=node))
+    plan = launch(RENAMED)
+    assert [str(problem) for problem in plan.problems] == []
+    (running,) = plan.nodes
+    published_here = [
+        rule.expression
+        for rules in plan.derived.reasons.values()
+        for rule, why in rules.items()
+        if rule.operation.value == "publish" and any(reason.origin == "declared" for reason in why)
+    ]
+    assert (running.fqn, published_here) == (name, [published])
+
+
+def test_whether_a_node_listens_must_be_known_where_the_launch_gives_it_something(
+    launch: Launch, prefix: Path
+) -> None:
+    undecided = ", use_global_arguments=bool(sys.argv[3:])"
+    install_program(prefix, TALKER.format(python=PYTHON, init="", node=undecided))
+    assert any("use_global_arguments" in str(problem) for problem in launch(RENAMED).problems)
+    assert not launch('<launch><node pkg="demo" exec="repeater"/></launch>').problems
