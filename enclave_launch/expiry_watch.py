@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
 
+from enclave_launch.runtime.deadline import Deadline
 from keystore.errors import KeystoreError
 from keystore.formats.validity import utc_now
 
@@ -28,6 +29,8 @@ MARGINS = (
 )
 _LONGEST_SLEEP = timedelta(hours=1)
 """A clock that is set is noticed after that."""
+_USED = 0.8  # of what is left; provisioning renews what has used two thirds of its life
+_SHORTEST_RUN = timedelta(seconds=5)
 _FOREVER = timedelta(days=36500)
 
 
@@ -104,13 +107,38 @@ def _watch(
         say(due.pop(0).text)
 
 
+def renewal_deadline(launch: ProvisionedLaunch, now: datetime) -> Deadline | None:
+    """When to end ``launch`` so that it can be provisioned and started anew before anything of its enclaves ends."""
+    return deadline_before(_ends(launch), now)
+
+
+def deadline_before(ends: Iterable[Expiry], now: datetime) -> Deadline | None:
+    """Five minutes before the first end of an enclave's; where less than 25 minutes are left, in the last fifth of them.
+
+    ``None`` when a new start would not help: nothing was renewed by the one before, or what ends is a CA.
+    """
+    of_enclaves = [one for one in ends if one.enclave is not None]
+    if not of_enclaves:
+        return None
+    first = min(of_enclaves, key=lambda one: one.not_after)
+    at = max(first.not_after - MARGINS[-2], now + (first.not_after - now) * _USED)
+    if at < now + _SHORTEST_RUN:
+        return None
+    return Deadline(
+        at, f"{first.subject} ends at {first.not_after:%Y-%m-%d %H:%M:%S} UTC: renewing, starting anew"
+    )
+
+
 def _all_notices(launch: ProvisionedLaunch, after: datetime) -> list[Notice]:
+    return notices(_ends(launch), launch.settings.keystore, after)
+
+
+def _ends(launch: ProvisionedLaunch) -> list[Expiry]:
     from keystore.steps.expiry import expires_soon
 
     keystore = launch.settings.keystore
     enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]
     try:
-        found = expires_soon(keystore, _FOREVER, enclaves=enclaves, known=launch.report.validities)
+        return list(expires_soon(keystore, _FOREVER, enclaves=enclaves, known=launch.report.validities))
     except KeystoreError:
         return []  # whatever is wrong with it is told where it is used
-    return notices(found, keystore, after)

@@ -20,6 +20,7 @@ from enclave_launch.policy.conditions import ALSO
 
 if TYPE_CHECKING:
     from enclave_launch.runtime.companion import LaunchCompanion
+    from enclave_launch.runtime.deadline import Deadline
     from keystore.formats.policy_xml import PolicyDocument
     from keystore.steps.options import ProvisionOptions
 
@@ -99,7 +100,8 @@ class SecurityOptions:
 @dataclass(frozen=True, slots=True)
 class RunSettings:
     """How to run. ``secrets``: environment variables that no process of the launch sees; ``log_limit``: bytes after
-    which a log file becomes ``<name>.1`` and a new one is begun, ``None`` for never."""
+    which a log file becomes ``<name>.1`` and a new one is begun, ``None`` for never; ``deadline``: when to end it, as
+    ``expiry_watch.renewal_deadline`` gives it."""
 
     noninteractive: bool = False
     debug: bool = False
@@ -107,3 +109,4 @@ class RunSettings:
     secrets: frozenset[str] = frozenset()
     companion: LaunchCompanion | None = None
     log_limit: int | None = None
+    deadline: Deadline | None = None

@@ -126,6 +126,7 @@ def _options(launch: Launch, settings: RunSettings) -> RunOptions:
         debug=settings.debug,
         secrets=settings.secrets | own,
         log_limit=settings.log_limit,
+        deadline=settings.deadline,
         prefixes=source.prefixes,
         needs_ros_services=_needs_ros_services(launch),
         launch_configurations=source.launch_configurations,

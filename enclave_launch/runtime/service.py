@@ -18,7 +18,7 @@ import sys
 import threading
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AsyncExitStack, contextmanager
-from datetime import datetime
+from datetime import datetime, timezone
 from signal import SIG_IGN, SIGHUP, SIGINT, SIGQUIT, SIGTERM, Signals, getsignal
 from types import MappingProxyType
 from typing import Any, NamedTuple, TextIO
@@ -41,6 +41,7 @@ from enclave_launch.host.protocol import HostOptions
 from enclave_launch.prefixes import prepend_prefixes
 from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.companion import LaunchCompanion
+from enclave_launch.runtime.deadline import Deadline
 from enclave_launch.runtime.gate import EnclaveGate
 from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging
 from enclave_launch.runtime.live_host import LiveHost
@@ -77,6 +78,7 @@ class RunOptions(NamedTuple):
     notices: tuple[str, ...] = ()
     needs_ros_services: bool | None = False
     log_limit: int | None = None
+    deadline: Deadline | None = None
     prefixes: tuple[str, ...] = ()
     companion: LaunchCompanion | None = None
     host_options: HostOptions = HostOptions()
@@ -219,6 +221,7 @@ class LaunchService:
         for notice in self._options.notices:
             self._say("WARNING", notice)
         self._observe(LaunchStarted(str(self._log.directory)))
+        self._look_at_clock()
         with STAGE.turn(self._actor):
             self._begin()
         if tree.lost is not None:
@@ -239,6 +242,19 @@ class LaunchService:
         status = self._exit_status()
         self._observe(LaunchOver(status))
         return status
+
+    def _look_at_clock(self) -> None:
+        """Every minute, since a clock can be set; more often near the end."""
+        deadline = self._options.deadline
+        if deadline is None or self._shutting_down:
+            return
+        left = (deadline.at - datetime.now(timezone.utc)).total_seconds()
+        if left > 0:
+            asyncio.get_running_loop().call_later(min(left, 60.0), self._look_at_clock)
+            return
+        deadline.reached = True
+        self._say("WARNING", deadline.reason)
+        self.shut_down(deadline.reason)
 
     def _begin(self) -> None:
         argv = [f"{name}:={value}" for name, value in self._arguments]

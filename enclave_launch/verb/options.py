@@ -255,6 +255,11 @@ def _add_running(group: argparse._ArgumentGroup) -> None:
     group.add_argument("-n", "--noninteractive", action="store_true", help="the launch has no terminal")
     group.add_argument("-d", "--debug", action="store_true", help="more output from the launcher itself")
     group.add_argument(
+        "--restart-expiring",
+        action="store_true",
+        help="shortly before a certificate or permissions end: end the launch in order, renew them, start it anew",
+    )
+    group.add_argument(
         "--log-limit",
         metavar="SIZE",
         type=size_in_bytes,

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from enclave_launch.options import ResolveOptions, RunSettings
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.runtime.companion import LaunchCompanion
+    from enclave_launch.runtime.deadline import Deadline
+    from enclave_launch.secured import ProvisionedLaunch
     from enclave_launch.verb.target import Target
 
 
@@ -93,7 +95,9 @@ def _start(
 ) -> int:
     if keystore is None:
         return _launch_plainly(target, options, companion)
-    return _launch(_planned(target, options, keystore), options, keystore, companion)
+    while (status := _launch(_planned(target, options, keystore), options, keystore, companion)) is None:
+        pass  # what it used was about to end: planned, renewed and started once more
+    return status
 
 
 def _planned(target: Target, options: argparse.Namespace, keystore: str | None) -> LaunchPlan:
@@ -259,7 +263,8 @@ def _launch_plainly(
 
 def _launch(
     plan: LaunchPlan, options: argparse.Namespace, keystore: str, companion: LaunchCompanion | None = None
-) -> int:
+) -> int | None:
+    """The exit status; ``None`` when it was ended in order to be renewed and started anew (``--restart-expiring``)."""
     from enclave_launch.flow import provision, run
     from enclave_launch.verb.security import expiry_notices, repair_notices, security_options
 
@@ -280,7 +285,16 @@ def _launch(
     )
     if companion is None and not options.no_explain_denials:
         companion = _explainer(plan)
-    return run(launch, options=_run_settings(options, companion))
+    deadline = _deadline(launch) if options.restart_expiring else None
+    status = run(launch, options=_run_settings(options, companion, deadline))
+    return None if deadline is not None and deadline.reached else status
+
+
+def _deadline(launch: ProvisionedLaunch) -> Deadline | None:
+    from enclave_launch.expiry_watch import renewal_deadline
+    from keystore.formats.validity import utc_now
+
+    return renewal_deadline(launch, utc_now())
 
 
 def _explainer(plan: LaunchPlan) -> LaunchCompanion:
@@ -307,7 +321,9 @@ def _check_before_keys_are_made(plan: LaunchPlan) -> None:
         require_rclpy()
 
 
-def _run_settings(options: argparse.Namespace, companion: LaunchCompanion | None = None) -> RunSettings:
+def _run_settings(
+    options: argparse.Namespace, companion: LaunchCompanion | None = None, deadline: Deadline | None = None
+) -> RunSettings:
     from enclave_launch.options import RunSettings
 
     if options.show_all_subprocesses_output:
@@ -320,6 +336,7 @@ def _run_settings(options: argparse.Namespace, companion: LaunchCompanion | None
         secrets=secrets,
         companion=companion,
         log_limit=options.log_limit,
+        deadline=deadline,
     )
 
 

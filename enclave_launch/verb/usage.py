@@ -28,6 +28,7 @@ FOR_SECURE = frozenset(
         "valid_for",
         "no_revoke",
         "warn_expiry",
+        "restart_expiring",
         "compatible_subjects",
         "ca_passphrase_file",
         "ca_passphrase_env",

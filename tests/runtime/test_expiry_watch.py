@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
 import threading
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
@@ -9,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch import SecurityOptions, provision, resolve
-from enclave_launch.expiry_watch import notices, watched
+from enclave_launch.expiry_watch import deadline_before, notices, watched
 from keystore.formats.validity import utc_now
 from keystore.steps.expiry import Expiry
 from keystore.steps.options import ProvisionOptions
@@ -62,3 +66,48 @@ def test_a_running_launch_says_so(tmp_path: Path, ahead: timedelta | None) -> No
         heard.wait(20 if ahead else 0.2)
     assert bool(said) is bool(ahead)
     assert not said or "of /tool ends" in said[0] or ("/tool" in said[0] and "5 minutes" in said[0])
+
+
+EXECUTABLE = """<launch>
+  <executable cmd="sh -c 'echo up; exec sleep 60'" name="tool" enclave="/tool" output="screen"/>
+</launch>
+"""
+
+
+def test_with_restart_expiring_a_launch_is_renewed_and_started_anew_before_the_end(tmp_path: Path) -> None:
+    """A life of 20 seconds: in its last fifth the launch is ended in order, what it uses renewed, and it runs again."""
+    file = tmp_path / "test.launch.xml"
+    file.write_text(EXECUTABLE)
+    keystore = tmp_path / "ks"
+    words = ["--secure", "--keystore", str(keystore), "--valid-for", "20s", "--restart-expiring", str(file)]
+    environment = {**os.environ, "ROS_LOG_DIR": str(tmp_path / "log")}
+    with subprocess.Popen(
+        [sys.executable, "-m", "enclave_launch", "-n", *words],
+        env=environment,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as launch:
+        assert launch.stdout is not None
+        certificates, shown = [], []
+        for line in launch.stdout:
+            shown.append(line)
+            if line == "[tool-1] up\n":
+                certificates.append((keystore / "enclaves" / "tool" / "cert.pem").read_bytes())
+                if len(certificates) == 2:
+                    launch.send_signal(signal.SIGINT)
+        assert launch.wait() == 0, shown
+    assert len(set(certificates)) == 2, shown
+    assert any("renewing, starting anew" in line for line in shown)
+
+
+def test_a_new_start_is_planned_only_where_it_helps() -> None:
+    assert _deadline(NOW, NOW + DAY, now=NOW) == NOW + DAY - timedelta(minutes=5)
+    assert _deadline(NOW, NOW + timedelta(seconds=100), now=NOW) == NOW + timedelta(seconds=80)
+    assert _deadline(NOW, NOW + HOUR, now=NOW + HOUR - timedelta(seconds=5)) is None, "renewing did not help"
+
+
+def _deadline(not_before: datetime, not_after: datetime, now: datetime) -> datetime | None:
+    end = Expiry(not_after, "certificate", "/tool", not_before)
+    authority = Expiry(now + timedelta(seconds=1), "identity CA", None, not_before)
+    deadline = deadline_before([end, authority], now)
+    return deadline.at if deadline else None
