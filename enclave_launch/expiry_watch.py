@@ -113,7 +113,7 @@ def renewal_deadline(launch: ProvisionedLaunch, now: datetime) -> Deadline | Non
 
 
 def deadline_before(ends: Iterable[Expiry], now: datetime) -> Deadline | None:
-    """Five minutes before the first end of an enclave's; where less than 25 minutes are left, in the last fifth of them.
+    """Five minutes before the first end of an enclave's; where less than 25 minutes are left, in their last fifth.
 
     ``None`` when a new start would not help: nothing was renewed by the one before, or what ends is a CA.
     """

@@ -175,9 +175,10 @@ LAUNCHES = {
 
 @pytest.mark.parametrize("distro", ["humble", "rolling"])
 def test_launch_files_become_exactly_their_permissions(
-    dds: Probe, domain_id: int, tmp_path: Path, distro: str
+    dds: Probe, domain_id: int, tmp_path: Path, distro: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The whole flow, several launches into one keystore."""
+    """The whole flow, several launches into one keystore, in the domain that the processes would have."""
+    monkeypatch.setenv("ROS_DOMAIN_ID", str(domain_id))
     security = SecurityOptions(keystore=ProvisionOptions(domains=Domains.single(domain_id), durable=False))
     for name in LAUNCHES:
         launch_file = LAUNCH_FILES / f"{name}.launch.xml"
