@@ -9,11 +9,11 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.terminal import message, printable, safe_output
-from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
+from enclave_launch.errors import ManifestError, UsageError
+from enclave_launch.verb.guard import guarded
 from enclave_launch.verb.options import build_parser
-from enclave_launch.verb.usage import check_options, read_command_line, unsecured_notice
+from enclave_launch.verb.usage import CommandLine, check_options, read_command_line, unsecured_notice
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,24 +43,14 @@ def _guarded_main(argv: Sequence[str] | None) -> int:
     before = gc.get_threshold()
     gc.set_threshold(_ALLOCATIONS)
     try:
-        check_options(line, parser)
-        return _main(line.options)
-    except EnclaveLaunchError as error:
-        print(f"secure-launch: error: {error}", file=sys.stderr)
-        return error.exit_status
-    except ImportError as error:
-        text = missing_dependency(error)
-        if text is None:
-            raise
-        print(f"secure-launch: error: {text}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return guarded("secure-launch", lambda: _checked_main(line, parser))
     finally:
         gc.set_threshold(*before)
+
+
+def _checked_main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
+    check_options(line, parser)
+    return _main(line.options)
 
 
 def _main(options: argparse.Namespace) -> int:

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from collections.abc import Sequence
 
-from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.terminal import safe_output
-from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.verb.guard import guarded
 from enclave_launch.verb.secure_plan import check, diff, flow, show, suggest
 
 VERBS = (show, check, diff, flow, suggest)
@@ -41,21 +39,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv``. Gives the exit status, never a traceback for what a user can cause."""
     with safe_output():
         options = build_parser().parse_args(argv)
-        try:
-            status: int = options.verb(options)
-            sys.stdout.flush()
-            return status
-        except EnclaveLaunchError as error:
-            print(f"secure-plan: error: {error}", file=sys.stderr)
-            return error.exit_status
-        except ImportError as error:
-            text = missing_dependency(error)
-            if text is None:
-                raise
-            print(f"secure-plan: error: {text}", file=sys.stderr)
-            return 1
-        except KeyboardInterrupt:
-            return 130
-        except BrokenPipeError:
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            return 0
+        return guarded("secure-plan", lambda: _run(options))
+
+
+def _run(options: argparse.Namespace) -> int:
+    status: int = options.verb(options)
+    sys.stdout.flush()
+    return status
