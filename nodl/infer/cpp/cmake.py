@@ -8,15 +8,28 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_text
+from nodl.infer.cpp.cmake_language import (
+    BLOCK_ENDS,
+    LINK_WORDS,
+    Layer,
+    absolute,
+    commands,
+    compile_definitions,
+    condition_state,
+    end_of_block,
+    expand,
+    recursive_pattern,
+)
 
-_ARGUMENT = re.compile(r'\[(=*)\[((?:.|\n)*?)\]\1\]|"((?:\\.|[^"\\])*)"|([^\s()"]+)|([()])')
-_COMMAND = re.compile(r"[ \t]*(\w+)\s*\(")
-_VARIABLE = re.compile(r"\$\{([\w.\-]+)\}")
+if TYPE_CHECKING:
+    from nodl.infer.cpp.cmake_language import Command
+
 _SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _EXECUTABLES = frozenset(
     {
@@ -43,16 +56,6 @@ _LIBRARY_WORDS = frozenset(
         "UNKNOWN",
     }
 )
-_LINK_WORDS = frozenset({"PUBLIC", "PRIVATE", "INTERFACE", "SYSTEM"})
-_BLOCK_ENDS = {
-    "if": "endif",
-    "foreach": "endforeach",
-    "function": "endfunction",
-    "macro": "endmacro",
-    "while": "endwhile",
-}
-
-Command = tuple[str, list[str]]
 
 
 @dataclass
@@ -90,31 +93,6 @@ def read_build(folder: str | None) -> Build:
     return build
 
 
-def commands(source: str) -> Iterator[Command]:
-    """Every command with its arguments, parentheses kept as arguments of their own."""
-    source = re.sub(r"#\[(=*)\[(?:.|\n)*?\]\1\]|(?<!\\)#[^\n]*", "", source)
-    position = 0
-    while True:
-        match = _COMMAND.search(source, position)
-        if match is None:
-            return
-        words: list[str] = []
-        depth, position = 1, match.end()
-        while depth and (found := _ARGUMENT.search(source, position)):
-            position = found.end()
-            if found[5]:
-                depth += 1 if found[5] == "(" else -1
-                if depth:
-                    words.append(found[5])
-            elif found[3] is not None:
-                words.append('"' + found[3])
-            else:
-                words.append(found[2] or found[4] or "")
-        yield match[1].lower(), words
-        if depth:
-            return
-
-
 class _Reader:
     def __init__(self, build: Build):
         self.build = build
@@ -139,7 +117,7 @@ class _Reader:
             self.steps += 1
             if self.steps > 20_000:
                 return
-            end = _block(listed, index) if name in _BLOCK_ENDS else index
+            end = end_of_block(listed, index) if name in BLOCK_ENDS else index
             if end > index:
                 self.block(name, words, listed[index + 1 : end], variables)
             elif name not in ("else", "elseif"):
@@ -150,12 +128,12 @@ class _Reader:
         if name in ("function", "macro"):
             self.functions[words[0].lower()] = (name == "function", words[1:], list(body))
         elif name == "foreach":
-            given = _expand(words, variables)
+            given = expand(words, variables)
             items = [word for word in given[1:] if word not in ("IN", "ITEMS", "LISTS")]
             if "LISTS" in given:
                 items = [part for word in items for part in variables.get(word, "").split(";") if part]
             for item in items:
-                self.run(body, _Layer(variables, {given[0]: item}))
+                self.run(body, Layer(variables, {given[0]: item}))
         elif name == "if":
             self._if(words, body, variables)
         elif name == "while":
@@ -171,14 +149,14 @@ class _Reader:
             else:
                 parts[-1][1].append(command)
         for condition, inside in parts:
-            known = _known(condition)
+            known = condition_state(condition)
             if known is not False:
                 self.run(inside, variables)
             if known is True:
                 return
 
     def command(self, name: str, words: list[str], variables: dict[str, str]) -> None:
-        given = _expand(words, variables)
+        given = expand(words, variables)
         if name in self.functions:
             self._call(name, given, variables)
             return
@@ -201,7 +179,7 @@ class _Reader:
             "ARGV": ";".join(given),
         }
         inner.update({f"ARGV{index}": word for index, word in enumerate(given)})
-        self.run(body, {**variables, **inner} if own else _Layer(variables, inner))
+        self.run(body, {**variables, **inner} if own else Layer(variables, inner))
 
     def _target(
         self, given: list[str], variables: dict[str, str], *, executable: bool, automatic: bool
@@ -212,7 +190,7 @@ class _Reader:
         target.automatic = automatic
         words = given[1:]
         if automatic and "DIRECTORY" in words:
-            folder = _path(words[words.index("DIRECTORY") + 1], variables)
+            folder = absolute(words[words.index("DIRECTORY") + 1], variables)
             words = [
                 file
                 for suffix in _SOURCE_SUFFIXES
@@ -223,12 +201,12 @@ class _Reader:
 
     def _sources(self, target: Target, words: list[str], variables: dict[str, str]) -> None:
         for word in words:
-            if word in _LIBRARY_WORDS or word in _LINK_WORDS:
+            if word in _LIBRARY_WORDS or word in LINK_WORDS:
                 continue
             if word.startswith("$<TARGET_OBJECTS:"):
                 target.links.append(word[len("$<TARGET_OBJECTS:") :].rstrip(">"))
                 continue
-            file = _path(word, variables)
+            file = absolute(word, variables)
             if file.endswith(_SOURCE_SUFFIXES) and file not in target.sources:
                 target.sources.append(file)
 
@@ -273,12 +251,14 @@ class _Reader:
             found = [
                 f
                 for p in patterns
-                for f in sorted(glob.glob(_deep(_path(p, variables), given[0]), recursive=True))
+                for f in sorted(
+                    glob.glob(recursive_pattern(absolute(p, variables), given[0]), recursive=True)
+                )
             ]
             variables[given[1]] = ";".join(found)
 
     def _do_aux_source_directory(self, given: list[str], variables: dict[str, str]) -> None:
-        folder = _path(given[0], variables)
+        folder = absolute(given[0], variables)
         found = [str(p) for p in sorted(Path(folder).glob("*")) if p.suffix in _SOURCE_SUFFIXES]
         variables[given[-1]] = ";".join(found)
 
@@ -288,34 +268,34 @@ class _Reader:
 
     def _do_target_link_libraries(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in self.build.targets:
-            self.build.targets[given[0]].links += [w for w in given[1:] if w not in _LINK_WORDS]
+            self.build.targets[given[0]].links += [w for w in given[1:] if w not in LINK_WORDS]
 
     def _do_target_compile_definitions(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in self.build.targets:
-            self.build.targets[given[0]].definitions.update(_definitions(given[1:]))
+            self.build.targets[given[0]].definitions.update(compile_definitions(given[1:]))
 
     _do_target_compile_options = _do_target_compile_definitions
 
     def _do_add_definitions(self, given: list[str], variables: dict[str, str]) -> None:
-        self.definitions.update(_definitions(given, only_flags=False))
+        self.definitions.update(compile_definitions(given, only_flags=False))
 
     _do_add_compile_definitions = _do_add_definitions
 
     def _do_add_compile_options(self, given: list[str], variables: dict[str, str]) -> None:
-        self.definitions.update(_definitions(given, only_flags=True))
+        self.definitions.update(compile_definitions(given, only_flags=True))
 
     def _do_add_subdirectory(self, given: list[str], variables: dict[str, str]) -> None:
-        folder = _path(given[0], variables)
+        folder = absolute(given[0], variables)
         if os.path.basename(folder) not in ("test", "tests"):
             self.read(folder, variables)
 
     def _do_include_directories(self, given: list[str], variables: dict[str, str]) -> None:
-        self.build.includes += [_path(word, variables) for word in given if not word.startswith("$")]
+        self.build.includes += [absolute(word, variables) for word in given if not word.startswith("$")]
 
     def _do_target_include_directories(self, given: list[str], variables: dict[str, str]) -> None:
         words = [re.sub(r"^\$<BUILD_INTERFACE:(.*)>$", r"\1", word) for word in given[1:]]
         self.build.includes += [
-            _path(w, variables) for w in words if not w.startswith("$<") and w not in _LINK_WORDS
+            absolute(w, variables) for w in words if not w.startswith("$<") and w not in LINK_WORDS
         ]
 
     def _do_set_target_properties(self, given: list[str], variables: dict[str, str]) -> None:
@@ -343,83 +323,8 @@ class _Reader:
         self, given: list[str], variables: dict[str, str]
     ) -> None:
         if len(given) > 1:
-            self.build.plugin_files.append(_path(given[1], variables))
+            self.build.plugin_files.append(absolute(given[1], variables))
 
     def _do_generate_parameter_library(self, given: list[str], variables: dict[str, str]) -> None:
         if len(given) > 1:
-            self.build.parameter_files[given[0]] = _path(given[1], variables)
-
-
-class _Layer(dict[str, str]):
-    """Variables of a loop or macro: new ones here, all others written through."""
-
-    def __init__(self, outer: dict[str, str], own: dict[str, str]):
-        super().__init__({**outer, **own})
-        self._outer, self._own = outer, set(own)
-
-    def __setitem__(self, name: str, value: str) -> None:
-        super().__setitem__(name, value)
-        if name not in self._own:
-            self._outer[name] = value
-
-
-def _block(listed: Sequence[Command], start: int) -> int:
-    name = listed[start][0]
-    depth = 0
-    for index in range(start, len(listed)):
-        depth += (listed[index][0] == name) - (listed[index][0] == _BLOCK_ENDS[name])
-        if depth == 0:
-            return index
-    return len(listed) - 1
-
-
-def _expand(words: list[str], variables: dict[str, str]) -> list[str]:
-    """Variables filled in; lists become several arguments unless they stand in quotes."""
-    found: list[str] = []
-    for word in words:
-        quoted = word.startswith('"')
-        for _ in range(8):
-            filled = _VARIABLE.sub(lambda match: variables.get(match[1], ""), word)
-            if filled == word:
-                break
-            word = filled
-        found += [word[1:]] if quoted else [part for part in word.split(";") if part]
-    return found
-
-
-def _known(condition: list[str]) -> bool | None:
-    words = [word.lstrip('"') for word in condition if word not in ("(", ")")]
-    if words in (
-        ["BUILD_TESTING"],
-        ["CATKIN_ENABLE_TESTING"],
-        ["WIN32"],
-        ["APPLE"],
-        ["MSVC"],
-        ["ANDROID"],
-        ["FALSE"],
-    ):
-        return False
-    if words in (["NOT", "WIN32"], ["UNIX"], ["TRUE"], ["NOT", "APPLE"]):
-        return True
-    return False if "BUILD_TESTING" in words and "NOT" not in words and "OR" not in words else None
-
-
-def _path(word: str, variables: dict[str, str]) -> str:
-    return os.path.normpath(os.path.join(variables.get("CMAKE_CURRENT_SOURCE_DIR", ""), word))
-
-
-def _deep(pattern: str, how: str) -> str:
-    folder, name = os.path.split(pattern)
-    return os.path.join(folder, "**", name) if how == "GLOB_RECURSE" else pattern
-
-
-def _definitions(words: list[str], only_flags: bool = False) -> dict[str, str]:
-    found = {}
-    for word in words:
-        if word.startswith("-D"):
-            word = word[2:]
-        elif only_flags or word.startswith(("-", "$")) or word in _LINK_WORDS:
-            continue
-        name, _, value = word.partition("=")
-        found[name] = value.replace('\\"', '"') or "1"
-    return found
+            self.build.parameter_files[given[0]] = absolute(given[1], variables)

@@ -1,4 +1,4 @@
-"""What the declarations of one preprocessed file say: classes, functions, constants, aliases, registrations."""
+"""What a file declares: classes, functions, variables, as values."""
 
 from __future__ import annotations
 
@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.preprocess import Preprocessed
-from nodl.infer.cpp.syntax import children, line_of, parse, text, walk
+from nodl.infer.cpp.syntax import line_of, text
 
 if TYPE_CHECKING:
     from tree_sitter import Node, Tree
+
 
 _LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
 Scope = tuple[str, ...]  # namespaces and classes around a declaration
@@ -56,12 +57,12 @@ class Function:
     @property
     def only_computes(self) -> bool:
         """A number or condition from values that it cannot change, in more than a few lines."""
-        declarator = _function_declarator(self.node)
+        declarator = function_declarator(self.node)
         if declarator is None or self.body is None or self.body.end_byte - self.body.start_byte < 300:
             return False
         constant = any(text(child) == "const" for child in declarator.named_children)
         changes = any(p.type.rstrip().endswith(("&", "*")) and "const" not in p.type for p in self.parameters)
-        return _type_text(self.node) in _NUMBERS and not changes and (constant or not self.owner)
+        return type_text(self.node) in _NUMBERS and not changes and (constant or not self.owner)
 
     @property
     def line(self) -> int:
@@ -136,243 +137,7 @@ class FileIndex:
     all_functions: list[Function] = field(default_factory=list)
 
 
-def index_file(source: Preprocessed) -> FileIndex:
-    """Raises ``CppSupportMissing``."""
-    tree = parse(source.text.encode())
-    index = FileIndex(source.file, source, tree)
-    _Collector(index).collect(tree.root_node, (), [])
-    if tree.root_node.has_error:
-        for node in walk(tree.root_node):
-            if node.type == "ERROR" or node.is_missing:
-                index.errors.append((node.start_byte, line_of(node), text(node)))
-    return index
-
-
-class _Collector:
-    def __init__(self, index: FileIndex):
-        self.index = index
-        self.defaults: dict[str, str] = {}  # of the template parameters that were just read
-
-    def collect(self, node: Node, scope: Scope, templates: list[str], cls: Class | None = None) -> None:
-        for child in node.named_children:
-            self.one(child, scope, templates, cls)
-
-    def one(self, child: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
-        kind = child.type
-        if kind == "namespace_definition":
-            name = text(child.child_by_field_name("name"))
-            inner = (
-                *scope,
-                *(part.strip() for part in name.removeprefix("inline").split("::") if part.strip()),
-            )
-            self.collect(_required(child, "body"), inner, [])
-        elif kind in ("class_specifier", "struct_specifier"):
-            self.class_(child, scope, templates)
-        elif kind == "function_definition":
-            self.function(child, scope, templates, cls)
-        elif kind == "template_declaration":
-            names = _template_names(child.child_by_field_name("parameters"))
-            self.defaults = _template_defaults(child.child_by_field_name("parameters"))
-            for inner_node in child.named_children[1:]:
-                self.one(inner_node, scope, [*templates, *names], cls)
-        elif kind in (
-            "alias_declaration",
-            "using_declaration",
-            "namespace_alias_definition",
-            "type_definition",
-        ):
-            self.alias(child, scope, cls)
-        elif kind == "enum_specifier":
-            self.enum(child, scope)
-        elif kind in ("declaration", "field_declaration"):
-            self.declaration(child, scope, templates, cls)
-        elif kind == "friend_declaration":
-            return
-        elif kind in ("preproc_if", "preproc_ifdef", "preproc_else", "preproc_elif", "linkage_specification",
-                      "declaration_list", "ERROR", "export_declaration"):  # fmt: skip
-            self.collect(child, scope, templates, cls)
-
-    # --- classes ----------------------------------------------------------------------------------------
-
-    def class_(self, node: Node, scope: Scope, templates: list[str]) -> None:
-        body = node.child_by_field_name("body")
-        named = node.child_by_field_name("name")
-        if body is None:
-            return
-        written = text(named).partition("<")[0]
-        steps = [step for step in written.split("::") if step]
-        name = steps[-1] if steps else f"(unnamed at {line_of(node)})"
-        inner = (*scope, *steps) if steps else scope
-        made = Class(
-            name, "::".join((*scope, *(steps or [name]))), self.index, node, inner, templates=templates
-        )
-        made.template_defaults, self.defaults = (self.defaults if templates else {}), {}
-        for child in node.named_children:
-            if child.type == "base_class_clause":
-                made.bases = [
-                    text(b) for b in children(child) if b.type not in ("access_specifier", "virtual")
-                ]
-        self.index.classes.setdefault(name, []).append(made)
-        self.collect(body, inner, [], made)
-
-    def enum(self, node: Node, scope: Scope) -> None:
-        name = text(node.child_by_field_name("name"))
-        body = node.child_by_field_name("body")
-        prefix = "::".join((*scope, *([name] if name else [])))
-        self.index.enums.add(name)
-        for child in children(body):
-            if child.type == "enumerator":
-                constant = text(child.child_by_field_name("name"))
-                full = f"{prefix}::{constant}" if prefix else constant
-                for key in (constant, f"{name}::{constant}", full):
-                    self.index.enumerators.setdefault(key, full)
-
-    # --- functions --------------------------------------------------------------------------------------
-
-    def function(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
-        made = self._function(node, scope, templates, cls)
-        if made is None:
-            return
-        made.body = next(
-            (c for c in node.named_children if c.type in ("compound_statement", "try_statement")), None
-        )
-        if made.body is None:  # = default, = delete, = 0
-            self._declare(made, cls)
-            return
-        for child in (
-            *node.named_children,
-            *(made.body.named_children if made.body.type == "try_statement" else ()),
-        ):
-            if child.type == "field_initializer_list":
-                made.initialisers = [
-                    _initialiser(item) for item in children(child) if item.type == "field_initializer"
-                ]
-        self.index.all_functions.append(made)
-        if cls is not None:
-            cls.methods.setdefault(made.name, []).append(made)
-        else:
-            self.index.functions.setdefault(made.name, []).append(made)
-
-    def _function(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> Function | None:
-        declarator = _function_declarator(node)
-        if declarator is None:
-            return None
-        full = _plain_name(text(declarator.child_by_field_name("declarator")))
-        owner, _, name = full.rpartition("::")
-        if cls is not None:
-            owner = cls.qualified
-        inner = scope if cls is not None else (*scope, *(step for step in owner.split("::") if step))
-        made = Function(name, node, self.index, inner, owner, templates=templates)
-        made.parameters = _parameters(declarator, made)
-        words = {
-            text(child)
-            for child in node.named_children
-            if child.type in ("virtual", "storage_class_specifier")
-        }
-        head = text(node)[: max(0, declarator.end_byte - node.start_byte)]
-        made.virtual = (
-            "virtual" in words
-            or head.lstrip().startswith("virtual")
-            or any(child.type == "virtual_specifier" for child in declarator.named_children)
-        )
-        made.static = "static" in words
-        return made
-
-    def _declare(self, made: Function, cls: Class | None) -> None:
-        table = cls.declared if cls is not None else self.index.declared
-        table.setdefault(made.name, []).append(made)
-
-    # --- the rest ---------------------------------------------------------------------------------------
-
-    def declaration(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
-        kind = node.child_by_field_name("type")
-        if kind is not None and kind.type in ("class_specifier", "struct_specifier"):
-            self.class_(kind, scope, templates)
-        elif kind is not None and kind.type == "enum_specifier":
-            self.enum(kind, scope)
-        if _function_declarator(node) is not None and not _is_variable(node):
-            made = self._function(node, scope, templates, cls)
-            if made is not None:
-                self._declare(made, cls)
-            return
-        for declared in _declared_names(node):
-            self._variable(node, *declared, scope, cls)
-
-    def _variable(
-        self, node: Node, name: str, value: Node | None, pointer: bool, scope: Scope, cls: Class | None
-    ) -> None:
-        written = _type_text(node)
-        static = any(text(c) == "static" for c in node.named_children if c.type == "storage_class_specifier")
-        if cls is not None:
-            cls.fields[name] = Field(name, written, value, static, pointer, node)
-            return
-        owner, _, last = name.rpartition("::")
-        inner = (*scope, *(step for step in owner.split("::") if step))
-        made = Global(last, written, value, node, inner, self.index, pointer)
-        self.index.globals.setdefault(last, []).append(made)
-
-    def alias(self, node: Node, scope: Scope, cls: Class | None) -> None:
-        if node.type == "using_declaration":
-            target = text(node.named_children[-1]) if node.named_children else ""
-            if re.match(r"using\s+namespace\b", text(node)):
-                self.index.using.append(target.lstrip(":"))
-            else:
-                name = target.rpartition("::")[2]
-                if cls is not None and (
-                    name in target.rpartition("::")[0].split("::")[-1:]
-                    or any(base.partition("<")[0].rpartition("::")[2] == name for base in cls.bases)
-                ):
-                    cls.inherits_constructors = True
-                    return
-                self.index.aliases["::".join((*scope, name))] = (target, scope)
-            return
-        if node.type == "type_definition":
-            names = [child for child in node.named_children if child.type == "type_identifier"]
-            kind = node.child_by_field_name("type")
-            if kind is not None and kind.type in ("struct_specifier", "class_specifier"):
-                self.class_(kind, scope, [])
-            if kind is not None and kind.type == "enum_specifier":
-                self.enum(kind, scope)
-                self.index.enums |= {text(name) for name in names}
-                return
-            if names and kind is not None:
-                self.index.aliases["::".join((*scope, text(names[-1])))] = (text(kind), scope)
-            return
-        inner = children(node)
-        if len(inner) >= 2:
-            self.index.aliases["::".join((*scope, text(inner[0])))] = (text(inner[-1]), scope)
-
-
-def _required(node: Node, name: str) -> Node:
-    return node.child_by_field_name(name) or node
-
-
-def _template_names(node: Node | None) -> list[str]:
-    names = []
-    for child in children(node):
-        identifiers = [c for c in walk(child) if c.type in ("type_identifier", "identifier")]
-        if child.type in ("parameter_declaration", "optional_parameter_declaration"):
-            declarator = child.child_by_field_name("declarator")
-            names.append(text(declarator) if declarator is not None else "")
-        elif identifiers:
-            named = child.child_by_field_name("name")
-            names.append(text(named or identifiers[0]))
-        else:
-            names.append("")
-    return names
-
-
-def _template_defaults(node: Node | None) -> dict[str, str]:
-    found = {}
-    for child in children(node):
-        default = child.child_by_field_name("default_type")
-        name = child.child_by_field_name("name")
-        if default is not None and name is not None:
-            found[text(name)] = text(default)
-    return found
-
-
-def _function_declarator(node: Node) -> Node | None:
+def function_declarator(node: Node) -> Node | None:
     declarator = node.child_by_field_name("declarator")
     while declarator is not None and declarator.type != "function_declarator":
         if declarator.type in ("init_declarator", "array_declarator"):
@@ -386,94 +151,5 @@ def _function_declarator(node: Node) -> Node | None:
     return declarator
 
 
-def _is_variable(node: Node) -> bool:
-    """``Foo member(1, this);`` reads as a function that takes types named 1 and this."""
-    declarator = _function_declarator(node)
-    listed = children(declarator.child_by_field_name("parameters")) if declarator is not None else []
-    return any(text(item) in ("this", "*this", "nullptr", "true", "false") for item in listed)
-
-
-def _plain_name(name: str) -> str:
-    """Without template arguments: ``Foo<T>::bar`` is ``Foo::bar``; operators stay whole."""
-    if "operator" in name:
-        return name
-    out, depth = [], 0
-    for character in name:
-        depth += (character == "<") - (character == ">")
-        if depth == 0 and character != ">":
-            out.append(character)
-    return re.sub(r"\s+", "", "".join(out))
-
-
-def _parameters(declarator: Node, function: Function | None = None) -> list[Parameter]:
-    listed = declarator.child_by_field_name("parameters")
-    found = []
-    for child in listed.named_children if listed is not None else ():
-        if child.type in ("variadic_parameter_declaration", "variadic_parameter") and function is not None:
-            function.variadic = True
-        if not child.type.endswith("parameter_declaration"):
-            continue
-        declared = child.child_by_field_name("declarator")
-        names = [n for n in walk(declared) if n.type == "identifier"] if declared is not None else []
-        constant = any(text(c) == "const" for c in child.named_children if c.type == "type_qualifier")
-        written = ("const " if constant else "") + _type_text(child) + _marks(declared)
-        if written == "void" and not names:
-            continue
-        found.append(
-            Parameter(text(names[0]) if names else "", written, child.child_by_field_name("default_value"))
-        )
-    return found
-
-
-def _marks(declarator: Node | None) -> str:
-    """``&`` or ``*`` of a declarator."""
-    if declarator is None:
-        return ""
-    written = text(declarator)
-    return "".join(c for c in written[: max(1, len(written) - len(written.lstrip("&* ")))] if c in "&*")
-
-
-def _type_text(node: Node) -> str:
-    return re.sub(r"\s+", " ", text(node.child_by_field_name("type")))
-
-
-def _initialiser(item: Node) -> tuple[str, Node]:
-    inner = children(item)
-    return re.sub(r"\s+", "", text(inner[0])), inner[-1]
-
-
-def _declared_names(node: Node) -> list[tuple[str, Node | None, bool]]:
-    """Name, initial value and whether it is a pointer, for each variable of a declaration."""
-    found: list[tuple[str, Node | None, bool]] = []
-    values = node.children_by_field_name("default_value")
-    for declarator in node.children_by_field_name("declarator"):
-        value = None
-        inner: Node | None = declarator
-        pointer = False
-        while inner is not None and inner.type not in (
-            "identifier",
-            "field_identifier",
-            "qualified_identifier",
-        ):
-            if inner.type == "init_declarator":
-                value = inner.child_by_field_name("value")
-            pointer = pointer or inner.type in ("pointer_declarator", "reference_declarator")
-            inner = inner.child_by_field_name("declarator") or next(
-                (c for c in inner.named_children if c.type.endswith(("declarator", "identifier"))), None
-            )
-        if inner is not None:
-            later = [v for v in values if v.start_byte >= declarator.end_byte]
-            found.append((text(inner), value or (later[0] if later else None), pointer))
-    return found
-
-
-def declared_names(node: Node) -> list[tuple[str, Node | None, bool]]:
-    return _declared_names(node)
-
-
-def parameters_of(declarator: Node) -> list[Parameter]:
-    return _parameters(declarator)
-
-
 def type_text(node: Node) -> str:
-    return _type_text(node)
+    return re.sub(r"\s+", " ", text(node.child_by_field_name("type")))

@@ -12,8 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.declarations import Class, Field, FileIndex, Function
-from nodl.infer.cpp.names import POINTER_MEMBERS
 from nodl.infer.cpp.syntax import text
+from nodl.infer.cpp.type_names import POINTER_MEMBERS
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:

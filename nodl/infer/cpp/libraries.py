@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.names import Type
+from nodl.infer.cpp.type_names import Type
 from nodl.infer.cpp.values import BOTTOM, Obj, Value
 
 if TYPE_CHECKING:

@@ -14,9 +14,10 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.declarations import FileIndex, Function, Scope
 from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
-from nodl.infer.cpp.names import Names, Type, split_type
+from nodl.infer.cpp.names import Names
 from nodl.infer.cpp.store import Changes, Store
 from nodl.infer.cpp.syntax import line_of, text
+from nodl.infer.cpp.type_names import Type, split_type
 from nodl.infer.cpp.values import (
     BOTTOM,
     Atom,

@@ -4,97 +4,23 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from functools import cached_property, lru_cache
-from typing import NamedTuple, TypeVar
+from functools import cached_property
+from typing import TYPE_CHECKING, TypeVar
 
-from nodl.infer.cpp.declarations import Class, FileIndex, Function, Global, Scope
+from nodl.infer.cpp.known_headers import KNOWN_HEADERS
+from nodl.infer.cpp.type_names import POINTER_MEMBERS, Type, split_type
 
-_NOISE = re.compile(r"\b(?:const|volatile|typename|struct|class|static|constexpr|inline|mutable|enum)\b")
+if TYPE_CHECKING:
+    from nodl.infer.cpp.declarations import Class, FileIndex, Function, Global, Scope
+
 _WRAPPERS = frozenset({
     "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",
     "std::reference_wrapper",
     "std::atomic", "tl::optional", "boost::optional",
 })  # fmt: skip
-POINTER_MEMBERS = frozenset({
-    "SharedPtr", "UniquePtr", "WeakPtr", "ConstSharedPtr", "ConstUniquePtr", "ConstWeakPtr", "Ptr", "ConstPtr",
-    "SharedPtrConst",
-})  # fmt: skip
 
 
 _INTERFACES = re.compile(r"/(?:msg|srv|action)/")
-# Header folders whose classes make no node of their own: rclcpp's family is modelled, others know nothing of ROS.
-KNOWN_HEADERS = frozenset({
-    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcl_interfaces", "rcutils",
-    "rmw", "rcpputils",
-    "pluginlib", "class_loader", "message_filters", "tf2_ros", "tf2", "tf2_geometry_msgs", "tf2_eigen",
-    "tf2_sensor_msgs", "tf2_kdl",
-    "image_transport", "diagnostic_updater", "bondcpp", "bond", "cv_bridge", "ament_index_cpp",
-    "realtime_tools", "urdf", "kdl",
-    "laser_geometry", "interactive_markers", "camera_info_manager", "image_geometry", "angles",
-    "rosidl_runtime_cpp", "kdl_parser",
-    "rosidl_runtime_c", "rosidl_typesupport_cpp", "rosidl_typesupport_introspection_cpp", "Eigen", "opencv2",
-    "boost", "pcl", "yaml-cpp", "nlohmann",
-    "sys", "linux", "netinet", "arpa", "gtest", "gmock", "benchmark", "ompl", "ceres", "pcl_conversions",
-    "urdf_parser", "suitesparse",
-    "filters", "resource_retriever", "tracetools", "tinyxml2", "behaviortree_cpp", "behaviortree_cpp_v3",
-    "nanoflann", "geographic_msgs", "GeographicLib",
-    "eigen3_cmake_module", "rsl", "fmt", "parameter_traits", "control_toolbox", "urdf_model", "sdf",
-    "lifecycle_msgs", "OGRE", "tbb", "xtensor",
-    "Magick++", "GraphicsMagick", "console_bridge", "ruckig", "octomap", "fcl", "grid_map_core",
-    "libstatistics_collector",
-})  # fmt: skip
-
-
-# Of these, the ones with nodes among their classes: each class that is made is in the table, or a gap.
-ROS_LIBRARIES = frozenset({
-    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "tf2_ros", "image_transport", "message_filters",
-    "diagnostic_updater", "nav2_util", "interactive_markers", "camera_info_manager", "realtime_tools", "bond",
-})  # fmt: skip
-
-
-class Type(NamedTuple):
-    """``name`` qualified as far as known, without template arguments. ``pointer``: nothing is made by declaring one."""
-
-    name: str
-    arguments: tuple[Type, ...] = ()
-    pointer: bool = False
-
-    @property
-    def last(self) -> str:
-        return self.name.rpartition("::")[2]
-
-    def __str__(self) -> str:
-        inner = f"<{', '.join(map(str, self.arguments))}>" if self.arguments else ""
-        return self.name + inner
-
-
-NO_TYPE = Type("")
-
-
-@lru_cache(maxsize=8192)
-def split_type(written: str) -> tuple[str, tuple[str, ...], str, bool]:
-    """Name, template arguments, what follows them (``::SharedPtr``), whether it is a pointer."""
-    cleaned = _NOISE.sub(" ", written).strip()
-    pointer = cleaned.endswith("*") or cleaned.rstrip("&").rstrip().endswith("*")
-    cleaned = re.sub(r"\s+", " ", cleaned.rstrip("&* ")).strip().replace(" ::", "::").replace(":: ", "::")
-    start = cleaned.find("<")
-    if start < 0:
-        return cleaned.lstrip(":"), (), "", pointer
-    depth, arguments, last = 0, [], start + 1
-    for position in range(start, len(cleaned)):
-        character = cleaned[position]
-        depth += (character in "<(") - (character in ">)")
-        if (character == "," and depth == 1) or depth == 0:
-            arguments.append(cleaned[last:position].strip())
-            last = position + 1
-            if depth == 0:
-                return (
-                    cleaned[:start].strip().lstrip(":"),
-                    tuple(filter(None, arguments)),
-                    cleaned[last:],
-                    pointer,
-                )
-    return cleaned[:start].strip().lstrip(":"), (), "", pointer
 
 
 class Names:
@@ -443,14 +369,3 @@ def _complete(function: Function, declared: Iterable[Function]) -> None:
         function.virtual = function.virtual or each.virtual
         for own, other in zip(function.parameters, each.parameters, strict=False):
             own.default = own.default or other.default
-
-
-def ros_type(kind: Type) -> str:
-    """``std_msgs::msg::String`` as ``std_msgs/msg/String``; empty for what is not an interface type.
-
-    Where generated headers are in reach the name leads to their template, ``String_<...>`` (rosidl_generator_cpp).
-    """
-    steps = kind.name.split("::")
-    if len(steps) == 3 and steps[1] in ("msg", "srv", "action") and steps[2]:
-        return "/".join(steps).removesuffix("_")
-    return ""

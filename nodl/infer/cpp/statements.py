@@ -3,31 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.declarations import declared_names, type_text
-from nodl.infer.cpp.machine import (
-    BREAK,
-    CONTINUE,
-    NEXT,
-    RETURN,
-    Frame,
-    Loop,
-    Machine,
-    is_reference,
-    statement,
-)
-from nodl.infer.cpp.objects import copied, declared_value, iterated
-from nodl.infer.cpp.store import Changes
+from nodl.infer.cpp.collect import declared_names
+from nodl.infer.cpp.declarations import type_text
+from nodl.infer.cpp.machine import BREAK, CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
+from nodl.infer.cpp.objects import declared_value
 from nodl.infer.cpp.syntax import children, parse_expression, text, unwrapped, walk
 from nodl.infer.cpp.values import BOTTOM, Group, Value, join, truth, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
-
-MAX_UNROLLED = 64
-MAX_ROUNDS = 3
 
 
 @statement(
@@ -226,217 +212,6 @@ def try_statement(run: Machine, node: Node, frame: Frame) -> int:
     return run.branches([*after, *(caught(clause) for clause in catches)])
 
 
-# --- loops ----------------------------------------------------------------------------------------------------
-
-
-@statement("for_range_loop")
-def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
-    right = node.child_by_field_name("right")
-    subject = run.evaluate(right, frame)
-    items, exact = iterated(run, subject, node, frame)
-    body = node.child_by_field_name("body")
-    declarator = node.child_by_field_name("declarator")
-    written = type_text(node)
-
-    def bind(item: Value) -> None:
-        names = [n for n in walk(declarator) if n.type == "identifier"] if declarator is not None else []
-        if declarator is not None and any(
-            n.type == "structured_binding_declarator" for n in walk(declarator)
-        ):
-            bind_names(run, [text(name) for name in names], item, frame)
-        elif names:
-            by_value = "&" not in text(declarator)
-            run.local(frame, text(names[0]), copied(run, item, node, frame) if by_value else item, written)
-
-    return _over(run, body, [partial(bind, item) for item in items], exact, frame)
-
-
-def bind_names(run: Machine, names: list[str], value: Value, frame: Frame) -> None:
-    """A structured binding."""
-    for index, name in enumerate(names):
-        parts = [a.items[index] for a in value if isinstance(a, Group) and index < len(a.items)]
-        run.local(frame, name, join(*parts) if parts else unknown(f"the value of {name}"))
-
-
-def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exact: bool, frame: Frame) -> int:
-    """The body once for each step; any number of times each unless ``exact``."""
-    if body is None:
-        return NEXT
-    if not steps and exact:
-        run.kill(body, frame, "the loop runs over nothing")
-        return NEXT
-    start = run.store.mark()
-    breaks: list[Changes] = []
-    returns = 0
-    outer_path = frame.path
-    for index, step in enumerate(steps):
-        frame.path = (*outer_path, index)
-
-        def once(step: Callable[[], None] = step) -> int:
-            step()
-            return _iteration(run, body, frame, start, breaks)
-
-        outcome = once() if exact else run.branches([once, lambda: NEXT])
-        returns |= outcome & RETURN
-        if not outcome & NEXT:
-            break
-    else:
-        outcome = NEXT
-    frame.path = outer_path
-    run.settle(start, breaks, bool(outcome & NEXT))
-    return returns | (NEXT if breaks or outcome & NEXT else 0)
-
-
-def _iteration(run: Machine, body: Node, frame: Frame, start: int, breaks: list[Changes]) -> int:
-    loop = Loop(run.store.mark(), start, breaks)
-    frame.loops.append(loop)
-    outcome = run.execute(body, frame)
-    frame.loops.pop()
-    run.settle(loop.mark, loop.continues, bool(outcome & NEXT))
-    if outcome & CONTINUE:
-        outcome |= NEXT
-    return outcome & (NEXT | RETURN)
-
-
-@statement("for_statement")
-def for_statement(run: Machine, node: Node, frame: Frame) -> int:
-    initializer = node.child_by_field_name("initializer")
-    iterator = _iterator(node)
-    if iterator is not None:
-        return _over_iterator(run, node, *iterator, frame)
-    if initializer is not None:
-        run.execute(initializer, frame)
-    return _counted(
-        run, node, frame, node.child_by_field_name("condition"), node.child_by_field_name("update")
-    )
-
-
-def _iterator(node: Node) -> tuple[str, Node] | None:
-    """Variable and container of ``for (auto it = c.begin(); it != c.end(); ++it)``."""
-    condition = unwrapped(node.child_by_field_name("condition"))
-    if condition is None or condition.type != "binary_expression":
-        return None
-    right = condition.child_by_field_name("right")
-    callee = (
-        right.child_by_field_name("function")
-        if right is not None and right.type == "call_expression"
-        else None
-    )
-    if (
-        callee is None
-        or callee.type != "field_expression"
-        or text(callee.child_by_field_name("field")) not in _ENDINGS
-    ):
-        return None
-    container = callee.child_by_field_name("argument")
-    left = condition.child_by_field_name("left")
-    return (
-        (text(left), container)
-        if container is not None and left is not None and left.type == "identifier"
-        else None
-    )
-
-
-_ENDINGS = frozenset({"end", "cend", "rend", "crend"})
-
-
-def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: Frame) -> int:
-    """The iterator stands for the element that it points to."""
-    items, exact = iterated(run, run.evaluate(container, frame), node, frame)
-    exact = exact and node.child_by_field_name("update") is not None
-    body = node.child_by_field_name("body")
-    return _over(run, body, [partial(run.local, frame, name, item) for item in items], exact, frame)
-
-
-@statement("while_statement")
-def while_statement(run: Machine, node: Node, frame: Frame) -> int:
-    return _counted(run, node, frame, node.child_by_field_name("condition"), None)
-
-
-def _counted(run: Machine, node: Node, frame: Frame, condition: Node | None, update: Node | None) -> int:
-    """As often as the condition is certainly true; after that any number of times."""
-    body = node.child_by_field_name("body")
-    if body is None:
-        return NEXT
-    start = run.store.mark()
-    breaks: list[Changes] = []
-    returns = 0
-    outer_path = frame.path
-    for index in range(MAX_UNROLLED):
-        holds = condition_value(run, condition, frame) if condition is not None else None
-        if holds is False:
-            if index == 0:
-                run.kill(body, frame, "the condition of the loop is never true")
-            break
-        if holds is None or text(condition) in ("true", "1", "(true)", "(1)"):
-            returns |= _repeated(run, body, update, condition, frame, start, breaks)
-            break
-        frame.path = (*outer_path, index)
-        outcome = _iteration(run, body, frame, start, breaks)
-        returns |= outcome & RETURN
-        if not outcome & NEXT:
-            frame.path = outer_path
-            run.settle(start, breaks, False)
-            return returns | (NEXT if breaks else 0)
-        if update is not None:
-            run.evaluate(update, frame)
-    else:
-        returns |= _repeated(run, body, update, condition, frame, start, breaks)
-    frame.path = outer_path
-    run.settle(start, breaks, True)
-    return returns | NEXT
-
-
-def _repeated(
-    run: Machine,
-    body: Node,
-    update: Node | None,
-    condition: Node | None,
-    frame: Frame,
-    start: int,
-    breaks: list[Changes],
-) -> int:
-    """Until nothing changes; what still does after some rounds is not known."""
-    returns = 0
-    for round_ in range(MAX_ROUNDS + 2):
-        mark = run.store.mark()
-
-        def once() -> int:
-            outcome = _iteration(run, body, frame, start, breaks)
-            if outcome & NEXT and update is not None:
-                run.evaluate(update, frame)
-            if condition is not None:
-                condition_value(run, condition, frame)
-            return outcome
-
-        outcome = run.branches([once, lambda: NEXT])
-        returns |= outcome & RETURN
-        changes = run.store.changes(mark)
-        before = {cell: run.store.before(cell, mark) for cell in changes}
-        moved = {cell: value for cell, value in changes.items() if set(before[cell]) != set(value)}
-        if not moved:
-            break
-        if round_ >= MAX_ROUNDS - 1:
-            for cell, value in moved.items():
-                run.store.set(cell, join(before[cell], unknown("a value that changes in a loop")) or value)
-    return returns
-
-
-@statement("do_statement")
-def do_statement(run: Machine, node: Node, frame: Frame) -> int:
-    body = node.child_by_field_name("body")
-    start = run.store.mark()
-    breaks: list[Changes] = []
-    if body is None:
-        return NEXT
-    outcome = _iteration(run, body, frame, start, breaks)
-    condition = node.child_by_field_name("condition")
-    if outcome & NEXT and condition_value(run, unwrapped(condition), frame) is not False:
-        outcome |= _repeated(run, body, None, unwrapped(condition), frame, start, breaks)
-    run.settle(start, breaks, bool(outcome & NEXT))
-    return (outcome & RETURN) | (NEXT if breaks or outcome & NEXT else 0)
-
-
 # --- declarations ---------------------------------------------------------------------------------------------
 
 
@@ -508,4 +283,8 @@ def _local_alias(run: Machine, node: Node, frame: Frame) -> None:
     frame.bindings = {**frame.bindings, **bound}
 
 
-__all__ = ["BOTTOM", "is_reference"]
+def bind_names(run: Machine, names: list[str], value: Value, frame: Frame) -> None:
+    """A structured binding."""
+    for index, name in enumerate(names):
+        parts = [a.items[index] for a in value if isinstance(a, Group) and index < len(a.items)]
+        run.local(frame, name, join(*parts) if parts else unknown(f"the value of {name}"))

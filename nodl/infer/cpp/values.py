@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.declarations import Class, Function
     from nodl.infer.cpp.findings import NodeRecord
     from nodl.infer.cpp.machine import Frame
-    from nodl.infer.cpp.names import Type
+    from nodl.infer.cpp.type_names import Type
 
 MAX_ALTERNATIVES = 32
 MAX_SEQUENCES = 6

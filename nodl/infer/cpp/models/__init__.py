@@ -1,5 +1,5 @@
 """What libraries do with a node: rclcpp itself, then the reviewed table of well-known libraries."""
 
-from nodl.infer.cpp.models import actions, interfaces, nodes, parameters, plugins, table
+from nodl.infer.cpp.models import actions, images, interfaces, nodes, parameters, plugins, table, tf2
 
-__all__ = ["actions", "interfaces", "nodes", "parameters", "plugins", "table"]
+__all__ = ["actions", "images", "interfaces", "nodes", "parameters", "plugins", "table", "tf2"]

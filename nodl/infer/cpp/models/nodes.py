@@ -17,7 +17,7 @@ from nodl.infer.cpp.libraries import (
     node_method,
 )
 from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.names import Type
+from nodl.infer.cpp.type_names import Type
 from nodl.infer.cpp.values import (
     BOTTOM,
     NodePart,

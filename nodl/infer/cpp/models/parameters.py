@@ -7,10 +7,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.expressions import assign
+from nodl.infer.cpp.assignments import assign
+from nodl.infer.cpp.contents import handed_over, nodes_in
 from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method, node_method
 from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.objects import handed_over, nodes_in
 from nodl.infer.cpp.syntax import text, unwrapped
 from nodl.infer.cpp.values import (
     BOTTOM,

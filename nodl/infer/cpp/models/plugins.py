@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.constructors import construct
 from nodl.infer.cpp.libraries import Call, library_class, library_method
 from nodl.infer.cpp.machine import Frame, Machine
 from nodl.infer.cpp.models.parameters import parameter_names
-from nodl.infer.cpp.names import Type
-from nodl.infer.cpp.objects import construct
+from nodl.infer.cpp.type_names import Type
 from nodl.infer.cpp.values import BOTTOM, Obj, Param, Value, join, unknown
 
 if TYPE_CHECKING:

@@ -9,36 +9,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from nodl.infer.cpp.findings import NodeRecord
-from nodl.infer.cpp.libraries import (
-    LIBRARY_CLASSES,
-    LIBRARY_METHODS,
-    NODE_BASES,
-    Call,
-    library_class,
-    library_function,
-)
+from nodl.infer.cpp.contents import nodes_in
+from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_METHODS, NODE_BASES, Call, library_class
 from nodl.infer.cpp.machine import Frame, Machine
 from nodl.infer.cpp.models.interfaces import add
 from nodl.infer.cpp.models.nodes import become_node
-from nodl.infer.cpp.names import NO_TYPE, Type, ros_type
-from nodl.infer.cpp.objects import nodes_in
-from nodl.infer.cpp.values import (
-    BOTTOM,
-    NodePart,
-    Obj,
-    Param,
-    Text,
-    Value,
-    concatenated,
-    literal,
-    truth,
-    unknown,
-)
+from nodl.infer.cpp.type_names import ros_type
+from nodl.infer.cpp.values import BOTTOM, Obj, Param, Text, Value, concatenated, literal, unknown
 from nodl.node_interface import EndpointKind
 
 if TYPE_CHECKING:
     from tree_sitter import Node
+
 
 PUB, SUB = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
 SRV, CLI = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
@@ -53,13 +35,12 @@ class Makes(NamedTuple):
     type: str
 
 
-_TF = "tf2_msgs/msg/TFMessage"
-_IMAGE, _INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
+TF = "tf2_msgs/msg/TFMessage"
 
 ROWS: dict[str, tuple[Makes, ...]] = {
     # tf2_ros/src/transform_broadcaster.cpp, static_transform_broadcaster.h, buffer_server.h, buffer_client.h
-    "tf2_ros::TransformBroadcaster": (Makes(PUB, "/tf", _TF),),
-    "tf2_ros::StaticTransformBroadcaster": (Makes(PUB, "/tf_static", _TF),),
+    "tf2_ros::TransformBroadcaster": (Makes(PUB, "/tf", TF),),
+    "tf2_ros::StaticTransformBroadcaster": (Makes(PUB, "/tf_static", TF),),
     "tf2_ros::BufferClient": (Makes(CALL, "{0}", "tf2_msgs/action/LookupTransform"),),
     # diagnostic_updater/diagnostic_updater.hpp: publisher /diagnostics, parameters diagnostic_updater.*
     "diagnostic_updater::Updater": (Makes(PUB, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"),),
@@ -125,7 +106,7 @@ ROWS: dict[str, tuple[Makes, ...]] = {
 }
 
 
-def _texts(arguments: Sequence[Value], run: Machine) -> list[Value]:
+def texts_in(arguments: Sequence[Value], run: Machine) -> list[Value]:
     return [value for value in arguments if value and not nodes_in(run, value)]
 
 
@@ -145,7 +126,7 @@ def make(
         if row:
             run.gap(node, frame, f"the node that {this.type.name} makes interfaces on is not known")
         return
-    texts = _texts(arguments, run)
+    texts = texts_in(arguments, run)
     for each in row:
         kind = each.type
         if kind == "T0":
@@ -175,67 +156,7 @@ for _name, _makes in ROWS.items():
     _row(_name, _makes)
 
 
-def _own_node(run: Machine, this: Obj, name: Value, node: Node, frame: Frame, description: str) -> Obj:
-    """A node that a library makes for itself."""
-    made = run.obj(("own node", this), Type("rclcpp::Node"), heap=True)
-    become_node(run, made, [name], node, frame, lifecycle=False)
-    assert made.node is not None
-    made.node.description = description
-    return made
-
-
-# --- tf2_ros ----------------------------------------------------------------------------------------------------
-
-
-@library_class("tf2_ros::TransformListener")
-def _listener(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
-    """tf2_ros/src/transform_listener.cpp: without a node it makes one, ``transform_listener_impl_<address>``."""
-    owner = owner_in(run, arguments)
-    if owner is None and any(_may_be_node(value) for value in arguments[1:2]):
-        run.gap(node, frame, "the node of this tf2_ros::TransformListener is not known")
-        return None
-    if owner is None:
-        name = concatenated(literal("transform_listener_impl_"), unknown("an address"))
-        owner = _own_node(run, this, name, node, frame, "tf2_ros::TransformListener")
-    assert owner.node is not None
-    for topic in ("/tf", "/tf_static"):
-        run.endpoint(owner.node, SUB, literal(topic), _TF, node, frame)
-    return None
-
-
-def _may_be_node(value: Value) -> bool:
-    return not value or not all(isinstance(atom, bool) for atom in value)
-
-
-@library_class("tf2_ros::StaticTransformListener")
-def _static_listener(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
-    owner = owner_in(run, arguments)
-    if owner is None or owner.node is None:
-        run.gap(node, frame, "the node of this tf2_ros::StaticTransformListener is not known")
-        return None
-    run.endpoint(owner.node, SUB, literal("/tf_static"), _TF, node, frame)
-    return None
-
-
-@library_class("tf2_ros::Buffer")
-def _buffer(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
-    """tf2_ros/src/buffer.cpp: with a node, the service ``tf2_frames`` on it."""
-    owner = owner_in(run, arguments)
-    if owner is not None and owner.node is not None:
-        run.endpoint(owner.node, SRV, literal("tf2_frames"), "tf2_msgs/srv/FrameGraph", node, frame)
-    return None
-
-
-@library_class("tf2_ros::BufferServer")
-def _buffer_server(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
-    """tf2_ros/buffer_server.h: (buffer, node, action name, ...)."""
-    make(run, (Makes(ACT, "{0}", "tf2_msgs/action/LookupTransform"),), this, arguments[1:], node, frame)
-    return None
-
-
-# --- message_filters and image_transport --------------------------------------------------------------------------
+# --- message_filters ----------------------------------------------------------------------------------------------
 
 
 @library_class("message_filters::Subscriber")
@@ -250,7 +171,7 @@ def _filter_subscriber(
 
 def _filter_subscribe(run: Machine, this: Obj, arguments: Sequence[Value], node: Node, frame: Frame) -> None:
     owner = owner_in(run, arguments)
-    texts = _texts(arguments, run)
+    texts = texts_in(arguments, run)
     kind = ros_type(this.type.arguments[0]) if this.type.arguments else ""
     if not arguments and this.data.get("topic") is not None:
         return  # the same subscription again
@@ -270,151 +191,6 @@ def _subscribe(run: Machine, call: Call) -> Value:
 
 
 LIBRARY_METHODS[("message_filters::Subscriber", "subscribe")] = _subscribe
-
-
-def _transported(base: Value, plugin: str) -> Value:
-    return concatenated(base, literal(f"/{plugin}"))
-
-
-# image_transport_plugins: the transports that ros-<distro>-image-transport-plugins brings, with their types.
-_TRANSPORTS = {
-    "compressed": "sensor_msgs/msg/CompressedImage",
-    "compressedDepth": "sensor_msgs/msg/CompressedImage",
-    "theora": "theora_image_transport/msg/Packet",
-    "zstd": "sensor_msgs/msg/CompressedImage",
-    "ffmpeg": "ffmpeg_image_transport_msgs/msg/FFMPEGPacket",
-}
-
-
-def _image_publisher(run: Machine, owner: Obj, base: Value, node: Node, frame: Frame) -> None:
-    """image_transport/src/publisher.cpp: one publisher for each transport plugin that is installed."""
-    assert owner.node is not None
-    run.endpoint(owner.node, PUB, base, _IMAGE, node, frame)
-    for plugin, kind in list(_TRANSPORTS.items())[:3]:
-        run.endpoint(owner.node, PUB, _transported(base, plugin), kind, node, frame)
-
-
-def _info_topic(base: Value) -> Value:
-    """image_transport/src/camera_common.cpp, getCameraInfoTopic: the last part of the name replaced."""
-    found: list[object] = []
-    for atom in base:
-        if (
-            isinstance(atom, Text)
-            and atom.parts
-            and isinstance(atom.parts[-1], str)
-            and "/" in atom.parts[-1]
-        ):
-            head = atom.parts[-1].rpartition("/")[0]
-            found += concatenated((Text((*atom.parts[:-1], head + "/")),), literal("camera_info"))
-        elif isinstance(atom, Text) and all(isinstance(part, str) for part in atom.parts):
-            found += literal("camera_info")
-        else:
-            found += unknown("the camera_info beside a topic that is not known")
-    return tuple(found)
-
-
-def _image(run: Machine, call: Call, what: str) -> Value:
-    owner = owner_in(run, call.values) or (
-        call.receiver if call.receiver is not None and call.receiver.node else None
-    )
-    held = call.receiver.data.get("owner") if call.receiver is not None else None
-    owner = owner or held
-    texts = _texts(call.values, run)
-    if owner is None or owner.node is None:
-        run.gap(call.node, call.frame, f"the node that image_transport makes a {what} on is not known")
-        return unknown("an image interface")
-    base = texts[0] if texts else unknown("a topic that is not given")
-    for value in call.values:
-        for atom in value:
-            run.later(atom, call.frame)
-    if what in ("publisher", "camera publisher"):
-        _image_publisher(run, owner, base, call.node, call.frame)
-    else:
-        _image_subscriber(run, owner, base, call, texts)
-    if what.startswith("camera"):
-        kind = PUB if what.endswith("publisher") else SUB
-        run.endpoint(owner.node, kind, _info_topic(base), _INFO, call.node, call.frame)
-    made = run.obj(
-        ("image", call.frame.file.file, call.node.start_byte, call.frame.path),
-        Type(f"image_transport::{what}"),
-        heap=True,
-    )
-    return (made,)
-
-
-def _image_subscriber(run: Machine, owner: Obj, base: Value, call: Call, texts: Sequence[Value]) -> None:
-    """image_transport/src/subscriber.cpp: the transport is the argument behind the callback, a hint, or ``raw``."""
-    assert owner.node is not None
-    transports = (
-        texts[-1]
-        if len(texts) > 1 and any(isinstance(a, Text | Param) for a in texts[-1])
-        else literal("raw")
-    )
-    if call.receiver is not None and len(texts) <= 1:
-        transports = literal("raw")
-    for atom in transports:
-        if isinstance(atom, Text) and atom.parts == ("raw",):
-            run.endpoint(owner.node, SUB, base, _IMAGE, call.node, call.frame)
-            continue
-        run.endpoint(owner.node, SUB, base, _IMAGE, call.node, call.frame)
-        run.gap(
-            call.node,
-            call.frame,
-            f"the transport of this image subscription is chosen at run time ({_shown(atom)}); "
-            "its topic is BASE for raw, BASE/TRANSPORT else",
-            owner.node,
-        )
-
-
-def _shown(atom: object) -> str:
-    return f"parameter {atom.name}" if isinstance(atom, Param) else "not known"
-
-
-for _function, _what in (
-    ("create_publisher", "publisher"),
-    ("create_subscription", "subscription"),
-    ("create_camera_publisher", "camera publisher"),
-    ("create_camera_subscription", "camera subscription"),
-):
-    library_function(f"image_transport::{_function}")(lambda run, call, what=_what: _image(run, call, what))  # type: ignore[misc]
-
-
-@library_class("image_transport::ImageTransport")
-def _image_transport(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
-    this.data["owner"] = owner_in(run, arguments)
-    if this.data["owner"] is None:
-        run.gap(node, frame, "the node of this image_transport::ImageTransport is not known")
-    return None
-
-
-for _method, _what in (
-    ("advertise", "publisher"),
-    ("advertiseCamera", "camera publisher"),
-    ("subscribe", "subscription"),
-    ("subscribeCamera", "camera subscription"),
-):
-    LIBRARY_METHODS[("image_transport::ImageTransport", _method)] = lambda run, call, what=_what: _image(
-        run, call, what
-    )  # type: ignore[misc]
-
-
-@library_class("image_transport::SubscriberFilter")
-def _subscriber_filter(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
-    """image_transport/subscriber_filter.hpp: (node, topic, transport)."""
-    if arguments:
-        _image(run, Call(node, frame, arguments, []), "subscription")
-    return None
-
-
-def _filter(run: Machine, call: Call) -> Value:
-    return _image(run, Call(call.node, call.frame, call.values, []), "subscription")
-
-
-LIBRARY_METHODS[("image_transport::SubscriberFilter", "subscribe")] = _filter
 
 
 # --- nodes of libraries -------------------------------------------------------------------------------------------
@@ -451,5 +227,3 @@ def _component_manager(
 
 for _cls in ("rclcpp_components::ComponentManager",):
     NODE_BASES[_cls] = LIBRARY_CLASSES[_cls] = _component_manager
-
-__all__ = ["NO_TYPE", "NodePart", "NodeRecord", "truth"]

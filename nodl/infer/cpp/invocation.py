@@ -1,0 +1,244 @@
+"""A function, method or closure that runs: its frame, its template arguments, what it gives and writes back."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.assignments import assign
+from nodl.infer.cpp.collect import parameters_of
+from nodl.infer.cpp.constructors import bind_parameters, chosen
+from nodl.infer.cpp.contents import handed_over
+from nodl.infer.cpp.libraries import NODE_METHODS, Call
+from nodl.infer.cpp.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.store import Changes
+from nodl.infer.cpp.syntax import children, text, unwrapped
+from nodl.infer.cpp.unknown_calls import unknown_call
+from nodl.infer.cpp.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
+from nodl.infer.cpp.variables import declared_type
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+    from nodl.infer.cpp.declarations import Function
+    from nodl.infer.cpp.type_names import Type
+
+
+def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame) -> Value:
+    """Call whatever ``callee`` holds."""
+    found: list[Value] = []
+    for atom in callee:
+        if isinstance(atom, Lambda):
+            found.append(call_lambda(run, atom, values, node, frame))
+        elif isinstance(atom, Bound):
+            found.append(invoke(run, atom.function, atom.this, values, node, frame, ()))
+        elif (
+            isinstance(atom, Obj) and atom.cls is not None and run.names.find_methods(atom.cls, "operator()")
+        ):
+            found.append(
+                call_methods(
+                    run, run.names.find_methods(atom.cls, "operator()"), atom, values, node, frame, ()
+                )
+            )
+        elif isinstance(atom, Obj) and atom.data.get("partial") is not None:
+            inner, fixed = atom.data["partial"]
+            found.append(call_values(run, inner, _placed(fixed, values), node, frame))
+        else:
+            name = text(node.child_by_field_name("function"))[:60]
+            handed_over(run, f"{name}()", values, node, frame)
+            found.append(unknown(f"the result of {name}()"))
+    return join(*found) if found else unknown("the result of a call")
+
+
+def _placed(fixed: Sequence[Value], values: Sequence[Value]) -> list[Value]:
+    """The arguments of ``std::bind`` with its placeholders filled in."""
+    found = []
+    for value in fixed:
+        place = next(
+            (
+                a.why
+                for a in value
+                if isinstance(a, Unknown) and re.search(r"the value of (?:\w+::)*_\d$", a.why)
+            ),
+            "",
+        )
+        index = int(place[-1]) - 1 if place else -1
+        found.append((values[index] if index < len(values) else unknown("an argument")) if place else value)
+    return found
+
+
+def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node, frame: Frame) -> Value:
+    if frame.depth > MAX_DEPTH:
+        return unknown("a recursion")
+    outer = atom.frame
+    inner = Frame(
+        outer.file, outer.scope, outer.function, None, outer.bindings, outer,
+        (*frame.path[-24:], (outer.file.file, node.start_byte)), (*outer.conditions, *run.conditions(node, frame)),
+        depth=frame.depth + 1,
+    )  # fmt: skip
+    inner.mark = run.store.mark()
+    declarator = atom.node.child_by_field_name("declarator")
+    for index, parameter in enumerate(parameters_of(declarator) if declarator is not None else ()):
+        value = values[index] if index < len(values) else unknown(f"the argument {parameter.name}")
+        run.local(inner, parameter.name, value, parameter.type)
+    body = atom.node.child_by_field_name("body")
+    outcome = run.execute(body, inner) if body is not None else NEXT
+    run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+    return inner.returned
+
+
+def call_functions(
+    run: Machine,
+    functions: Sequence[Function],
+    values: Sequence[Value],
+    node: Node,
+    frame: Frame,
+    types: Sequence[Type],
+) -> Value:
+    function = chosen(functions, values)
+    if function is None:
+        return unknown_call(run, functions[0].name, values, node, [], frame)
+    return invoke(run, function, None, values, node, frame, types)
+
+
+def call_methods(
+    run: Machine,
+    methods: Sequence[Function],
+    this_object: Obj | None,
+    values: Sequence[Value],
+    node: Node,
+    frame: Frame,
+    types: Sequence[Type],
+    *,
+    exactly: bool = False,
+    bindings: dict[str, Type] | None = None,
+) -> Value:
+    function = chosen(methods, values)
+    if function is None and this_object is not None and this_object.cls is not None and not exactly:
+        for base in run.names.ancestry(this_object.cls)[1:]:
+            function = chosen(run.names.methods.get(base, {}).get(methods[0].name, []), values)
+            if function is not None:
+                break
+    if function is None:
+        name = f"{methods[0].owner}::{methods[0].name}"
+        if this_object is not None and this_object.is_node and methods[0].name in NODE_METHODS:
+            run.handle(node, frame)
+            return NODE_METHODS[methods[0].name](
+                run, Call(node, frame, list(values), list(types), [], this_object)
+            )
+        return unknown_call(run, name, values, node, [], frame)
+    return invoke(run, function, this_object, values, node, frame, types, bindings)
+
+
+def invoke(
+    run: Machine, function: Function, this_object: Obj | None, values: Sequence[Value], node: Node, frame: Frame,
+    types: Sequence[Type], bindings: dict[str, Type] | None = None,
+) -> Value:  # fmt: skip
+    """Run the body of ``function``."""
+    run.handle(node, frame)
+    run.called.add(function)
+    if run.active.count(function) > MAX_RECURSION or frame.depth > MAX_DEPTH:
+        if function.parameters and run.makes_interfaces(function):
+            run.gap(node, frame, f"{function} calls itself, deeper than is followed")
+        return unknown("a recursion")
+    if function.only_computes and not run.makes_interfaces(function):
+        return unknown(f"the result of {function.name}()")
+    inner = Frame(
+        function.file, function.scope, function, this_object, bindings or {},
+        path=(*frame.path[-24:], (frame.file.file, node.start_byte)),
+        conditions=run.conditions(node, frame), depth=frame.depth + 1,
+    )  # fmt: skip
+    if this_object is not None:
+        inner.bindings = {**_class_bindings(run, function, this_object), **(bindings or {})}
+    deduced = {**_element_types(run, function, node, frame), **_deduced(run, function, values, types)}
+    inner.bindings = {**inner.bindings, **deduced}
+    inner.mark = run.store.mark()
+    run.active.append(function)
+    bind_parameters(run, function, values, inner)
+    outcome = run.execute(function.body, inner) if function.body is not None else NEXT
+    if function.name in HOOKS:
+        inner.exits = _successes(inner)
+    run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+    run.active.pop()
+    _write_back(run, function, inner, node, frame)
+    inner.finished = not inner.captured
+    return inner.returned
+
+
+# Transitions of a lifecycle node (rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp).
+HOOKS = ("on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown", "on_error")
+
+
+def _successes(inner: Frame) -> list[Changes]:
+    """A transition that fails leaves the node where nothing else runs."""
+    kept = [
+        changes
+        for changes, value in zip(inner.exits, inner.exit_values, strict=True)
+        if not value or not all(_FAILED.search(str(getattr(a, "why", getattr(a, "name", "")))) for a in value)
+    ]
+    return kept or inner.exits
+
+
+_FAILED = re.compile(r"::(?:FAILURE|ERROR)$")
+
+
+def _class_bindings(run: Machine, function: Function, this_object: Obj) -> dict[str, Type]:
+    for cls, bound in this_object.bindings.items():
+        if (
+            cls.qualified == function.owner
+            or cls.qualified.endswith("::" + function.owner)
+            or cls.scope == function.scope
+        ):
+            return bound
+    return {}
+
+
+def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -> dict[str, Type]:
+    """``T`` of a parameter ``std::list<T> &``, from the container that is given."""
+    bound: dict[str, Type] = {}
+    given = children(node.child_by_field_name("arguments")) if function.templates else []
+    for parameter, argument in zip(function.parameters, given, strict=False):
+        match = re.search(r"<\s*(\w+)\s*>", parameter.type)
+        target = unwrapped(argument)
+        if target is not None and target.type == "pointer_expression":
+            target = target.child_by_field_name("argument")
+        if match is None or match[1] not in function.templates or target is None:
+            continue
+        written = declared_type(run, target, frame)
+        if written is not None and written[0].arguments:
+            bound[match[1]] = written[0].arguments[0]
+    return bound
+
+
+def _deduced(
+    run: Machine, function: Function, values: Sequence[Value], types: Sequence[Type]
+) -> dict[str, Type]:
+    """Template parameters: as given, else from the types of the arguments."""
+    bound = dict(zip(function.templates, types, strict=False))
+    for parameter, value in zip(function.parameters, values, strict=False):
+        name = re.sub(r"\b(?:const|typename)\b|[&*\s]", "", parameter.type)
+        inner = re.fullmatch(r"std::(?:shared_ptr|unique_ptr|weak_ptr)<(\w+)>", name)
+        name = inner[1] if inner else name
+        if name in function.templates and name not in bound:
+            kinds = [atom.type for atom in value if isinstance(atom, Obj)]
+            if kinds:
+                bound[name] = kinds[0]
+    return bound
+
+
+def _write_back(run: Machine, function: Function, inner: Frame, node: Node, frame: Frame) -> None:
+    """What a function does to its reference parameters shows in the caller's variables."""
+    given = children(node.child_by_field_name("arguments"))
+    for parameter, argument in zip(function.parameters, given, strict=False):
+        marks = parameter.type.rstrip()
+        if not marks.endswith(("&", "*")) or "const" in parameter.type.split() or not parameter.name:
+            continue
+        target = unwrapped(argument)
+        if target is not None and target.type == "pointer_expression":
+            target = target.child_by_field_name("argument")
+        if target is None or target.type not in ("identifier", "field_expression", "subscript_expression"):
+            continue
+        value = run.store.get((inner, parameter.name))
+        if value is not None and value != run.evaluate(target, frame):
+            assign(run, target, value, frame)

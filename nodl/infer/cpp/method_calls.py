@@ -1,0 +1,233 @@
+"""Calls on an object: by its own class, by the table of libraries, or of something that is not known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.assignments import assign
+from nodl.infer.cpp.callees import callee_name, is_only_declared, types_of
+from nodl.infer.cpp.containers import CONTAINER_METHODS, container_call, is_standard
+from nodl.infer.cpp.contents import handed_over
+from nodl.infer.cpp.invocation import call_methods, call_values
+from nodl.infer.cpp.ledger import CREATES
+from nodl.infer.cpp.libraries import LIBRARY_METHODS, NODE_METHODS, Call
+from nodl.infer.cpp.machine import Frame, Machine
+from nodl.infer.cpp.syntax import text, unwrapped
+from nodl.infer.cpp.unknown_calls import unknown_call, without_source
+from nodl.infer.cpp.values import (
+    BOTTOM,
+    Bound,
+    Const,
+    Group,
+    Lambda,
+    Map,
+    Obj,
+    Param,
+    Seq,
+    Text,
+    Unknown,
+    Value,
+    join,
+    unknown,
+)
+from nodl.infer.cpp.variables import declared_type, member
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+    from nodl.infer.cpp.type_names import Type
+
+
+def is_library_method(this_object: Obj, name: str) -> bool:
+    if this_object.is_node and name in NODE_METHODS:
+        return True
+    return (this_object.foreign_base, name) in LIBRARY_METHODS or (
+        this_object.type.name,
+        name,
+    ) in LIBRARY_METHODS
+
+
+def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame: Frame) -> Value:
+    receiver_node = callee.child_by_field_name("argument")
+    field = unwrapped(callee.child_by_field_name("field"))
+    name = callee_name(field) if field is not None else ""
+    if field is not None and field.type == "qualified_identifier":
+        name = name.rpartition("::")[2]
+    receiver = run.evaluate(receiver_node, frame)
+    if (
+        name in ("get", "lock", "value", "release")
+        and not given
+        and any(isinstance(a, Obj) for a in receiver)
+    ):
+        kept = tuple(
+            a
+            for a in receiver
+            if not (isinstance(a, Obj) and a.cls is not None and run.names.find_methods(a.cls, name))
+        )
+        if kept == receiver:
+            return receiver
+    if name == "reset" and _is_pointer(run, receiver_node, frame, receiver):
+        return _reset(run, receiver_node, node, given, frame)
+    if not receiver:
+        values = [run.evaluate(each, frame) for each in given]
+        for value in values:
+            for atom in value:
+                run.later(atom, frame)
+        if receiver_node is not None and _could_make(run, receiver_node, name, frame):
+            run.unset[(frame.file.file, node.start_byte)] = (
+                run.place(node, frame),
+                text(receiver_node)[:40],
+                name,
+            )
+        return BOTTOM
+    found: list[Value] = []
+    before = run.store.mark()
+    alternatives = []
+    for atom in receiver:
+        found.append(_on_atom(run, atom, name, node, callee, receiver_node, given, frame))
+        if len(receiver) > 1:
+            alternatives.append(run.store.changes(before))
+            run.store.undo(before)
+    if alternatives:
+        run.store.merge(alternatives)
+    return join(*found)
+
+
+def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
+    """Whether the method, of an object that was not seen to be made, would make interfaces."""
+    written = declared_type(run, receiver, frame)
+    cls = run.names.class_of(written[0], frame.scope, frame.file) if written is not None else None
+    if cls is not None:
+        return any(map(run.makes_interfaces, run.names.find_methods(cls, name)))
+    if written is not None and written[0].name not in ("", "auto"):
+        return False
+    return any(run.makes_interfaces(f) for table in run.names.methods.values() for f in table.get(name, ()))
+
+
+def _is_pointer(run: Machine, receiver_node: Node | None, frame: Frame, receiver: Value) -> bool:
+    if receiver_node is None or any(
+        isinstance(a, Obj)
+        and a.cls
+        and run.names.find_methods(a.cls, "reset")
+        and not _declared_pointer(run, receiver_node, frame)
+        for a in receiver
+    ):
+        return False
+    return _declared_pointer(run, receiver_node, frame)
+
+
+def _declared_pointer(run: Machine, node: Node, frame: Frame) -> bool:
+    if node.parent is not None and "->" in text(node.parent)[len(text(node)) : len(text(node)) + 3]:
+        return False
+    found = declared_type(run, node, frame)
+    return found is not None and found[1]
+
+
+def _reset(run: Machine, receiver_node: Node | None, node: Node, given: list[Node], frame: Frame) -> Value:
+    """``pointer.reset(new Foo(...))``."""
+    value = run.evaluate(given[0], frame) if given else BOTTOM
+    if receiver_node is not None:
+        assign(run, receiver_node, value, frame)
+    return BOTTOM
+
+
+def _on_atom(
+    run: Machine,
+    atom: object,
+    name: str,
+    node: Node,
+    callee: Node,
+    receiver_node: Node | None,
+    given: list[Node],
+    frame: Frame,
+) -> Value:
+    if isinstance(atom, Obj):
+        return on_object(run, atom, name, node, callee, given, frame)
+    if isinstance(atom, Lambda | Bound):
+        values = [run.evaluate(each, frame) for each in given]
+        return call_values(run, (atom,), values, node, frame) if name == "operator()" else BOTTOM
+    if isinstance(atom, Text | Seq | Map | Group | Param | bool | int | float | Const) or (
+        isinstance(atom, Unknown) and name in CONTAINER_METHODS
+    ):
+        return container_call(run, atom, name, node, receiver_node, given, frame)
+    values = [run.evaluate(each, frame) for each in given]
+    why = atom.why if isinstance(atom, Unknown) else "not known"
+    return _on_unknown(run, name, values, node, receiver_node, given, frame, why)
+
+
+def on_object(
+    run: Machine, atom: Obj, name: str, node: Node, callee: Node, given: list[Node], frame: Frame
+) -> Value:
+    types = types_of(run, callee, frame)
+    if atom.cls is not None:
+        methods = run.names.find_methods(atom.cls, name)
+        if methods:
+            values = [run.evaluate(each, frame) for each in given]
+            return call_methods(run, methods, atom, values, node, frame, types)
+        field = member(run, atom, name, frame)
+        if field is not None and name not in NODE_METHODS:
+            values = [run.evaluate(each, frame) for each in given]
+            return call_values(run, field, values, node, frame)
+    values = [run.evaluate(each, frame) for each in given]
+    call = Call(node, frame, values, types, given, atom)
+    found = by_model(run, atom, name, call)
+    if found is not None:
+        return found
+    if atom.cls is not None and is_only_declared(run, atom.cls, name):
+        return without_source(run, f"{atom.cls.name}::{name}", values, node, frame, atom)
+    if atom.node is not None and not atom.is_node and not name.startswith("create"):
+        for value in values:
+            for each in value:
+                run.later(each, frame)
+        return unknown(f"the result of {name}()")
+    return unknown_call(run, f"{atom.type.name}::{name}", values, node, given, frame, receiver=atom)
+
+
+def by_model(run: Machine, atom: Obj, name: str, call: Call) -> Value | None:
+    """What the tables know of a method; ``None`` if they do not know it."""
+    model = LIBRARY_METHODS.get((atom.type.name, name)) or LIBRARY_METHODS.get((atom.foreign_base, name))
+    if model is None and atom.is_node:
+        model = NODE_METHODS.get(name)
+    if model is None:
+        return None
+    run.handle(call.node, call.frame)
+    return model(run, call)
+
+
+def _on_unknown(
+    run: Machine, name: str, values: Sequence[Value], node: Node, receiver_node: Node | None, given: list[Node],
+    frame: Frame, why: str,
+) -> Value:  # fmt: skip
+    if CREATES.fullmatch(name):
+        run.handle(node, frame)
+        run.gap(
+            node,
+            frame,
+            f"the node that {text(receiver_node)[:60]}->{name}() makes an interface on is not known: {why}",
+        )
+        return unknown(f"the result of {name}()")
+    written = declared_type(run, receiver_node, frame) if receiver_node is not None else None
+    known_type = (
+        written is not None and written[0].name not in ("", "auto") and not is_own_class(run, written[0])
+    )
+    if not known_type:
+        possible = [
+            f
+            for c, table in run.names.methods.items()
+            for f in table.get(name, ())
+            if run.makes_interfaces(f)
+        ]
+        possible = [f for f in possible if len(values) <= len(f.parameters) + (9 if f.variadic else 0)]
+        if possible and not is_standard(name):
+            run.gap(
+                node,
+                frame,
+                f"which {name}() is called here is not known ({why}); {possible[0]} makes interfaces",
+            )
+    handed_over(run, f"{text(receiver_node)[:40]}->{name}()", values, node, frame)
+    return unknown(f"the result of {name}()")
+
+
+def is_own_class(run: Machine, kind: Type) -> bool:
+    return kind.last in run.names.classes

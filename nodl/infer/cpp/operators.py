@@ -1,0 +1,259 @@
+"""Operators on values: arithmetic, comparisons, texts put together, streams, pointers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from nodl.infer.cpp.assignments import assign
+from nodl.infer.cpp.contents import items_of
+from nodl.infer.cpp.machine import NEXT, Frame, Machine, expression
+from nodl.infer.cpp.syntax import children, text
+from nodl.infer.cpp.type_names import Type
+from nodl.infer.cpp.values import (
+    BOTTOM,
+    END,
+    NPOS,
+    Bound,
+    Const,
+    Group,
+    Map,
+    Obj,
+    Param,
+    Seq,
+    Text,
+    Unknown,
+    Value,
+    concatenated,
+    join,
+    literal,
+    plain,
+    truth,
+    unknown,
+)
+from nodl.infer.cpp.variables import current_object, member
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+
+@expression("field_expression")
+def field(run: Machine, node: Node, frame: Frame) -> Value:
+    owners = run.evaluate(node.child_by_field_name("argument"), frame)
+    name = text(node.child_by_field_name("field"))
+    found: list[Value] = []
+    for atom in owners:
+        if isinstance(atom, Obj):
+            value = member(run, atom, name, frame)
+            if value is None and atom.cls is None and name.endswith(("options", "callbacks")):
+                value = (run.obj(("field", atom, name), Type("")),)  # options in options
+                run.store.set((atom, name), value)
+            found.append(value if value is not None else unknown(f"the value of {name}"))
+        elif isinstance(atom, Group) and name in ("first", "second") and len(atom.items) == 2:
+            found.append(atom.items[name == "second"])
+        else:
+            found.append(unknown(f"the value of {text(node)[:60]}"))
+    return join(*found) if found else unknown(f"the value of {text(node)[:60]}")
+
+
+@expression("binary_expression")
+def binary(run: Machine, node: Node, frame: Frame) -> Value:
+    operator = text(node.child_by_field_name("operator"))
+    left_node, right_node = node.child_by_field_name("left"), node.child_by_field_name("right")
+    left = run.evaluate(left_node, frame)
+    if operator in ("&&", "||", "and", "or"):
+        return _logical(run, operator in ("||", "or"), left, right_node, frame)
+    right = run.evaluate(right_node, frame)
+    if operator == ">>" and has_text(left):
+        return _extracted(run, left_node, left, right_node, frame)
+    if operator == "<<":
+        return _streamed(run, left_node, left, right, frame)
+    if operator == "+" and (has_text(left) or has_text(right)):
+        return concatenated(left, right)
+    if operator == "/" and (has_text(left) or has_text(right)):
+        return concatenated(left, literal("/"), right)
+    if len(left) == 1 and len(right) == 1:
+        return computed(operator, left[0], right[0])
+    return unknown(f"the value of {text(node)[:60]}")
+
+
+def has_text(value: Value) -> bool:
+    return any(isinstance(atom, Text | Param) for atom in value)
+
+
+def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, frame: Frame) -> Value:
+    known = truth(left)
+    if known is either and known is not None:
+        if right_node is not None:
+            run.kill(right_node, frame, "the condition before decides")
+        return (either,)
+    if known is not None:
+        value = truth(run.evaluate(right_node, frame))
+        return (value,) if value is not None else unknown("a condition")
+    found: list[Value] = []
+
+    def second() -> int:
+        found.append(run.evaluate(right_node, frame))
+        return NEXT
+
+    run.branches([second, lambda: NEXT])
+    right = truth(found[0])
+    return (either,) if right is either else unknown("a condition")
+
+
+def computed(operator: str, left: object, right: object) -> Value:
+    if operator in ("==", "!="):
+        same = _same(left, right)
+        return unknown("a comparison") if same is None else (same == (operator == "=="),)
+    if not isinstance(left, int | float) or not isinstance(right, int | float):
+        return unknown("a computed value")
+    try:
+        return (_ARITHMETIC[operator](left, right),)
+    except (KeyError, ZeroDivisionError, TypeError, ValueError, OverflowError):
+        return unknown("a computed value")
+
+
+def _same(left: object, right: object) -> bool | None:
+    first, second = plain(left), plain(right)
+    if first is not None and second is not None:
+        return first == second
+    if isinstance(left, Const) and isinstance(right, Const):
+        return left == right
+    if END in (left, right) and isinstance(left if right == END else right, Obj | Group | Text | Bound):
+        return False  # an element that was found
+    if NPOS in (left, right) and isinstance(left if right == NPOS else right, int):
+        return False
+    return None
+
+
+_ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
+    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b,
+    "/": lambda a, b: a // b if isinstance(a, int) and isinstance(b, int) else a / b,
+    "%": lambda a, b: a % b, "<": lambda a, b: a < b, ">": lambda a, b: a > b, "<=": lambda a, b: a <= b,
+    ">=": lambda a, b: a >= b, "|": lambda a, b: a | b, "&": lambda a, b: a & b,
+}  # fmt: skip
+
+
+def _streamed(run: Machine, target: Node | None, left: Value, right: Value, frame: Frame) -> Value:
+    """``stream << text``; the stream is a text that grows."""
+    if not has_text(left):
+        return left or unknown("a stream")
+    found = concatenated(left, right) if right else left
+    inner = target
+    while inner is not None and inner.type == "binary_expression":
+        inner = inner.child_by_field_name("left")
+    if inner is not None and inner.type in ("identifier", "field_expression", "field_identifier"):
+        assign(run, inner, found, frame)
+    return found
+
+
+def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | None, frame: Frame) -> Value:
+    """``stream >> word``: the first word of a text that is known, and the rest stays."""
+    words = [run.text_of(atom) for atom in left]
+    if len(words) != 1 or words[0] is None or stream is None or right is None:
+        if right is not None:
+            assign(run, right, unknown("a word that is read from a stream"), frame)
+        return unknown("a stream")
+    found = words[0].split(None, 1)
+    assign(run, stream, literal(found[1] if len(found) > 1 else ""), frame)
+    if found:
+        assign(run, right, literal(found[0]), frame)
+    return (bool(found),)
+
+
+@expression("unary_expression")
+def unary(run: Machine, node: Node, frame: Frame) -> Value:
+    operator = text(node.child_by_field_name("operator"))
+    value = run.evaluate(node.child_by_field_name("argument"), frame)
+    if operator in ("!", "not"):
+        known = truth(value)
+        return unknown("a condition") if known is None else (not known,)
+    if operator == "-" and len(value) == 1 and isinstance(value[0], int | float):
+        return (-value[0],)
+    return value if operator == "+" else unknown("a computed value")
+
+
+@expression("pointer_expression")
+def pointer(run: Machine, node: Node, frame: Frame) -> Value:
+    argument = node.child_by_field_name("argument")
+    if text(node).startswith("&") and argument is not None and argument.type == "qualified_identifier":
+        found = method_pointer(run, argument, frame)
+        if found is not None:
+            return found
+    return run.evaluate(argument, frame)
+
+
+def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
+    """``&Foo::on_message``."""
+    head, _, last = re.sub(r"\s+", "", text(node)).rpartition("::")
+    kind = run.type_of(re.sub(r"<.*>$", "", head), frame)
+    cls = run.names.class_of(kind, frame.scope, frame.file)
+    if cls is None and (this_object := current_object(frame)) is not None and this_object.cls is not None:
+        cls = next((c for c in run.names.ancestry(this_object.cls) if c.name == kind.last), None)
+    methods = run.names.find_methods(cls, last) if cls is not None else []
+    return tuple(Bound(each, None) for each in methods) or None
+
+
+@expression("conditional_expression")
+def conditional(run: Machine, node: Node, frame: Frame) -> Value:
+    known = truth(run.evaluate(node.child_by_field_name("condition"), frame))
+    sides = {True: node.child_by_field_name("consequence"), False: node.child_by_field_name("alternative")}
+    if known is not None:
+        other = sides[not known]
+        if other is not None:
+            run.kill(other, frame, "the condition before decides")
+        return run.evaluate(sides[known], frame)
+    found: list[Value] = []
+
+    def side(which: Node | None) -> int:
+        found.append(run.evaluate(which, frame))
+        return NEXT
+
+    run.branches([lambda: side(sides[True]), lambda: side(sides[False])])
+    return join(*found)
+
+
+@expression("update_expression")
+def update(run: Machine, node: Node, frame: Frame) -> Value:
+    argument = node.child_by_field_name("argument")
+    before = run.evaluate(argument, frame)
+    step = 1 if "++" in text(node) else -1
+    after = (before[0] + step,) if len(before) == 1 and isinstance(before[0], int) else unknown("a counter")
+    if argument is not None:
+        assign(run, argument, after, frame)
+    return before if not text(node).startswith(("++", "--")) else after
+
+
+@expression("subscript_expression")
+def subscript(run: Machine, node: Node, frame: Frame) -> Value:
+    container = node.child_by_field_name("argument")
+    keys = [run.evaluate(child, frame) for child in children(node.child_by_field_name("indices"))]
+    found = [element(run, atom, keys[0] if keys else BOTTOM) for atom in run.evaluate(container, frame)]
+    result = join(*found) if found else BOTTOM
+    return result or unknown(f"the value of {text(node)[:60]}")
+
+
+def element(run: Machine, atom: object, key: Value) -> Value:
+    """``container[key]``."""
+
+    if isinstance(atom, Map):
+        definite = [value for known, value in atom.entries if len(key) == 1 and known == key]
+        if definite and not atom.open:
+            return definite[-1]
+        return (
+            join(*(value for _, value in atom.entries), unknown("an element of a map"))
+            if atom.open or not definite
+            else definite[-1]
+        )
+    if isinstance(atom, Seq | Group | Param):
+        items, exact = items_of(run, atom)
+        if exact and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(items):
+            return items[key[0]]
+        return join(*items) if items else unknown("an element of a list")
+    if isinstance(atom, Unknown):
+        return (atom,)
+    written = run.settled_text(atom) if isinstance(atom, Text) else None
+    if written is not None and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(written):
+        return literal(written[key[0]])
+    return unknown("an element of something that is not known")

@@ -1,0 +1,97 @@
+"""Calls of what is not in reach: a gap where they may make an interface."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.assignments import assign
+from nodl.infer.cpp.contents import handed_over, nodes_in
+from nodl.infer.cpp.ledger import CREATES
+from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
+from nodl.infer.cpp.machine import Frame, Machine
+from nodl.infer.cpp.syntax import text, unwrapped
+from nodl.infer.cpp.values import BOTTOM, Obj, Param, Seq, Text, Value, join, unknown
+from nodl.infer.cpp.variables import declared_type
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+
+def without_source(
+    run: Machine, name: str, values: Sequence[Value], node: Node, frame: Frame, receiver: Obj | None
+) -> Value:
+    """Declared in a header in reach, defined where we cannot see it."""
+    nodes = [o for value in values for o in nodes_in(run, value)]
+    if receiver is not None and receiver.node is not None:
+        nodes.append(receiver)
+    holder = receiver is not None and receiver.cls is not None and _holds_node(run, receiver)
+    if nodes or holder or CREATES.fullmatch(name.rpartition("::")[2]):
+        record = nodes[0].node if nodes else None
+        run.gap(node, frame, f"the source of {name}() is not in reach; it may make interfaces", record)
+    run.handle(node, frame)
+    handed_over(run, f"{name}()", [v for v in values if not nodes_in(run, v)], node, frame)
+    return unknown(f"the result of {name}()")
+
+
+def _holds_node(run: Machine, holder: Obj) -> bool:
+    for each in run.names.ancestry(holder.cls) if holder.cls is not None else ():
+        for name in each.fields:
+            if nodes_in(run, run.store.get((holder, name)) or BOTTOM):
+                return True
+    return False
+
+
+def unknown_call(
+    run: Machine,
+    name: str,
+    values: Sequence[Value],
+    node: Node,
+    given: Sequence[Node],
+    frame: Frame,
+    receiver: Obj | None = None,
+) -> Value:
+    """A function of a library that is not modelled."""
+    last = name.rpartition("::")[2]
+    harmless = is_harmless_function(name) or (receiver is not None and receiver.type.name in LIBRARY_CLASSES)
+    if receiver is not None and receiver.foreign_base and is_harmless_class(receiver.foreign_base):
+        harmless = True
+    if CREATES.fullmatch(last) and not harmless:
+        run.handle(node, frame)
+        run.gap(
+            node,
+            frame,
+            f"{name}() may make an interface; whose is not known",
+            receiver.node if receiver else None,
+        )
+    if receiver is not None and last.startswith("emplace"):  # the element that it makes may be anything
+        handed_over(run, f"an element that {last}() makes", values, node, frame)
+    if harmless:
+        for value in values:
+            for atom in value:
+                run.later(atom, frame)
+        return unknown(f"the result of {name}()")
+    run.handle(node, frame) if CREATES.fullmatch(last) else None
+    handed_over(run, f"{name}()", values, node, frame)
+    if receiver is None or receiver.cls is not None:
+        _may_be_written(run, name, given, frame)
+    return unknown(f"the result of {name}()")
+
+
+def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:
+    """A text that somebody unknown gets as a variable may be another one afterwards."""
+    for each in given:
+        target = unwrapped(each)
+        if target is not None and target.type == "pointer_expression" and text(target).startswith("&"):
+            target = target.child_by_field_name("argument")
+        if target is None or target.type not in ("identifier", "field_expression"):
+            continue
+        declared = declared_type(run, target, frame)
+        if declared is None or declared[0].name not in ("std::string", "string", "std::vector"):
+            continue
+        owner = frame.owner_of(text(target))
+        if owner is not None and "const" in owner.types.get(text(target), "").split():
+            continue
+        before = run.evaluate(target, frame)
+        if any(isinstance(atom, Text | Seq | Param) for atom in before):
+            assign(run, target, join(before, unknown(f"what {name}() may have written")), frame)

@@ -1,0 +1,151 @@
+"""What a name or member holds: variables, members of objects, constants, what their declarations say."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.declarations import Class
+from nodl.infer.cpp.machine import Frame, Machine
+from nodl.infer.cpp.syntax import children, text
+from nodl.infer.cpp.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+    from nodl.infer.cpp.type_names import Type
+
+
+def variable(run: Machine, name: str, frame: Frame) -> Value:
+    """Local variable, member, constant, enumerator or function of that name."""
+    owner = frame.owner_of(name)
+    if owner is not None:
+        return run.store.get((owner, name)) or BOTTOM
+    this_object = current_object(frame)
+    if this_object is not None and "::" not in name:
+        found = member(run, this_object, name, frame)
+        if found is not None:
+            return found
+    found = constant(run, name, frame)
+    if found is not None:
+        return found
+    if name.endswith("string::npos"):
+        return (NPOS,)
+    return unknown(f"the value of {name}")
+
+
+def current_object(frame: Frame | None) -> Obj | None:
+    while frame is not None:
+        if frame.this is not None:
+            return frame.this
+        frame = frame.outer
+    return None
+
+
+def member(run: Machine, owner: Obj, name: str, frame: Frame) -> Value | None:
+    """The field ``name`` of an object; ``None`` when its class has no such field in reach."""
+    value = run.store.get((owner, name))
+    if value is not None:
+        return value
+    if owner.cls is None:
+        return None
+    for each in run.names.ancestry(owner.cls):
+        declared = each.fields.get(name)
+        if declared is not None and declared.static:
+            return static_member(run, each, name)
+        if declared is not None:
+            return BOTTOM
+    return None
+
+
+def static_member(run: Machine, cls: object, name: str) -> Value:
+
+    from nodl.infer.cpp.objects import default_value
+
+    assert isinstance(cls, Class)
+    cell = (cls, name)
+    known = run.store.get(cell)
+    if known is not None:
+        return known
+    declared = cls.fields[name]
+    frame = Frame(cls.file, cls.scope)
+    outside = next(
+        (g for g in run.names.globals.get(name, ()) if g.value is not None and g.scope[-1:] == (cls.name,)),
+        None,
+    )
+    if declared.default is not None:
+        found = _initial(run, declared.default, declared.type, frame)
+    elif outside is not None:
+        found = _initial(run, outside.value, declared.type, Frame(outside.file, cls.scope))
+    else:
+        kind = run.names.resolve(declared.type, cls.scope, cls.file)
+        found = BOTTOM if declared.pointer or kind.pointer else default_value(run, declared.node, kind, frame)
+    run.store.set(cell, found)
+    return found
+
+
+def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Value:
+    from nodl.infer.cpp.objects import made
+
+    if value is not None and value.type in ("initializer_list", "argument_list"):
+        return made(run, value, run.type_of(written, frame), children(value), frame)
+    return run.evaluate(value, frame)
+
+
+def constant(run: Machine, name: str, frame: Frame) -> Value | None:
+    from nodl.infer.cpp.objects import default_value
+
+    cell_owner = run.names.find_global(name, frame.scope, frame.file)
+    if cell_owner is not None:
+        cell = (cell_owner, "")
+        known = run.store.get(cell)
+        if known is None:
+            inner = Frame(cell_owner.file, cell_owner.scope)
+            run.store.set(cell, BOTTOM)
+            kind = run.names.resolve(cell_owner.type, cell_owner.scope, cell_owner.file)
+            if cell_owner.value is not None:
+                known = _initial(run, cell_owner.value, cell_owner.type, inner)
+            else:
+                known = (
+                    BOTTOM
+                    if cell_owner.pointer or kind.pointer
+                    else default_value(run, cell_owner.node, kind, inner)
+                )
+            run.store.set(cell, known)
+        return known
+    head, separator, last = name.rpartition("::")
+    if separator:
+        kind = run.type_of(head, frame)
+        cls = run.names.class_of(kind, frame.scope, frame.file)
+        for each in run.names.ancestry(cls) if cls is not None else ():
+            if last in each.fields and each.fields[last].static:
+                return static_member(run, each, last)
+    if name in run.names.enumerators:
+        return (Const(run.names.enumerators[name]),)
+    if separator and f"{head.rpartition('::')[2]}::{last}" in run.names.enumerators:
+        return (Const(run.names.enumerators[f"{head.rpartition('::')[2]}::{last}"]),)
+    function = run.names.find_functions(name, frame.scope, frame.file)
+    if function:
+        return tuple(Bound(each, None) for each in function)
+    return None
+
+
+def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool] | None:
+    """The type that a variable or member was declared with, and whether it is a pointer."""
+    name = text(node).removeprefix("this->")
+    owner = frame.owner_of(name)
+    if owner is not None:
+        written = owner.types.get(name, "")
+        kind = run.type_of(written, owner)
+        return kind, kind.pointer or written.endswith(("&", "*"))
+    this_object = current_object(frame)
+    if this_object is not None and this_object.cls is not None:
+        for each in run.names.ancestry(this_object.cls):
+            if name in each.fields:
+                found = each.fields[name]
+                kind = run.names.resolve(found.type, each.scope, each.file, this_object.bindings.get(each))
+                return kind, found.pointer or kind.pointer
+    outside = run.names.find_global(name, frame.scope, frame.file)
+    if outside is not None:
+        kind = run.names.resolve(outside.type, outside.scope, outside.file)
+        return kind, outside.pointer or kind.pointer
+    return None
