@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.values import BOTTOM, Text, Value, join
+from nodl.infer.cpp.running.values import BOTTOM, Text, Value, join
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.declarations import Class
+    from nodl.infer.cpp.reading.declarations import Class
 
 Condition = tuple[str, int, str]  # file, line of the #if, symbol: what the preprocessor decides elsewhere
 

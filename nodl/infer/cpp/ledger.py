@@ -11,15 +11,15 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from nodl.infer.cpp.declarations import Class, Field, FileIndex, Function
+from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function
+from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS
 from nodl.infer.cpp.syntax import text
-from nodl.infer.cpp.type_names import POINTER_MEMBERS
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.machine import Machine
+    from nodl.infer.cpp.running.machine import Machine
 
 CREATES = re.compile(
     r"create_(?:publisher|subscription|service|client|server|generic_\w+|sub_node|lifecycle_publisher|camera_publisher|"

@@ -7,13 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.type_names import Type
-from nodl.infer.cpp.values import BOTTOM, Obj, Value
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.values import BOTTOM, Obj, Value
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.machine import Frame, Machine
+    from nodl.infer.cpp.running.machine import Frame, Machine
 
 
 @dataclass(frozen=True)

@@ -8,23 +8,23 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 import nodl.infer.cpp.models
-import nodl.infer.cpp.rules  # noqa: F401  (registers how statements and expressions run)
+import nodl.infer.cpp.running.rules  # noqa: F401  (registers how statements and expressions run)
 from enclave_launch.boundary.files import read_text
-from nodl.infer.cpp.cmake import Target
-from nodl.infer.cpp.collect import index_file
-from nodl.infer.cpp.constructors import construct
-from nodl.infer.cpp.declarations import Class, FileIndex, Function
 from nodl.infer.cpp.findings import NodeRecord
-from nodl.infer.cpp.invocation import HOOKS
-from nodl.infer.cpp.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.ledger import CREATES, Answer, account
-from nodl.infer.cpp.machine import NEXT, BudgetExceeded, Frame, Machine, Settings
-from nodl.infer.cpp.names import Names
-from nodl.infer.cpp.preprocess import Preprocessed, preprocess
-from nodl.infer.cpp.project import SourcePackage, Workspace, sources_of
+from nodl.infer.cpp.reading.cmake import Target
+from nodl.infer.cpp.reading.collect import index_file
+from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function
+from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
+from nodl.infer.cpp.reading.names import Names
+from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
+from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.invocation import HOOKS
+from nodl.infer.cpp.running.machine import NEXT, BudgetExceeded, Frame, Machine, Settings
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Seq, Value, unknown
 from nodl.infer.cpp.syntax import line_of
-from nodl.infer.cpp.type_names import Type
-from nodl.infer.cpp.values import BOTTOM, Bound, Lambda, Obj, Seq, Value, unknown
 from nodl.source_ref import SourceRef
 
 MAX_ROUNDS = 4
@@ -207,7 +207,7 @@ def _start(run: Machine, entry: Entry) -> None:
 
 def _globals(run: Machine, entry: Entry) -> None:
     """Variables outside of functions are made before main."""
-    from nodl.infer.cpp.variables import constant
+    from nodl.infer.cpp.running.variables import constant
 
     for file in entry.files:
         index = run.names.files.get(file)
@@ -219,7 +219,7 @@ def _globals(run: Machine, entry: Entry) -> None:
 
 
 def _run_main(run: Machine, function: Function) -> None:
-    from nodl.infer.cpp.invocation import invoke
+    from nodl.infer.cpp.running.invocation import invoke
 
     arguments: list[Value] = [
         unknown("the number of arguments"),
@@ -287,7 +287,7 @@ def _round(run: Machine) -> None:
 
 
 def _call_back(run: Machine, atom: object, frame: Frame, certainly: bool = False) -> None:
-    from nodl.infer.cpp.invocation import call_lambda, invoke
+    from nodl.infer.cpp.running.invocation import call_lambda, invoke
 
     if isinstance(atom, Lambda):
         if run.subtree_matters(atom.node):

@@ -13,10 +13,10 @@ from functools import cached_property
 from pathlib import Path
 
 from enclave_launch.boundary.files import read_text
-from nodl.infer.cpp.machine import Settings
 from nodl.infer.cpp.program import Entry, Findings, Sources, run_program
-from nodl.infer.cpp.project import SourcePackage, Workspace, find_packages, read_source_package
+from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages, read_source_package
 from nodl.infer.cpp.results import interfaces_of, program_gaps
+from nodl.infer.cpp.running.machine import Settings
 from nodl.infer.cpp.system import Key, package_programs
 from nodl.infer.start import Start
 from nodl.node_interface import NodeInterface

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.program import Findings
-from nodl.infer.cpp.values import NodePart, Text, Value, concatenated, plain
+from nodl.infer.cpp.running.values import NodePart, Text, Value, concatenated, plain
 from nodl.infer.results import certainty_of
 from nodl.infer.start import Start
 from nodl.name_template import NameTemplate, Part, UnknownPart

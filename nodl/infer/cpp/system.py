@@ -8,7 +8,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from nodl.infer.cpp.machine import Settings
 from nodl.infer.cpp.program import (
     Entry,
     Findings,
@@ -17,8 +16,9 @@ from nodl.infer.cpp.program import (
     run_program,
     target_entry,
 )
-from nodl.infer.cpp.project import SourcePackage, Workspace, find_packages, sources_of
+from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages, sources_of
 from nodl.infer.cpp.results import interfaces_of, program_gaps
+from nodl.infer.cpp.running.machine import Settings
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
@@ -199,7 +199,7 @@ def _unmade(
     workspace: Workspace, sources: Sources, files: Sequence[str], made: set[str]
 ) -> Iterable[tuple[Key, Entry]]:
     from nodl.infer.cpp.libraries import NODE_BASES
-    from nodl.infer.cpp.names import Names
+    from nodl.infer.cpp.reading.names import Names
 
     indexes = [
         i for f in files if not _is_test(f, workspace) and (i := sources.index(f, {}, False)) is not None

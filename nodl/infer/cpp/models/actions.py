@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from nodl.infer.cpp.libraries import Call, library_function
-from nodl.infer.cpp.machine import Machine
 from nodl.infer.cpp.models.interfaces import add, owner_and_name
-from nodl.infer.cpp.type_names import ros_type
-from nodl.infer.cpp.values import Value, unknown
+from nodl.infer.cpp.reading.type_names import ros_type
+from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.values import Value, unknown
 from nodl.node_interface import EndpointKind
 
 

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call, library_class, library_function
-from nodl.infer.cpp.machine import Frame, Machine
 from nodl.infer.cpp.models.table import PUB, SUB, owner_in, texts_in
-from nodl.infer.cpp.type_names import Type
-from nodl.infer.cpp.values import Obj, Param, Text, Value, concatenated, literal, unknown
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import Obj, Param, Text, Value, concatenated, literal, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node

@@ -6,11 +6,21 @@ create_generic_*.hpp, generic_*.hpp, wait_for_message.hpp (humble to rolling).
 
 from __future__ import annotations
 
-from nodl.infer.cpp.contents import nodes_in
 from nodl.infer.cpp.libraries import Call, library_function, library_method, node_method
-from nodl.infer.cpp.machine import Machine
-from nodl.infer.cpp.type_names import NO_TYPE, Type, ros_type
-from nodl.infer.cpp.values import BOTTOM, Obj, Param, Text, Value, concatenated, literal, plain, unknown
+from nodl.infer.cpp.reading.type_names import NO_TYPE, Type, ros_type
+from nodl.infer.cpp.running.contents import nodes_in
+from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Obj,
+    Param,
+    Text,
+    Value,
+    concatenated,
+    literal,
+    plain,
+    unknown,
+)
 from nodl.node_interface import EndpointKind
 
 KINDS = {

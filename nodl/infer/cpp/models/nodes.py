@@ -16,9 +16,9 @@ from nodl.infer.cpp.libraries import (
     library_method,
     node_method,
 )
-from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.type_names import Type
-from nodl.infer.cpp.values import (
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import (
     BOTTOM,
     NodePart,
     Obj,

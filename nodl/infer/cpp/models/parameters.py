@@ -7,12 +7,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.assignments import assign
-from nodl.infer.cpp.contents import handed_over, nodes_in
 from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method, node_method
-from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.syntax import text, unwrapped
-from nodl.infer.cpp.values import (
+from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.contents import handed_over, nodes_in
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,
     NodePart,
@@ -27,6 +26,7 @@ from nodl.infer.cpp.values import (
     literal,
     unknown,
 )
+from nodl.infer.cpp.syntax import text, unwrapped
 from nodl.infer.models.signatures import PARAMETER_SERVICES
 from nodl.node_interface import EndpointKind
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.constructors import construct
 from nodl.infer.cpp.libraries import Call, library_class, library_method
-from nodl.infer.cpp.machine import Frame, Machine
 from nodl.infer.cpp.models.parameters import parameter_names
-from nodl.infer.cpp.type_names import Type
-from nodl.infer.cpp.values import BOTTOM, Obj, Param, Value, join, unknown
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Value, join, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -93,7 +93,7 @@ def _asks(run: Machine, call: Call) -> Value:
 
 
 def _text(value: str) -> Value:
-    from nodl.infer.cpp.values import literal
+    from nodl.infer.cpp.running.values import literal
 
     return literal(value)
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
-from nodl.infer.cpp.contents import nodes_in
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_METHODS, NODE_BASES, Call, library_class
-from nodl.infer.cpp.machine import Frame, Machine
 from nodl.infer.cpp.models.interfaces import add
 from nodl.infer.cpp.models.nodes import become_node
-from nodl.infer.cpp.type_names import ros_type
-from nodl.infer.cpp.values import BOTTOM, Obj, Param, Text, Value, concatenated, literal, unknown
+from nodl.infer.cpp.reading.type_names import ros_type
+from nodl.infer.cpp.running.contents import nodes_in
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Text, Value, concatenated, literal, unknown
 from nodl.node_interface import EndpointKind
 
 if TYPE_CHECKING:

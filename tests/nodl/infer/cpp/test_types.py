@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from nodl.infer.cpp.type_names import Type, ros_type
+from nodl.infer.cpp.reading.type_names import Type, ros_type
 
 
 @pytest.mark.parametrize(

@@ -5,17 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.assignments import assign
-from nodl.infer.cpp.callees import callee_name, is_only_declared, types_of
-from nodl.infer.cpp.containers import CONTAINER_METHODS, container_call, is_standard
-from nodl.infer.cpp.contents import handed_over
-from nodl.infer.cpp.invocation import call_methods, call_values
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, NODE_METHODS, Call
-from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.syntax import text, unwrapped
-from nodl.infer.cpp.unknown_calls import unknown_call, without_source
-from nodl.infer.cpp.values import (
+from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
+from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
+from nodl.infer.cpp.running.contents import handed_over
+from nodl.infer.cpp.running.invocation import call_methods, call_values
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
+from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
     Const,
@@ -31,12 +30,13 @@ from nodl.infer.cpp.values import (
     join,
     unknown,
 )
-from nodl.infer.cpp.variables import declared_type, member
+from nodl.infer.cpp.running.variables import declared_type, member
+from nodl.infer.cpp.syntax import text, unwrapped
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.type_names import Type
+    from nodl.infer.cpp.reading.type_names import Type
 
 
 def is_library_method(this_object: Obj, name: str) -> bool:

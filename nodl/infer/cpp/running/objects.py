@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.contents import copied
-from nodl.infer.cpp.machine import Frame, Machine
+from nodl.infer.cpp.reading.type_names import NO_TYPE
+from nodl.infer.cpp.running.contents import copied
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Seq, Value, literal, unknown
 from nodl.infer.cpp.syntax import children, text
-from nodl.infer.cpp.type_names import NO_TYPE
-from nodl.infer.cpp.values import BOTTOM, Group, Map, Obj, Seq, Value, literal, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.declarations import Class
-    from nodl.infer.cpp.type_names import Type
+    from nodl.infer.cpp.reading.declarations import Class
+    from nodl.infer.cpp.reading.type_names import Type
 
 
 SEQUENCES = frozenset({
@@ -76,7 +76,7 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
 
 def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
     """``Foo x = y``: the object itself, or a Foo made of y."""
-    from nodl.infer.cpp.constructors import construct
+    from nodl.infer.cpp.running.constructors import construct
 
     cls = run.names.class_of(kind, frame.scope, frame.file)
     if cls is None or any(isinstance(atom, Obj) for atom in value):
@@ -88,7 +88,7 @@ def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) 
 
 def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
     """An object of ``kind`` from arguments in parentheses or braces."""
-    from nodl.infer.cpp.constructors import construct
+    from nodl.infer.cpp.running.constructors import construct
 
     cls = run.names.class_of(kind, frame.scope, frame.file)
     if cls is None and kind.name in SEQUENCES:
@@ -144,7 +144,7 @@ def is_aggregate(run: Machine, cls: Class) -> bool:
 def _aggregate(
     run: Machine, node: Node, kind: Type, cls: Class, given: Sequence[Node], frame: Frame
 ) -> Value:
-    from nodl.infer.cpp.constructors import class_frame, construct
+    from nodl.infer.cpp.running.constructors import class_frame, construct
 
     (made_object,) = construct(run, kind, [], node, frame)
     names = [f.name for f in cls.fields.values() if not f.static]
@@ -167,7 +167,7 @@ def _aggregate(
 
 def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
     """What a declaration without initial value holds."""
-    from nodl.infer.cpp.constructors import construct
+    from nodl.infer.cpp.running.constructors import construct
 
     if kind.name in _TEXTS:
         return literal("")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from nodl.infer.cpp.values import BOTTOM, Value, join
+from nodl.infer.cpp.running.values import BOTTOM, Value, join
 
 Cell = tuple[object, str]
 Changes = dict[Cell, Value]

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_text
-from nodl.infer.cpp.cmake_language import (
+from nodl.infer.cpp.reading.cmake_language import (
     BLOCK_ENDS,
     LINK_WORDS,
     Layer,
@@ -28,7 +28,7 @@ from nodl.infer.cpp.cmake_language import (
 )
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.cmake_language import Command
+    from nodl.infer.cpp.reading.cmake_language import Command
 
 _SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _EXECUTABLES = frozenset(

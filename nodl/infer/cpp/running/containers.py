@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.assignments import assign, with_entry
-from nodl.infer.cpp.constructors import construct
-from nodl.infer.cpp.contents import copied, handed_over, items_of
-from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.objects import made
-from nodl.infer.cpp.operators import element
-from nodl.infer.cpp.syntax import children
-from nodl.infer.cpp.values import (
+from nodl.infer.cpp.running.assignments import assign, with_entry
+from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.contents import copied, handed_over, items_of
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.objects import made
+from nodl.infer.cpp.running.operators import element
+from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
     NPOS,
@@ -27,7 +26,8 @@ from nodl.infer.cpp.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.variables import declared_type
+from nodl.infer.cpp.running.variables import declared_type
+from nodl.infer.cpp.syntax import children
 
 if TYPE_CHECKING:
     from tree_sitter import Node

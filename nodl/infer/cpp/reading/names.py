@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
-from nodl.infer.cpp.known_headers import KNOWN_HEADERS
-from nodl.infer.cpp.type_names import POINTER_MEMBERS, Type, split_type
+from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
+from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.declarations import Class, FileIndex, Function, Global, Scope
+    from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
 
 _WRAPPERS = frozenset({
     "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.contents import copied, iterated
-from nodl.infer.cpp.declarations import type_text
-from nodl.infer.cpp.machine import CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
-from nodl.infer.cpp.statements import bind_names, condition_value
-from nodl.infer.cpp.store import Changes
+from nodl.infer.cpp.reading.declarations import type_text
+from nodl.infer.cpp.running.contents import copied, iterated
+from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
+from nodl.infer.cpp.running.statements import bind_names, condition_value
+from nodl.infer.cpp.running.store import Changes
+from nodl.infer.cpp.running.values import Value, join, unknown
 from nodl.infer.cpp.syntax import text, unwrapped, walk
-from nodl.infer.cpp.values import Value, join, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node

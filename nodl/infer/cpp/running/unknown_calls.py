@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.assignments import assign
-from nodl.infer.cpp.contents import handed_over, nodes_in
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
-from nodl.infer.cpp.machine import Frame, Machine
+from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.contents import handed_over, nodes_in
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Seq, Text, Value, join, unknown
+from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import text, unwrapped
-from nodl.infer.cpp.values import BOTTOM, Obj, Param, Seq, Text, Value, join, unknown
-from nodl.infer.cpp.variables import declared_type
 
 if TYPE_CHECKING:
     from tree_sitter import Node

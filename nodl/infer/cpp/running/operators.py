@@ -6,12 +6,11 @@ import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from nodl.infer.cpp.assignments import assign
-from nodl.infer.cpp.contents import items_of
-from nodl.infer.cpp.machine import NEXT, Frame, Machine, expression
-from nodl.infer.cpp.syntax import children, text
-from nodl.infer.cpp.type_names import Type
-from nodl.infer.cpp.values import (
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.contents import items_of
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
+from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
     NPOS,
@@ -32,7 +31,8 @@ from nodl.infer.cpp.values import (
     truth,
     unknown,
 )
-from nodl.infer.cpp.variables import current_object, member
+from nodl.infer.cpp.running.variables import current_object, member
+from nodl.infer.cpp.syntax import children, text
 
 if TYPE_CHECKING:
     from tree_sitter import Node

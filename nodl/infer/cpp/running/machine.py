@@ -11,14 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.declarations import FileIndex, Function, Scope
 from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
-from nodl.infer.cpp.names import Names
-from nodl.infer.cpp.store import Changes, Store
-from nodl.infer.cpp.syntax import line_of, text
-from nodl.infer.cpp.type_names import Type, split_type
-from nodl.infer.cpp.values import (
+from nodl.infer.cpp.reading.declarations import FileIndex, Function, Scope
+from nodl.infer.cpp.reading.names import Names
+from nodl.infer.cpp.reading.type_names import Type, split_type
+from nodl.infer.cpp.running.store import Changes, Store
+from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
     Bound,
@@ -33,6 +32,7 @@ from nodl.infer.cpp.values import (
     plain,
     unknown,
 )
+from nodl.infer.cpp.syntax import line_of, text
 from nodl.infer.start import Start
 from nodl.name_template import ParameterPart, UnknownPart
 from nodl.node_interface import EndpointKind

@@ -8,24 +8,24 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.callees import callee_name, is_only_declared, types_of
-from nodl.infer.cpp.constructors import construct
-from nodl.infer.cpp.invocation import call_functions, call_methods, call_values
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BASES, Call
-from nodl.infer.cpp.machine import Frame, Machine, expression
-from nodl.infer.cpp.method_calls import by_model, is_library_method, method_call, on_object
-from nodl.infer.cpp.objects import is_plain_type, made
-from nodl.infer.cpp.standard import CASTS, STANDARD
+from nodl.infer.cpp.reading.type_names import NO_TYPE
+from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
+from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.invocation import call_functions, call_methods, call_values
+from nodl.infer.cpp.running.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.method_calls import by_model, is_library_method, method_call, on_object
+from nodl.infer.cpp.running.objects import is_plain_type, made
+from nodl.infer.cpp.running.standard import CASTS, STANDARD
+from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, unknown
+from nodl.infer.cpp.running.variables import current_object, member, variable
 from nodl.infer.cpp.syntax import children, text, unwrapped
-from nodl.infer.cpp.type_names import NO_TYPE
-from nodl.infer.cpp.unknown_calls import unknown_call, without_source
-from nodl.infer.cpp.values import BOTTOM, Bound, Lambda, Obj, Value, unknown
-from nodl.infer.cpp.variables import current_object, member, variable
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.declarations import Function
+    from nodl.infer.cpp.reading.declarations import Function
 
 
 @expression("call_expression")

@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.machine import Frame, Machine, template_arguments
+from nodl.infer.cpp.running.machine import Frame, Machine, template_arguments
 from nodl.infer.cpp.syntax import text
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.declarations import Class
-    from nodl.infer.cpp.type_names import Type
+    from nodl.infer.cpp.reading.declarations import Class
+    from nodl.infer.cpp.reading.type_names import Type
 
 
 def callee_name(callee: Node) -> str:

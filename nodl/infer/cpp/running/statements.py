@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.collect import declared_names
-from nodl.infer.cpp.declarations import type_text
-from nodl.infer.cpp.machine import BREAK, CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
-from nodl.infer.cpp.objects import declared_value
+from nodl.infer.cpp.reading.collect import declared_names
+from nodl.infer.cpp.reading.declarations import type_text
+from nodl.infer.cpp.running.machine import BREAK, CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
+from nodl.infer.cpp.running.objects import declared_value
+from nodl.infer.cpp.running.values import BOTTOM, Group, Value, join, truth, unknown
 from nodl.infer.cpp.syntax import children, parse_expression, text, unwrapped, walk
-from nodl.infer.cpp.values import BOTTOM, Group, Value, join, truth, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -160,7 +160,7 @@ def condition_atoms(run: Machine, condition: Node | None, frame: Frame) -> Value
 
 
 def _chosen_cases(run: Machine, cases: list[Node], subject: Value, frame: Frame) -> tuple[list[int], bool]:
-    from nodl.infer.cpp.values import Const
+    from nodl.infer.cpp.running.values import Const
 
     known = len(subject) == 1 and isinstance(subject[0], Const | int)
     default = [index for index, case in enumerate(cases) if case.child_by_field_name("value") is None]

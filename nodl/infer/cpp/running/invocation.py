@@ -6,23 +6,23 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.assignments import assign
-from nodl.infer.cpp.collect import parameters_of
-from nodl.infer.cpp.constructors import bind_parameters, chosen
-from nodl.infer.cpp.contents import handed_over
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
-from nodl.infer.cpp.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
-from nodl.infer.cpp.store import Changes
+from nodl.infer.cpp.reading.collect import parameters_of
+from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.constructors import bind_parameters, chosen
+from nodl.infer.cpp.running.contents import handed_over
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.running.store import Changes
+from nodl.infer.cpp.running.unknown_calls import unknown_call
+from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
+from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import children, text, unwrapped
-from nodl.infer.cpp.unknown_calls import unknown_call
-from nodl.infer.cpp.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
-from nodl.infer.cpp.variables import declared_type
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.declarations import Function
-    from nodl.infer.cpp.type_names import Type
+    from nodl.infer.cpp.reading.declarations import Function
+    from nodl.infer.cpp.reading.type_names import Type
 
 
 def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame) -> Value:

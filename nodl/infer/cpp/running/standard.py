@@ -6,11 +6,10 @@ import re
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.contents import items_of
-from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.syntax import text
-from nodl.infer.cpp.type_names import Type
-from nodl.infer.cpp.values import (
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.contents import items_of
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
     Bound,
@@ -27,6 +26,7 @@ from nodl.infer.cpp.values import (
     truth,
     unknown,
 )
+from nodl.infer.cpp.syntax import text
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -134,7 +134,7 @@ def _calls_back(
 @_standard("std::find_if", "std::find")
 def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
     """The element of a list that is exactly known, or its end."""
-    from nodl.infer.cpp.invocation import call_values
+    from nodl.infer.cpp.running.invocation import call_values
 
     items, exact = items_of(run, values[0][0]) if values and len(values[0]) == 1 else ([], False)
     for item in items if exact and len(values) > 2 else ():

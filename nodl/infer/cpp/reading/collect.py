@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.declarations import (
+from nodl.infer.cpp.reading.declarations import (
     Class,
     Field,
     FileIndex,
@@ -15,13 +15,13 @@ from nodl.infer.cpp.declarations import (
     function_declarator,
     type_text,
 )
-from nodl.infer.cpp.preprocess import Preprocessed
+from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.syntax import children, line_of, parse, text, walk
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.declarations import Scope
+    from nodl.infer.cpp.reading.declarations import Scope
 
 
 def index_file(source: Preprocessed) -> FileIndex:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.contents import copied
-from nodl.infer.cpp.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.contents import copied
+from nodl.infer.cpp.running.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.values import BOTTOM, Map, Obj, Seq, Value, concatenated, join, plain, unknown
+from nodl.infer.cpp.running.variables import current_object, declared_type
 from nodl.infer.cpp.syntax import children, text, unwrapped
-from nodl.infer.cpp.values import BOTTOM, Map, Obj, Seq, Value, concatenated, join, plain, unknown
-from nodl.infer.cpp.variables import current_object, declared_type
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @expression("assignment_expression")
 def assignment(run: Machine, node: Node, frame: Frame) -> Value:
-    from nodl.infer.cpp.operators import computed, has_text
+    from nodl.infer.cpp.running.operators import computed, has_text
 
     left, operator = node.child_by_field_name("left"), text(node.child_by_field_name("operator"))
     right = node.child_by_field_name("right")
@@ -44,7 +44,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
 
 def _braced(run: Machine, left: Node, right: Node, frame: Frame) -> Value:
     """``x = {...}``: of the type of x where that is known."""
-    from nodl.infer.cpp.objects import made
+    from nodl.infer.cpp.running.objects import made
 
     written = declared_type(run, left, frame)
     if written is not None and written[0].name:

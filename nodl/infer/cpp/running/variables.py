@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.declarations import Class
-from nodl.infer.cpp.machine import Frame, Machine
+from nodl.infer.cpp.reading.declarations import Class
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
 from nodl.infer.cpp.syntax import children, text
-from nodl.infer.cpp.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.type_names import Type
+    from nodl.infer.cpp.reading.type_names import Type
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:
@@ -59,7 +59,7 @@ def member(run: Machine, owner: Obj, name: str, frame: Frame) -> Value | None:
 
 def static_member(run: Machine, cls: object, name: str) -> Value:
 
-    from nodl.infer.cpp.objects import default_value
+    from nodl.infer.cpp.running.objects import default_value
 
     assert isinstance(cls, Class)
     cell = (cls, name)
@@ -84,7 +84,7 @@ def static_member(run: Machine, cls: object, name: str) -> Value:
 
 
 def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Value:
-    from nodl.infer.cpp.objects import made
+    from nodl.infer.cpp.running.objects import made
 
     if value is not None and value.type in ("initializer_list", "argument_list"):
         return made(run, value, run.type_of(written, frame), children(value), frame)
@@ -92,7 +92,7 @@ def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Va
 
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
-    from nodl.infer.cpp.objects import default_value
+    from nodl.infer.cpp.running.objects import default_value
 
     cell_owner = run.names.find_global(name, frame.scope, frame.file)
     if cell_owner is not None:

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from nodl.infer.cpp.macros import Macro, decided, expanded
+from nodl.infer.cpp.reading.macros import Macro, decided, expanded
 
 Include = Callable[
     [str, bool], "Preprocessed | None"

@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.preprocess import Preprocessed
+from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.syntax import line_of, text
 
 if TYPE_CHECKING:

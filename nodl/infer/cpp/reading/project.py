@@ -13,7 +13,7 @@ from pathlib import Path
 
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.shell_words import split_words
-from nodl.infer.cpp.cmake import Build, Target, read_build
+from nodl.infer.cpp.reading.cmake import Build, Target, read_build
 
 _TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^<>]*)?>\s*([\w\-.]+)\s*</")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.constructors import construct
-from nodl.infer.cpp.machine import Frame, Machine, expression
-from nodl.infer.cpp.objects import as_map, made
-from nodl.infer.cpp.operators import has_text
+from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.objects import as_map, made
+from nodl.infer.cpp.running.operators import has_text
+from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
+from nodl.infer.cpp.running.variables import variable
 from nodl.infer.cpp.syntax import children, text, unwrapped, walk
-from nodl.infer.cpp.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
-from nodl.infer.cpp.variables import variable
 
 if TYPE_CHECKING:
     from tree_sitter import Node

@@ -5,8 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.machine import Frame, Machine
-from nodl.infer.cpp.values import BOTTOM, Group, Map, Obj, Param, Seq, Unknown, Value, literal, unknown
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Group,
+    Map,
+    Obj,
+    Param,
+    Seq,
+    Unknown,
+    Value,
+    literal,
+    unknown,
+)
 
 if TYPE_CHECKING:
     from tree_sitter import Node

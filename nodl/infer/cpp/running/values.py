@@ -11,10 +11,10 @@ from nodl.name_template import ParameterPart, Part, UnknownPart
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.declarations import Class, Function
     from nodl.infer.cpp.findings import NodeRecord
-    from nodl.infer.cpp.machine import Frame
-    from nodl.infer.cpp.type_names import Type
+    from nodl.infer.cpp.reading.declarations import Class, Function
+    from nodl.infer.cpp.reading.type_names import Type
+    from nodl.infer.cpp.running.machine import Frame
 
 MAX_ALTERNATIVES = 32
 MAX_SEQUENCES = 6

@@ -6,19 +6,19 @@ import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.contents import copied, handed_over
-from nodl.infer.cpp.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
-from nodl.infer.cpp.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
-from nodl.infer.cpp.objects import MAPS, SEQUENCES, converted, default_value, initial_value, made
+from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
+from nodl.infer.cpp.running.contents import copied, handed_over
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.running.objects import MAPS, SEQUENCES, converted, default_value, initial_value, made
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Map, Obj, Seq, Text, Value, unknown
 from nodl.infer.cpp.syntax import children
-from nodl.infer.cpp.values import BOTTOM, Bound, Lambda, Map, Obj, Seq, Text, Value, unknown
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.declarations import Class, Function, Parameter
-    from nodl.infer.cpp.type_names import Type
+    from nodl.infer.cpp.reading.declarations import Class, Function, Parameter
+    from nodl.infer.cpp.reading.type_names import Type
 
 
 def construct(

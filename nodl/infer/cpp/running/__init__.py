@@ -1,0 +1,1 @@
+"""A program run in the abstract: values, variables, statements, expressions, calls, objects."""
