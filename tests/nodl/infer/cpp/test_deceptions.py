@@ -1,5 +1,4 @@
 """Programs that hide an interface as C++ allows: each is found or told as a gap, never passed over."""
-# ruff: noqa: E501
 
 from __future__ import annotations
 
@@ -45,7 +44,8 @@ HIDDEN = {
         'void go() { n_->template create_publisher<T>("a", 1); } rclcpp::Node * n_; };\n',
     ),
     "by curiously recurring templates": HEAD
-    + "template <typename D> struct Base : rclcpp::Node { Base() : rclcpp::Node(\"n\") { static_cast<D *>(this)->init(); } };\n"
+    + 'template <typename D> struct Base : rclcpp::Node { Base() : rclcpp::Node("n") { '
+    + "static_cast<D *>(this)->init(); } };\n"
     + f"struct D : Base<D> {{ void init() {{ {PUB} }} }};\nint main() {{ D d; }}\n",
     "in an operator": in_class(
         "Maker m; m(*this);", before=f"struct Maker {{ void operator()(rclcpp::Node & n) {{ n.{PUB} }} }};\n"
@@ -56,14 +56,21 @@ HIDDEN = {
     ),
     "in a nested lambda": in_class(f"auto f = [this]() {{ auto g = [this]() {{ {PUB} }}; g(); }}; f();"),
     "in a thread": in_class(f"std::thread t([this]() {{ {PUB} }}); t.detach();"),
-    "in a thread's method": in_class("t_ = std::thread(&Demo::work, this);", f"void work() {{ {PUB} }} std::thread t_;"),
+    "in a thread's method": in_class(
+        "t_ = std::thread(&Demo::work, this);", f"void work() {{ {PUB} }} std::thread t_;"
+    ),
     "in a default argument": in_class(
-        "go();", f"rclcpp::PublisherBase::SharedPtr made() {{ return {PUB} }}\n"
-        "void go(rclcpp::PublisherBase::SharedPtr p = nullptr) { if (!p) { p = made(); } }"
+        "go();",
+        f"rclcpp::PublisherBase::SharedPtr made() {{ return {PUB} }}\n"
+        "void go(rclcpp::PublisherBase::SharedPtr p = nullptr) { if (!p) { p = made(); } }",
     ),
     "behind a goto": in_class(f"goto there; there: {PUB}"),
-    "in a switch that falls through": in_class(f"switch (kind()) {{ case 1: case 2: {PUB} break; default: break; }}"),
-    "in a catch": in_class(f"try {{ risky(); }} catch (const std::exception & e) {{ {PUB} }}", "void risky() {}"),
+    "in a switch that falls through": in_class(
+        f"switch (kind()) {{ case 1: case 2: {PUB} break; default: break; }}"
+    ),
+    "in a catch": in_class(
+        f"try {{ risky(); }} catch (const std::exception & e) {{ {PUB} }}", "void risky() {}"
+    ),
     "in the condition of a loop": in_class(f"while (!{PUB[:-1]}) {{ }}"),
     "through a node in a container": HEAD
     + "int main() { std::map<std::string, rclcpp::Node::SharedPtr> nodes;\n"
@@ -75,14 +82,19 @@ HIDDEN = {
     + 'rclcpp::Node::SharedPtr make_it() { return std::make_shared<rclcpp::Node>("n"); }\n'
     + f"int main() {{ make_it()->{PUB} }}\n",
     "through a singleton": HEAD
-    + "struct S { static S & get() { static S s; return s; } rclcpp::Node::SharedPtr n = rclcpp::Node::make_shared(\"n\"); };\n"
+    + "struct S { static S & get() { static S s; return s; } rclcpp::Node::SharedPtr n = "
+    + 'rclcpp::Node::make_shared("n"); };\n'
     + f"int main() {{ S::get().n->{PUB} }}\n",
-    "by a member pointer": in_class("(this->*step_)();", f"void go() {{ {PUB} }} void (Demo::*step_)() = &Demo::go;"),
+    "by a member pointer": in_class(
+        "(this->*step_)();", f"void go() {{ {PUB} }} void (Demo::*step_)() = &Demo::go;"
+    ),
     "by std::invoke": in_class("std::invoke(&Demo::go, this);", f"void go() {{ {PUB} }}"),
     "by std::apply": in_class("std::apply([this](int) { " + PUB + " }, std::make_tuple(1));"),
     "by std::visit": in_class("std::variant<int> v; std::visit([this](auto) { " + PUB + " }, v);"),
     "through std::any": in_class(
-        "std::any x = std::function<void()>([this]() { " + PUB + " }); std::any_cast<std::function<void()>>(x)();"
+        "std::any x = std::function<void()>([this]() { "
+        + PUB
+        + " }); std::any_cast<std::function<void()>>(x)();"
     ),
     "by a second object that is made where nobody looks": in_class(
         'a_ = std::make_shared<H>("b"); std::tie(c_, std::ignore) = acme::pair(); a_->init(this); c_->init(this);',
@@ -92,35 +104,45 @@ HIDDEN = {
     ),
     "by an element that a container makes": in_class(
         "fill(all_);",
-        "template <typename T> void fill(std::list<T> & l) { l.emplace_back(\"a\", this); } std::list<H> all_;",
-        before="struct H { H(std::string t, rclcpp::Node * n) { n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
+        'template <typename T> void fill(std::list<T> & l) { l.emplace_back("a", this); } std::list<H> all_;',
+        before="struct H { H(std::string t, rclcpp::Node * n) { "
+        "n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
     ),
     "by an element of a list that is shared": in_class(
         "l_ = std::make_shared<std::list<H>>(); fill(*l_);",
-        "template <typename T> void fill(std::list<T> & l) { l.emplace_back(\"a\", this); } std::shared_ptr<std::list<H>> l_;",
-        before="struct H { H(std::string t, rclcpp::Node * n) { n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
+        'template <typename T> void fill(std::list<T> & l) { l.emplace_back("a", this); } '
+        "std::shared_ptr<std::list<H>> l_;",
+        before="struct H { H(std::string t, rclcpp::Node * n) { "
+        "n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
     ),
     "by an element of a type that is not known": in_class(
-        "l_.emplace_back(this);", "std::vector<acme::Thing> l_;",
+        "l_.emplace_back(this);",
+        "std::vector<acme::Thing> l_;",
     ),
-    "in the second overload": in_class("go(1); go(std::string{});", f"void go(int) {{}} void go(const std::string &) {{ {PUB} }}"),
+    "in the second overload": in_class(
+        "go(1); go(std::string{});", f"void go(int) {{}} void go(const std::string &) {{ {PUB} }}"
+    ),
     "behind an unknown macro": in_class(f"ACME_TRY({PUB[:-1]});"),
-    "in an anonymous namespace": in_class("go(*this);", before=f"namespace {{ void go(rclcpp::Node & n) {{ n.{PUB} }} }}\n"),
+    "in an anonymous namespace": in_class(
+        "go(*this);", before=f"namespace {{ void go(rclcpp::Node & n) {{ n.{PUB} }} }}\n"
+    ),
     "after a comma": in_class(f"int x = 0; x++, {PUB}"),
     "in a variadic template": in_class(
-        'each("a");', "template <typename... A> void each(A... names) { (create_publisher<std_msgs::msg::String>(names, 1), ...); }"
+        'each("a");',
+        "template <typename... A> void each(A... names) { (create_publisher<std_msgs::msg::String>(names, 1), ...); }",
     ),
     "in a timer callback's state": in_class(
         "t_ = create_wall_timer(1s, [this]() { step(); });",
         f"void step() {{ if (n_++ == 3) {{ {PUB} }} }} int n_ = 0; rclcpp::TimerBase::SharedPtr t_;",
     ),
     "in an inherited constructor": HEAD
-    + f'struct B : rclcpp::Node {{ B(std::string s) : Node(s) {{ {PUB} }} }};\nstruct D : B {{ using B::B; }};\n'
+    + f"struct B : rclcpp::Node {{ B(std::string s) : Node(s) {{ {PUB} }} }};\nstruct D : B {{ using B::B; }};\n"
     + 'int main() { D d("n"); }\n',
     "with the name in the second branch": in_class(
-        'std::string t = "b"; if (which()) { t = "a"; } create_publisher<std_msgs::msg::String>(t, 1);', "bool which();"
+        'std::string t = "b"; if (which()) { t = "a"; } create_publisher<std_msgs::msg::String>(t, 1);',
+        "bool which();",
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("source", HIDDEN.values(), ids=HIDDEN.keys())
@@ -130,8 +152,12 @@ def test_it_is_found_or_told(source: str, tmp_path: Path) -> None:
 
 
 FALSE = {
-    "a variable that is written again": in_class('std::string t = "x"; t = "a"; create_publisher<std_msgs::msg::String>(t, 1);'),
-    "a shadowed name": in_class('std::string t = "a"; { std::string u = "x"; } create_publisher<std_msgs::msg::String>(t, 1);'),
+    "a variable that is written again": in_class(
+        'std::string t = "x"; t = "a"; create_publisher<std_msgs::msg::String>(t, 1);'
+    ),
+    "a shadowed name": in_class(
+        'std::string t = "a"; { std::string u = "x"; } create_publisher<std_msgs::msg::String>(t, 1);'
+    ),
     "an argument of another instance": in_class(
         'Part p("a"); p.go(this);',
         before="struct Part { Part(std::string t) : t_(t) {} void go(rclcpp::Node * n) { "
@@ -153,7 +179,7 @@ FALSE = {
         "create_publisher<std_msgs::msg::String>(one::kTopic, 1);",
         before='namespace one { constexpr char kTopic[] = "a"; }\nnamespace two { constexpr char kTopic[] = "x"; }\n',
     ),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("source", FALSE.values(), ids=FALSE.keys())

@@ -1,5 +1,4 @@
 """What rclcpp and well-known libraries make when they are asked: each construct beside one that makes nothing."""
-# ruff: noqa: E501
 
 from __future__ import annotations
 
@@ -14,12 +13,18 @@ pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 TF = {("subscription", "/tf"), ("subscription", "/tf_static")}
 ROWS = {
     "a transform listener on the node": (
-        in_class("", "tf2_ros::Buffer b_{get_clock()}; tf2_ros::TransformListener l_{b_, this};"), TF,
+        in_class("", "tf2_ros::Buffer b_{get_clock()}; tf2_ros::TransformListener l_{b_, this};"),
+        TF,
     ),
-    "a transform broadcaster": (in_class("", "tf2_ros::TransformBroadcaster b_{*this};"), {("publisher", "/tf")}),
+    "a transform broadcaster": (
+        in_class("", "tf2_ros::TransformBroadcaster b_{*this};"),
+        {("publisher", "/tf")},
+    ),
     "a static broadcaster": (
-        in_class("b_ = std::make_shared<tf2_ros::StaticTransformBroadcaster>(this);",
-                 "std::shared_ptr<tf2_ros::StaticTransformBroadcaster> b_;"),
+        in_class(
+            "b_ = std::make_shared<tf2_ros::StaticTransformBroadcaster>(this);",
+            "std::shared_ptr<tf2_ros::StaticTransformBroadcaster> b_;",
+        ),
         {("publisher", "/tf_static")},
     ),
     "a buffer alone": (in_class("", "tf2_ros::Buffer b_{get_clock()};"), set()),
@@ -36,54 +41,87 @@ ROWS = {
         {("subscription", "image")},
     ),
     "a filter's subscriber that a callback of the options starts": (
-        in_class('rclcpp::PublisherOptions o; o.event_callbacks.matched_callback = [this](auto &) { s_.subscribe(this, "image"); }; '
-                 'create_publisher<sensor_msgs::msg::Image>("out", 1, o);', "message_filters::Subscriber<sensor_msgs::msg::Image> s_;"),
+        in_class(
+            "rclcpp::PublisherOptions o; o.event_callbacks.matched_callback = [this](auto &) { "
+            's_.subscribe(this, "image"); }; '
+            'create_publisher<sensor_msgs::msg::Image>("out", 1, o);',
+            "message_filters::Subscriber<sensor_msgs::msg::Image> s_;",
+        ),
         {("subscription", "image"), ("publisher", "out")},
     ),
     "a filter's subscriber that never subscribes": (
-        in_class("", "message_filters::Subscriber<sensor_msgs::msg::Image> s_;"), set(),
+        in_class("", "message_filters::Subscriber<sensor_msgs::msg::Image> s_;"),
+        set(),
     ),
     "diagnostics": (in_class("", "diagnostic_updater::Updater u_{this};"), {("publisher", "/diagnostics")}),
-    "a bond": (in_class("", 'bond::Bond b_{"bond", "id", shared_from_this()};'),
-               {("publisher", "bond"), ("subscription", "bond")}),
+    "a bond": (
+        in_class("", 'bond::Bond b_{"bond", "id", shared_from_this()};'),
+        {("publisher", "bond"), ("subscription", "bond")},
+    ),
     "an action server": (
-        in_class('rclcpp_action::create_server<example_interfaces::action::Fibonacci>(this, "fib", a, b, c);'),
+        in_class(
+            'rclcpp_action::create_server<example_interfaces::action::Fibonacci>(this, "fib", a, b, c);'
+        ),
         {("action_server", "fib")},
     ),
     "an action client with interfaces": (
-        in_class("rclcpp_action::create_client<example_interfaces::action::Fibonacci>(get_node_base_interface(), "
-                 'get_node_graph_interface(), get_node_logging_interface(), get_node_waitables_interface(), "fib");'),
+        in_class(
+            "rclcpp_action::create_client<example_interfaces::action::Fibonacci>(get_node_base_interface(), "
+            'get_node_graph_interface(), get_node_logging_interface(), get_node_waitables_interface(), "fib");'
+        ),
         {("action_client", "fib")},
     ),
-    "a generic publisher": (in_class('create_generic_publisher("a", "std_msgs/msg/String", 1);'), {("publisher", "a")}),
+    "a generic publisher": (
+        in_class('create_generic_publisher("a", "std_msgs/msg/String", 1);'),
+        {("publisher", "a")},
+    ),
     "a message that is waited for": (
         in_class('std_msgs::msg::String m; rclcpp::wait_for_message(m, shared_from_this(), "a");'),
         {("subscription", "a")},
     ),
     "a client of another node's parameters": (
-        in_class('c_ = std::make_shared<rclcpp::SyncParametersClient>(this, "other");', "rclcpp::SyncParametersClient::SharedPtr c_;"),
-        {("service_client", f"other/{name}") for name in (
-            "describe_parameters", "get_parameter_types", "get_parameters", "list_parameters", "set_parameters",
-            "set_parameters_atomically")},
+        in_class(
+            'c_ = std::make_shared<rclcpp::SyncParametersClient>(this, "other");',
+            "rclcpp::SyncParametersClient::SharedPtr c_;",
+        ),
+        {
+            ("service_client", f"other/{name}")
+            for name in (
+                "describe_parameters",
+                "get_parameter_types",
+                "get_parameters",
+                "list_parameters",
+                "set_parameters",
+                "set_parameters_atomically",
+            )
+        },
     ),
     "service introspection": (
-        in_class('s_ = create_service<std_srvs::srv::Empty>("s", cb); s_->configure_introspection(get_clock(), 1, state);',
-                 "rclcpp::Service<std_srvs::srv::Empty>::SharedPtr s_;"),
+        in_class(
+            's_ = create_service<std_srvs::srv::Empty>("s", cb); s_->configure_introspection(get_clock(), 1, state);',
+            "rclcpp::Service<std_srvs::srv::Empty>::SharedPtr s_;",
+        ),
         {("service_server", "s"), ("publisher", "s/_service_event")},
     ),
     "topic statistics of a subscription": (
-        in_class("rclcpp::SubscriptionOptions o; o.topic_stats_options.state = rclcpp::TopicStatisticsState::Enable; "
-                 'o.topic_stats_options.publish_topic = "stats"; create_subscription<std_msgs::msg::String>("a", 1, cb, o);'),
+        in_class(
+            "rclcpp::SubscriptionOptions o; o.topic_stats_options.state = rclcpp::TopicStatisticsState::Enable; "
+            'o.topic_stats_options.publish_topic = "stats"; create_subscription<std_msgs::msg::String>("a", 1, cb, o);'
+        ),
         {("subscription", "a"), ("publisher", "stats")},
     ),
     "a sub-node": (
-        in_class('auto n = create_sub_node("inner"); n->create_publisher<std_msgs::msg::String>("a", 1); '
-                 'n->create_publisher<std_msgs::msg::String>("/b", 1);'),
+        in_class(
+            'auto n = create_sub_node("inner"); n->create_publisher<std_msgs::msg::String>("a", 1); '
+            'n->create_publisher<std_msgs::msg::String>("/b", 1);'
+        ),
         {("publisher", "inner/a"), ("publisher", "/b")},
     ),
-    "its own name": (in_class('create_publisher<std_msgs::msg::String>(std::string(get_name()) + "/a", 1);'),
-                     {("publisher", "{node}/a")}),
-}  # fmt: skip
+    "its own name": (
+        in_class('create_publisher<std_msgs::msg::String>(std::string(get_name()) + "/a", 1);'),
+        {("publisher", "{node}/a")},
+    ),
+}
 
 
 @pytest.mark.parametrize(("source", "expected"), ROWS.values(), ids=ROWS.keys())
@@ -126,12 +164,28 @@ NAMES = {
     "a stream": ('std::stringstream s; s << "x" << 3; create_publisher<M>(s.str(), 1);', "x3"),
     "a number": ('create_publisher<M>("x" + std::to_string(2), 1);', "x2"),
     "a parameter": ('create_publisher<M>(declare_parameter<std::string>("p", "a"), 1);', "param:p"),
-    "a parameter without default": ('create_publisher<M>(declare_parameter<std::string>("p"), 1);', "param:p"),
-    "an output argument": ('std::string t; declare_parameter("p", "a"); get_parameter("p", t); create_publisher<M>(t, 1);', "param:p"),
-    "a parameter or a value": ('std::string t; get_parameter_or<std::string>("p", t, "a"); create_publisher<M>(t + "/x", 1);', "param:p/x"),
-    "a conversion": ('declare_parameter("p", "a"); create_publisher<M>(get_parameter("p").as_string(), 1);', "param:p"),
-    "what a switch chooses": ("std::string t; switch (K::B) { case K::A: t = \"x\"; break; case K::B: t = \"a\"; break; } create_publisher<M>(t, 1);", "a"),
-}  # fmt: skip
+    "a parameter without default": (
+        'create_publisher<M>(declare_parameter<std::string>("p"), 1);',
+        "param:p",
+    ),
+    "an output argument": (
+        'std::string t; declare_parameter("p", "a"); get_parameter("p", t); create_publisher<M>(t, 1);',
+        "param:p",
+    ),
+    "a parameter or a value": (
+        'std::string t; get_parameter_or<std::string>("p", t, "a"); create_publisher<M>(t + "/x", 1);',
+        "param:p/x",
+    ),
+    "a conversion": (
+        'declare_parameter("p", "a"); create_publisher<M>(get_parameter("p").as_string(), 1);',
+        "param:p",
+    ),
+    "what a switch chooses": (
+        'std::string t; switch (K::B) { case K::A: t = "x"; break; case K::B: t = "a"; '
+        "break; } create_publisher<M>(t, 1);",
+        "a",
+    ),
+}
 
 
 @pytest.mark.parametrize(("body", "expected"), NAMES.values(), ids=NAMES.keys())
