@@ -5,7 +5,10 @@
 ours    ``secure-launch --dry-run``'s evaluation as a whole process
 floor   a process that reads every file which was touched and parses it with lxml or PyYAML (libyaml), no more
 real    a process that resolves the same file with the sources of ros2/launch, starting nothing
-        (``REAL_LAUNCH_PYTHONPATH`` holds their PYTHONPATH; else "not available")
+        (``REAL_LAUNCH_PYTHONPATH`` holds their PYTHONPATH; else "not available"); it is spared rclpy, which is
+        stood in for
+
+Nav2's bring-up is resolved from the checkout of navigation2 that ``NAVIGATION2`` names, its programs stood in for.
 
 CPU seconds of the process and its children, the best of several runs (real: one). The import of launch_ros alone is
 in real's time for two nodes.
@@ -25,6 +28,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from bench.navigation2 import install_bringup  # noqa: E402
 from bench.synthetic_stack import write_nodes, write_stack  # noqa: E402
 
 RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 5
@@ -32,7 +36,7 @@ RUNS = int(sys.argv[1]) if len(sys.argv) > 1 else 5
 OURS = """
 import gc, sys
 from enclave_launch.evaluation.evaluate import evaluate
-result = evaluate(sys.argv[1])
+result = evaluate(sys.argv[1], [word.split(":=", 1) for word in sys.argv[2:]])
 print(len(result.processes), len(result.components))
 gc.freeze()  # ends as the command line does: without a last search for garbage
 """
@@ -55,7 +59,6 @@ if any(path.suffix == ".yaml" for path in paths):
 
 
 def main() -> None:
-    peer = os.environ.get("REAL_LAUNCH_PYTHONPATH")
     print(f"{'':28}{'ours':>9}{'floor':>9}{'real':>9}{'ours/floor':>12}{'real/ours':>11}")
     with tempfile.TemporaryDirectory() as folder:
         prefix = Path(folder)
@@ -67,34 +70,54 @@ def main() -> None:
         }
         for name, file in files.items():
             # Real launch takes minutes for the largest file, and its time grows faster than the file.
-            _row(name, file, prefix, None if name == "10,000 nodes" else peer)
+            _row(name, file, prefix, real=name != "10,000 nodes")
+    _nav2_rows()
     _print_memory()
 
 
-def _row(name: str, file: Path, prefix: Path, peer: str | None) -> None:
-    environment = {**os.environ, "AMENT_PREFIX_PATH": str(prefix), "PYTHONPATH": str(ROOT)}
+def _nav2_rows() -> None:
+    checkout = os.environ.get("NAVIGATION2")
+    if checkout is None:
+        print("nav2's bring-up: not available (NAVIGATION2 names no checkout)")
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        prefix = Path(folder)
+        file = install_bringup(Path(checkout), prefix)
+        for composed in (True, False):
+            name = f"nav2 bring-up, {'' if composed else 'not '}composed"
+            given = [f"use_composition:={composed}", f"map:={file.parent.parent}/maps/depot.yaml"]
+            _row(name, file, prefix, given)
+
+
+def _row(name: str, file: Path, prefix: Path, arguments: Sequence[str] = (), *, real: bool = True) -> None:
+    python_path = os.pathsep.join([str(ROOT), str(prefix / "python")])
+    environment = {**os.environ, "AMENT_PREFIX_PATH": str(prefix), "PYTHONPATH": python_path}
     touched = "\n".join(_touched(file, prefix))
-    ours = _best([sys.executable, "-c", OURS, str(file)], environment)
+    ours = _best([sys.executable, "-c", OURS, str(file), *arguments], environment)
     floor = _best([sys.executable, "-c", FLOOR], environment, touched)
+    peer = os.environ.get("REAL_LAUNCH_PYTHONPATH")
     line = f"{name:28}{ours:9.3f}{floor:9.3f}"
-    if peer is None:
+    if peer is None or not real:
         print(f"{line}{'-':>9}{ours / floor:12.1f}{'not available':>15}", flush=True)
         return
-    real = _real(file, {**environment, "PYTHONPATH": peer})
-    print(f"{line}{real:9.3f}{ours / floor:12.1f}{real / ours:11.1f}", flush=True)
+    environment["PYTHONPATH"] = os.pathsep.join([peer, str(prefix / "python")])
+    seconds = _real(file, environment, arguments)
+    print(f"{line}{seconds:9.3f}{ours / floor:12.1f}{seconds / ours:11.1f}", flush=True)
 
 
 def _touched(file: Path, prefix: Path) -> list[str]:
     """Every launch file and parameter file that a resolution of ``file`` opens."""
     if file.parent.parent.name == "many":
         return [str(file)]
+    if file.name == "bringup_launch.py":
+        return [str(file.parent.parent / "params" / "nav2_params.yaml")]
     share = prefix / "share"
     return [str(path) for pattern in ("*/launch/*.xml", "*/config/*.yaml") for path in share.glob(pattern)
             if path.parent.parent.name != "many"]  # fmt: skip
 
 
-def _real(file: Path, environment: dict[str, str]) -> float:
-    job = {"file": str(file), "arguments": [], "environment": {}, "folder": str(file.parent)}
+def _real(file: Path, environment: dict[str, str], arguments: Sequence[str]) -> float:
+    job = {"file": str(file), "arguments": list(arguments), "environment": {}, "folder": str(file.parent)}
     driver = ROOT / "tests" / "conformance" / "real_driver.py"
     return _best([sys.executable, "-W", "ignore", str(driver)], environment, json.dumps([job]), 1)
 

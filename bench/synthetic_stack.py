@@ -42,14 +42,14 @@ def write_stack(prefix: Path) -> Path:
     for area in AREAS:
         _write_area(prefix, area, nodes, components)
     includes = "".join(_include(f"{area}_launch", f"{area}.launch.xml") for area in AREAS)
-    top = _package(prefix, "stack_launch") / "launch" / "stack.launch.xml"
+    top = install_package(prefix, "stack_launch") / "launch" / "stack.launch.xml"
     top.write_text(f"<launch>\n{_arguments()}{includes}</launch>\n", encoding="utf-8")
     return top
 
 
 def write_nodes(prefix: Path, count: int) -> Path:
     """One file with ``count`` nodes, each with a parameter, a remap and a namespace."""
-    share = _package(prefix, "many", "node")
+    share = install_package(prefix, "many", "node")
     node = (
         '  <node pkg="many" exec="node" name="n{0}" namespace="area_$(var x)">\n'
         '    <param name="rate" value="{0}"/><remap from="in" to="/topic{0}"/>\n  </node>\n'
@@ -75,8 +75,8 @@ class _Budget:
 
 def _write_area(prefix: Path, area: str, nodes: _Budget, components: _Budget) -> None:
     package = f"{area}_launch"
-    share = _package(prefix, package)
-    _package(prefix, f"{area}_nodes", "node", "container")
+    share = install_package(prefix, package)
+    install_package(prefix, f"{area}_nodes", "node", "container")
     subsystems = [f"{area}_{number}" for number in range(SUBSYSTEMS)]
     includes = "".join(_include(package, f"{name}.launch.xml") for name in subsystems)
     body = (
@@ -163,7 +163,8 @@ def _include(package: str, file: str) -> str:
     return f'  <include file="$(find-pkg-share {package})/launch/{file}">\n{arguments}  </include>\n'
 
 
-def _package(prefix: Path, name: str, *executables: str) -> Path:
+def install_package(prefix: Path, name: str, *executables: str) -> Path:
+    """Install a package that holds ``executables`` and nothing else; returns its share folder."""
     index = prefix / "share" / "ament_index" / "resource_index" / "packages"
     index.mkdir(parents=True, exist_ok=True)
     (index / name).touch()
