@@ -19,6 +19,7 @@ from enclave_launch.options import SecurityOptions as SecurityOptions
 from enclave_launch.plan import LaunchPlan as LaunchPlan
 from enclave_launch.runtime.running_launch import RunningLaunch as RunningLaunch
 from enclave_launch.runtime.running_launch import RunningProcess as RunningProcess
+from enclave_launch.runtime.running_launch import endpoint_seen as endpoint_seen
 from enclave_launch.runtime.running_launch import printed as printed
 from enclave_launch.runtime.running_launch import started as started
 from enclave_launch.secured import ProvisionedLaunch as ProvisionedLaunch

@@ -101,12 +101,16 @@ class SecurityOptions:
 class RunSettings:
     """How to run. ``secrets``: environment variables that no process of the launch sees; ``log_limit``: bytes after
     which a log file becomes ``<name>.1`` and a new one is begun, ``None`` for never; ``deadline``: when to end it, as
-    ``expiry_watch.renewal_deadline`` gives it."""
+    ``expiry_watch.renewal_deadline`` gives it.
+
+    ``record``: every endpoint that a node makes, or is refused, is an event of the launch. ``None``: of secured
+    launches, whose refusals are explained, where that is possible. A ``companion`` of one's own takes its place."""
 
     noninteractive: bool = False
     debug: bool = False
     allow_late: bool = False
     secrets: frozenset[str] = frozenset()
     companion: LaunchCompanion | None = None
+    record: bool | None = None
     log_limit: int | None = None
     deadline: Deadline | None = None

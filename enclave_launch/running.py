@@ -6,6 +6,7 @@ The file is visited by a host that starts processes; what the user's code gave f
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
@@ -20,6 +21,7 @@ from enclave_launch.runtime.service import LaunchService, RunOptions, run_launch
 
 if TYPE_CHECKING:
     from enclave_launch.options import RunSettings
+    from enclave_launch.runtime.companion import LaunchCompanion
     from enclave_launch.runtime.running_launch import RunningLaunch
     from enclave_launch.runtime.warden_process import WardenProcess
     from enclave_launch.secured import ProvisionedLaunch
@@ -132,5 +134,26 @@ def _options(launch: Launch, settings: RunSettings) -> RunOptions:
         launch_configurations=source.launch_configurations,
         host_options=source.host_options,
         outcomes=source.outcomes,
-        companion=settings.companion,
+        companion=settings.companion or _recording(launch, settings),
     )
+
+
+def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
+    """Who records the launch; where it is secured, refusals are explained. A secured launch that nobody asked to
+    record goes on where that is not possible."""
+    secured = not isinstance(launch, _UNSECURED)
+    if settings.record is False or (settings.record is None and not secured):
+        return None
+    from enclave_launch.recording.denials import Explainer
+    from enclave_launch.recording.learning import new_run
+    from enclave_launch.recording.recording import Recording
+
+    source = _source(launch)
+    run = new_run(
+        source.launch_file,
+        source.host_options.distro or os.environ.get("ROS_DISTRO", ""),
+        "none",
+        secured=secured,
+    )
+    explainers = [] if isinstance(launch, _UNSECURED) else [Explainer(launch.plan)]
+    return Recording(run, explainers, optional=settings.record is None)

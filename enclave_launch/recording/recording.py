@@ -21,13 +21,14 @@ from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.recording.build import recorder_library
+from enclave_launch.recording.endpoint_events import EndpointEvents
 from enclave_launch.recording.environment import RECORD_VARIABLE, with_recorder
 from enclave_launch.recording.markers import Marked, MarkerRun
 from enclave_launch.recording.programs import look_at_command
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec
-from enclave_launch.runtime.run_events import ProcessExited, ProcessStarted, RunEvent
+from enclave_launch.runtime.run_events import LaunchOver, ProcessExited, ProcessStarted, RunEvent
 from nodl.record.assembly import Record
 from nodl.record.lines import Complaint, Line, LineReader, LoadedComponent, Run, StartedProcess, line_text
 
@@ -77,7 +78,7 @@ class Recording:
         self.unrecorded: list[Unrecorded] = []
         self.running: dict[int, float] = {}  # pid -> when it was started
         self.data = b""
-        self._listeners = tuple(listeners)
+        self._listeners: tuple[Listener, ...] = (EndpointEvents(), *listeners)
         self._markers = markers
         self._optional = optional
         self._processes: dict[str, ResolvedProcess] = {}
@@ -90,6 +91,10 @@ class Recording:
         self._launch: LaunchControl | None = None
 
     # LaunchCompanion
+
+    @property
+    def records(self) -> bool:
+        return self._folder is not None
 
     def opened(self, launch: LaunchControl) -> None:
         self._launch = launch
@@ -140,6 +145,9 @@ class Recording:
             self._write(_started(process, event.pid, self._marked.get(event.name)))
         elif isinstance(event, ProcessExited):
             self.running.pop(event.pid, None)
+        elif isinstance(event, LaunchOver) and self._folder is not None:
+            self._look_once_more()  # what is told now is heard before the end
+            self._tell(float("inf"))
         for listener in self._listeners:
             listener.happened(event)
 

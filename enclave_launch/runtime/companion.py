@@ -21,11 +21,19 @@ class LaunchControl(Protocol):
     def say(self, level: Level, message: str) -> None:
         """A line of the launch log."""
 
+    def tell(self, event: RunEvent) -> None:
+        """An event for all who watch the launch, the companion included."""
+
     def shut_down(self, reason: str) -> None: ...
 
 
 class LaunchCompanion(Protocol):
-    """``opened`` comes before the first process, ``closed`` after the last one has ended."""
+    """``opened`` comes before the first process, ``closed`` after the last one has ended. It hears of an event before
+    others do: what it tells when ``LaunchOver`` comes is still heard before that."""
+
+    @property
+    def records(self) -> bool:
+        """Once opened: will it tell endpoints as they are made?"""
 
     def opened(self, launch: LaunchControl) -> None:
         """:raises EnclaveLaunchError: it cannot go along, so nothing is started."""

@@ -6,12 +6,15 @@ from collections.abc import Callable
 from typing import Literal, NamedTuple
 
 from enclave_launch.process import ResolvedProcess
+from nodl.node_interface import EndpointKind
 
 
 class LaunchStarted(NamedTuple):
-    """Evaluation begins. ``log_directory``: where launch.log and the processes' own logs are."""
+    """Evaluation begins. ``log_directory``: where launch.log and the processes' own logs are; ``recorded``: endpoints
+    will be told as they are made."""
 
     log_directory: str
+    recorded: bool = False
 
 
 class ProcessPlanned(NamedTuple):
@@ -50,6 +53,39 @@ class ProcessOver(NamedTuple):
     failed: bool
 
 
+class Endpoint(NamedTuple):
+    """What a node asked rcl for. ``node`` and ``name`` are final, after all rules; ``written`` as the source has it.
+
+    ``component``: ``package/plugin`` of the composable node that asked, empty for nodes of the program itself. An
+    action is one endpoint.
+    """
+
+    node: str
+    kind: EndpointKind
+    name: str
+    written: str
+    type: str = ""
+    component: str = ""
+
+
+class EndpointCreated(NamedTuple):
+    """A node of the process has this endpoint now; ``pid`` as of ``ProcessStarted``. Only of a launch that is recorded
+    (``RunSettings.record``)."""
+
+    name: str
+    pid: int
+    endpoint: Endpoint
+
+
+class EndpointRefused(NamedTuple):
+    """It was asked for and not made: DDS refused it, or rcl its name. ``reason``: rcl's texts, first cause first."""
+
+    name: str
+    pid: int
+    endpoint: Endpoint
+    reason: tuple[str, ...]
+
+
 class LaunchFailed(NamedTuple):
     """Why the launch cannot go on; it is shutting down."""
 
@@ -69,6 +105,8 @@ RunEvent = (
     | ProcessOutput
     | ProcessExited
     | ProcessOver
+    | EndpointCreated
+    | EndpointRefused
     | LaunchFailed
     | LaunchOver
 )

@@ -22,6 +22,9 @@ from typing import Any, Literal, NamedTuple
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.run_events import (
+    Endpoint,
+    EndpointCreated,
+    LaunchStarted,
     Observer,
     ProcessExited,
     ProcessOutput,
@@ -31,6 +34,7 @@ from enclave_launch.runtime.run_events import (
     RunEvent,
 )
 from enclave_launch.runtime.service import LaunchService
+from nodl.node_interface import EndpointKind
 
 REMEMBERED_EVENTS = 10_000
 REMEMBERED_OUTPUT = 8 << 20  # bytes of output among them
@@ -43,7 +47,8 @@ class RunningProcess(NamedTuple):
     """One process as it is now.
 
     ``state``: ``waiting`` for its start or the next one, ``running``, or ``ended`` for good; ``pid`` and ``returncode``
-    of its latest life; ``starts`` counts its lives; ``output`` is the end of what it wrote, both streams.
+    of its latest life; ``starts`` counts its lives; ``output`` is the end of what it wrote, both streams; ``endpoints``
+    are those that its nodes made in its latest life, if the launch is recorded.
     """
 
     process: ResolvedProcess
@@ -53,6 +58,7 @@ class RunningProcess(NamedTuple):
     starts: int = 0
     failed: bool = False
     output: bytes = b""
+    endpoints: tuple[Endpoint, ...] = ()
 
     @property
     def name(self) -> str:
@@ -79,6 +85,25 @@ def printed(name: str, text: str = "") -> Condition:
     return holds
 
 
+def endpoint_seen(name: str, endpoint: str, *, kind: EndpointKind | None = None, node: str = "") -> Condition:
+    """A node of the process ``name`` has ``endpoint`` (its final name, ``/chatter``) now; ``kind`` and ``node``, its
+    full name, narrow it down. Needs a launch that is recorded: else asking raises ``RuntimeFailure``."""
+
+    def holds(launch: RunningLaunch) -> bool:
+        if not launch.is_recorded:
+            raise RuntimeFailure(
+                f"nobody sees whether {name} has {endpoint}: this launch is not recorded; start it with "
+                "RunSettings(record=True)"
+            )
+        process = launch.processes.get(name)
+        return process is not None and any(
+            each.name == endpoint and kind in (None, each.kind) and node in ("", each.node)
+            for each in process.endpoints
+        )
+
+    return holds
+
+
 # Runs a launch to its end, with who watches it and who gets its service; gives the exit status.
 Main = Callable[[Observer, Callable[[LaunchService], None]], Coroutine[Any, Any, int]]
 
@@ -93,6 +118,7 @@ class RunningLaunch:
         self._events: deque[RunEvent] = deque()
         self._first = 0  # number of the oldest event that is remembered
         self._output_remembered = 0  # bytes
+        self._recorded = False
         self._version = 0  # rises with each change
         self._exit_status: int | None = None
         self._error: BaseException | None = None
@@ -117,6 +143,11 @@ class RunningLaunch:
         return self._exit_status
 
     @property
+    def is_recorded(self) -> bool:
+        """Are endpoints told as they are made (``RunSettings.record``)?"""
+        return self._recorded
+
+    @property
     def warden_pid(self) -> int | None:
         """The process that all others of this launch hang on (``runtime.warden``); ``None`` before it is there."""
         return self._service.warden_pid if self._service is not None else None
@@ -134,8 +165,8 @@ class RunningLaunch:
         return self._exit_status
 
     def wait_until(self, condition: Condition, timeout: float | None = None) -> None:
-        """Until ``condition(self)`` holds: ``started(...)``, ``printed(...)`` or one of your own. It is asked whenever
-        something happened.
+        """Until ``condition(self)`` holds: ``started(...)``, ``printed(...)``, ``endpoint_seen(...)``, or one of your
+        own. It is asked whenever something happened.
 
         :raises TimeoutError: after ``timeout`` seconds.
         :raises RuntimeFailure: the launch ended before.
@@ -221,7 +252,9 @@ class RunningLaunch:
     def _follow(self, event: RunEvent) -> None:
         if isinstance(event, ProcessPlanned):
             self._processes[event.process.process_name] = RunningProcess(event.process)
-        elif isinstance(event, (ProcessStarted, ProcessOutput, ProcessExited, ProcessOver)):
+        elif isinstance(event, LaunchStarted):
+            self._recorded = event.recorded
+        elif isinstance(event, (ProcessStarted, ProcessOutput, ProcessExited, ProcessOver, EndpointCreated)):
             self._processes[event.name] = _after(self._processes[event.name], event)
 
     def _wait_for(self, condition: Callable[[], bool], timeout: float | None, what: str) -> None:
@@ -242,10 +275,16 @@ def _output_of(event: RunEvent) -> int:
 
 
 def _after(
-    process: RunningProcess, event: ProcessStarted | ProcessOutput | ProcessExited | ProcessOver
+    process: RunningProcess,
+    event: ProcessStarted | ProcessOutput | ProcessExited | ProcessOver | EndpointCreated,
 ) -> RunningProcess:
     if isinstance(event, ProcessStarted):
-        return process._replace(state="running", pid=event.pid, returncode=None, starts=process.starts + 1)
+        return process._replace(
+            state="running", pid=event.pid, returncode=None, starts=process.starts + 1, endpoints=()
+        )
+    if isinstance(event, EndpointCreated):
+        late = event.pid != process.pid  # of a life that is over
+        return process if late else process._replace(endpoints=(*process.endpoints, event.endpoint))
     if isinstance(event, ProcessOutput):
         return process._replace(output=(process.output + event.data)[-TAIL:])
     if isinstance(event, ProcessExited):

@@ -201,6 +201,10 @@ class LaunchService:
         """A line of the launch log, for a companion."""
         self._say(level, message)
 
+    def tell(self, event: RunEvent) -> None:
+        """An event that a companion has seen."""
+        self._observe(event)
+
     def on_signal(self, number: Signals) -> None:
         if number is not SIGINT:
             self._say("ERROR", f"received {number.name}, shutting down")
@@ -220,7 +224,9 @@ class LaunchService:
         self._say("INFO", f"Default logging verbosity is set to {'DEBUG' if self._options.debug else 'INFO'}")
         for notice in self._options.notices:
             self._say("WARNING", notice)
-        self._observe(LaunchStarted(str(self._log.directory)))
+        companion = self._options.companion
+        recorded = companion is not None and companion.records
+        self._observe(LaunchStarted(str(self._log.directory), recorded))
         self._look_at_clock()
         with STAGE.turn(self._actor):
             self._begin()

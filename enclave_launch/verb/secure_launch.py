@@ -273,8 +273,6 @@ def _launch(
             *expiry_notices(launch, options.warn_expiry),
         )
     )
-    if companion is None and not options.no_explain_denials:
-        companion = _explainer(plan)
     deadline = _deadline(launch) if options.restart_expiring else None
     status = run(launch, options=_run_settings(options, companion, deadline))
     return None if deadline is not None and deadline.reached else status
@@ -285,16 +283,6 @@ def _deadline(launch: ProvisionedLaunch) -> Deadline | None:
     from keystore.formats.validity import utc_now
 
     return renewal_deadline(launch, utc_now())
-
-
-def _explainer(plan: LaunchPlan) -> LaunchCompanion:
-    """Who tells why DDS refused something; the launch goes on where that is not possible."""
-    from enclave_launch.recording.denials import Explainer
-    from enclave_launch.recording.learning import new_run
-    from enclave_launch.recording.recording import Recording
-
-    run = new_run(plan.launch_file, plan.distro, "none", secured=True)
-    return Recording(run, [Explainer(plan)], optional=True)
 
 
 def _check_before_keys_are_made(plan: LaunchPlan) -> None:
@@ -325,6 +313,7 @@ def _run_settings(
         allow_late=options.allow_late,
         secrets=secrets,
         companion=companion,
+        record=False if options.no_explain_denials else None,
         log_limit=options.log_limit,
         deadline=deadline,
     )

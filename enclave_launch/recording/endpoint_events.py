@@ -1,0 +1,54 @@
+"""Recorded endpoints as events of the launch, each with the process and component that asked for it.
+
+Listens to a recording and tells the launch; what an endpoint is says ``nodl.record.asked``.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from enclave_launch.runtime.companion import LaunchControl
+from enclave_launch.runtime.run_events import Endpoint, EndpointCreated, EndpointRefused, RunEvent
+from nodl.record.asked import Asked, asked_endpoint
+from nodl.record.assembly import RecordedNode
+from nodl.record.lines import EndpointMade, Line
+
+if TYPE_CHECKING:
+    from enclave_launch.recording.recording import Recording
+
+
+class EndpointEvents:
+    """A listener. Endpoints of processes that the launch did not start are passed over."""
+
+    def __init__(self) -> None:
+        self._launch: LaunchControl | None = None
+        self._recording: Recording | None = None
+
+    def opened(self, launch: LaunchControl, recording: Recording) -> None:
+        self._launch, self._recording = launch, recording
+
+    def added(self, line: Line) -> None:
+        if not isinstance(line, EndpointMade) or self._launch is None or self._recording is None:
+            return
+        process, node = self._recording.record.node_of(line)
+        asked = asked_endpoint(process, node, line)
+        if asked is None or process.started is None:
+            return
+        name, pid, endpoint = process.started.process, process.started.pid, _endpoint(asked, node, line)
+        if asked.granted:
+            self._launch.tell(EndpointCreated(name, pid, endpoint))
+        else:
+            self._launch.tell(EndpointRefused(name, pid, endpoint, asked.error))
+
+    def happened(self, event: RunEvent) -> None: ...
+
+    def looked(self) -> None: ...
+
+    def closed(self) -> None: ...
+
+
+def _endpoint(asked: Asked, node: RecordedNode, line: EndpointMade) -> Endpoint:
+    component = f"{node.component.package}/{node.component.plugin}" if node.component else ""
+    return Endpoint(
+        node.fqn or line.fqn, asked.kind, asked.final or asked.written, asked.written, asked.type, component
+    )
