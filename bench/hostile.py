@@ -14,7 +14,7 @@ from enclave_launch.boundary.shell_words import split_words
 from enclave_launch.boundary.terminal import json_text, printable_lines
 from enclave_launch.boundary.yaml_nodes import compose
 from enclave_launch.frontend.substitution_grammar import parse_template
-from enclave_launch.frontend.xml_tree import parse_xml
+from enclave_launch.frontend.xml_tree import parse_launch_xml
 from enclave_launch.frontend.yaml_scalar import load as load_value
 from enclave_launch.frontend.yaml_tree import parse_yaml
 from enclave_launch.ros_rules.rcl_parameters import section_applies
@@ -45,9 +45,9 @@ CASES: list[Case] = [
     ("template: many calls", parse_template, lambda n: "$(var x)" * n, 10_000),
     ("template: never closed", parse_template, lambda n: "$(a" + " b" * n, 50_000),
     ("template: quotes", parse_template, lambda n: "$(a '" + "(" * n + "')", 100_000),
-    ("XML: attributes", parse_xml, lambda n: "<a " + " ".join(f'b{i}="c"' for i in range(n)) + "/>", 50_000),
-    ("XML: entities", parse_xml, lambda n: f"{ENTITY}<a b='{'&e;' * n}'/>", 20_000),
-    ("XML: elements in elements", parse_xml, lambda n: "<a>" * n, 50_000),
+    ("XML: attributes", parse_launch_xml, lambda n: "<a " + " ".join(f'b{i}="c"' for i in range(n)) + "/>", 50_000),
+    ("XML: entities", parse_launch_xml, lambda n: f"{ENTITY}<a b='{'&e;' * n}'/>", 20_000),
+    ("XML: elements in elements", parse_launch_xml, lambda n: "<a>" * n, 50_000),
     ("YAML: flow", parse_yaml, lambda n: "[" + "1," * n + "]", 8_000),
     ("YAML: depth", parse_yaml, lambda n: "[" * n, 50_000),
     ("YAML: tabs, the slow scanner", parse_yaml, lambda n: "- 'a\tb'\n" * n, 3_000),

@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from enclave_launch.admission.domains import domain_of
-from enclave_launch.enclave import Reason
+from enclave_launch.enclave import AssignmentReason
 from enclave_launch.plan import PlannedProcess
 from keystore.formats.domains import Domains
 
@@ -40,7 +40,7 @@ def enclave_arguments(planned: PlannedProcess) -> tuple[str, ...]:
     """What to append to the command line of a node; empty for executables and where the user already chose."""
     if planned.enclave is None or planned.process.kind == "executable":
         return ()
-    if planned.enclave.reason is Reason.ARGUMENT:
+    if planned.enclave.reason is AssignmentReason.ARGUMENT:
         return ()
     return ("--enclave", planned.enclave.path)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from enclave_launch.enclave import EnclaveScope, Reason, assign_enclave
+from enclave_launch.enclave import AssignmentReason, EnclaveScope, assign_enclave
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import EnclaveRequest, ProcessKind, ResolvedProcess
 from enclave_launch.source_location import SourceLocation
@@ -21,15 +21,23 @@ def process(
 
 
 CASES = {
-    "no attribute, nothing pushed: the root": (EnclaveRequest(), "/", Reason.ROOT),
-    "no attribute below a pushed namespace": (EnclaveRequest(scope="/foo"), "/foo", Reason.SCOPE),
-    "relative below the pushed namespace": (EnclaveRequest("bar", "/foo"), "/foo/bar", Reason.RELATIVE),
-    "relative with nothing pushed": (EnclaveRequest("bar"), "/bar", Reason.RELATIVE),
-    "relative of two parts": (EnclaveRequest("a/b", "/foo"), "/foo/a/b", Reason.RELATIVE),
-    "absolute ignores what was pushed": (EnclaveRequest("/bar", "/foo"), "/bar", Reason.ABSOLUTE),
-    "absolute root": (EnclaveRequest("/", "/foo"), "/", Reason.ABSOLUTE),
-    "relative below the pushed root": (EnclaveRequest("bar", "/"), "/bar", Reason.RELATIVE),
-    "the user's own --enclave wins": (EnclaveRequest("bar", "/foo", "/mine"), "/mine", Reason.ARGUMENT),
+    "no attribute, nothing pushed: the root": (EnclaveRequest(), "/", AssignmentReason.ROOT),
+    "no attribute below a pushed namespace": (EnclaveRequest(scope="/foo"), "/foo", AssignmentReason.SCOPE),
+    "relative below the pushed namespace": (
+        EnclaveRequest("bar", "/foo"),
+        "/foo/bar",
+        AssignmentReason.RELATIVE,
+    ),
+    "relative with nothing pushed": (EnclaveRequest("bar"), "/bar", AssignmentReason.RELATIVE),
+    "relative of two parts": (EnclaveRequest("a/b", "/foo"), "/foo/a/b", AssignmentReason.RELATIVE),
+    "absolute ignores what was pushed": (EnclaveRequest("/bar", "/foo"), "/bar", AssignmentReason.ABSOLUTE),
+    "absolute root": (EnclaveRequest("/", "/foo"), "/", AssignmentReason.ABSOLUTE),
+    "relative below the pushed root": (EnclaveRequest("bar", "/"), "/bar", AssignmentReason.RELATIVE),
+    "the user's own --enclave wins": (
+        EnclaveRequest("bar", "/foo", "/mine"),
+        "/mine",
+        AssignmentReason.ARGUMENT,
+    ),
 }
 
 

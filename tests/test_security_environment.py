@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.enclave import EnclaveAssignment, Reason
+from enclave_launch.enclave import AssignmentReason, EnclaveAssignment
 from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlannedProcess
 from enclave_launch.process import EnclaveRequest, ProcessKind, ResolvedProcess
@@ -41,7 +41,9 @@ def planned(kind: ProcessKind, enclave: str | None) -> PlannedProcess:
     process = ResolvedProcess(
         1, kind, None, "x", "x-1", None, None, None, ("x",), (), {}, {}, EnclaveRequest(), SourceLocation("a")
     )
-    return PlannedProcess(process, EnclaveAssignment(enclave, Reason.ABSOLUTE) if enclave else None, ())
+    return PlannedProcess(
+        process, EnclaveAssignment(enclave, AssignmentReason.ABSOLUTE) if enclave else None, ()
+    )
 
 
 @pytest.mark.parametrize("strategy", ["Enforce", "Permissive"])

@@ -1,5 +1,10 @@
 """Which enclave each process runs in, and why."""
 
-from enclave_launch.enclave.assignment import EnclaveAssignment, EnclaveScope, Reason, assign_enclave
+from enclave_launch.enclave.assignment import (
+    AssignmentReason,
+    EnclaveAssignment,
+    EnclaveScope,
+    assign_enclave,
+)
 
-__all__ = ["EnclaveAssignment", "EnclaveScope", "Reason", "assign_enclave"]
+__all__ = ["AssignmentReason", "EnclaveAssignment", "EnclaveScope", "assign_enclave"]

@@ -39,7 +39,7 @@ class EnclaveScope(str, Enum):
     LAUNCH = "launch"
 
 
-class Reason(str, Enum):
+class AssignmentReason(str, Enum):
     """Why a process has its enclave; the value is the text shown in the tree."""
 
     ARGUMENT = "--enclave in its own ROS arguments"
@@ -57,7 +57,7 @@ class EnclaveAssignment(NamedTuple):
     ``too_deep`` says why no certificate can be made for it."""
 
     path: str
-    reason: Reason
+    reason: AssignmentReason
     scope: str = "/"
     too_deep: str = ""
 
@@ -98,7 +98,7 @@ def _unchecked(
 ) -> EnclaveAssignment | None:
     request = process.enclave
     if request.argument is not None:
-        return EnclaveAssignment(request.argument, Reason.ARGUMENT)
+        return EnclaveAssignment(request.argument, AssignmentReason.ARGUMENT)
     if request.attribute is not None:
         return _from_attribute(request, request.attribute)
     if process.kind == "executable":
@@ -108,7 +108,7 @@ def _unchecked(
 
 def _from_attribute(request: EnclaveRequest, attribute: str) -> EnclaveAssignment:
     base = request.scope or "/"
-    reason = Reason.ABSOLUTE if attribute.startswith("/") else Reason.RELATIVE
+    reason = AssignmentReason.ABSOLUTE if attribute.startswith("/") else AssignmentReason.RELATIVE
     return EnclaveAssignment(join_enclave(base, attribute), reason, base)
 
 
@@ -116,13 +116,13 @@ def _default(process: ResolvedProcess, scope: EnclaveScope, default_name: str | 
     pushed = process.enclave.scope
     base = pushed or "/"
     if scope is EnclaveScope.LAUNCH:
-        return EnclaveAssignment("/", Reason.LAUNCH)
+        return EnclaveAssignment("/", AssignmentReason.LAUNCH)
     if scope is EnclaveScope.PROCESS:
         label = process.process_name.replace("-", "_").replace(".", "_")
-        return EnclaveAssignment(join_enclave(base, label), Reason.PROCESS_NAME, base)
+        return EnclaveAssignment(join_enclave(base, label), AssignmentReason.PROCESS_NAME, base)
     if scope is EnclaveScope.NODE:
-        return EnclaveAssignment(final_fqn(process, default_name), Reason.NODE_NAME)
-    return EnclaveAssignment(base, Reason.SCOPE if pushed else Reason.ROOT, base)
+        return EnclaveAssignment(final_fqn(process, default_name), AssignmentReason.NODE_NAME)
+    return EnclaveAssignment(base, AssignmentReason.SCOPE if pushed else AssignmentReason.ROOT, base)
 
 
 def final_fqn(process: ResolvedProcess, default_name: str | None) -> str:

@@ -47,7 +47,7 @@ class XmlElement:
         return len(self.children)
 
 
-def parse_xml(text: str) -> XmlElement:
+def parse_launch_xml(text: str) -> XmlElement:
     """Text -> root element.
 
     Raises ``xml.etree.ElementTree.ParseError`` with ElementTree's message and position, or ``RefusedXml``.

@@ -16,7 +16,7 @@ from enclave_launch.interfaces.situation import parameters_of_node
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedProcess
 from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
-from enclave_launch.ros_rules.ros_arguments import ParameterFile, parse_ros_arguments
+from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, parse_ros_arguments
 from nodl.dependence import Launched, Spawned
 
 _MANAGER = ("-c", "--controller-manager")
@@ -59,7 +59,7 @@ def _spawned(process: ResolvedProcess) -> Iterator[Spawned]:
     if not namespace.startswith("/"):
         namespace = ""
     manager = ([*_values(options, _MANAGER), "controller_manager"])[0]
-    files = [ParameterFile(file) for file in _values(options, _FILES)]
+    files = [ParameterFileArgument(file) for file in _values(options, _FILES)]
     rules = parse_ros_arguments(["--ros-args", *_words(_values(options, _ROS_ARGUMENTS))]).remaps
     for name in (*names, *_values(options, _NAME)):
         tokens = [token for token in (*namespace.split("/"), name) if token]

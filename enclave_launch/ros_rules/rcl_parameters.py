@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from enclave_launch.boundary.files import read_text
 from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
+from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 
 Section = Mapping[str, ParameterValue]
 
@@ -61,7 +61,7 @@ _KINDS: tuple[type, ...] = (bool, int, float, str)
 
 def resolve_parameters(
     fqn_tokens: Sequence[str | None],
-    sources: Iterable[ParameterFile | ParameterRule],
+    sources: Iterable[ParameterFileArgument | ParameterRule],
     generated: Generated = lambda path: None,
     directory: str | None = None,
 ) -> ResolvedParameters:
@@ -89,7 +89,7 @@ def resolve_parameters(
 
 
 def _sections_of(
-    source: ParameterFile | ParameterRule, generated: Generated, directory: str
+    source: ParameterFileArgument | ParameterRule, generated: Generated, directory: str
 ) -> Mapping[str, Section]:
     if isinstance(source, ParameterRule):
         value = _parse_value(source.value)

@@ -21,7 +21,7 @@ _OTHER_WITH_VALUE = ("--log-level", "--log-config-file", "--log-file-name")
 _WITH_VALUE = frozenset((*_REMAP, *_PARAMETER, *_PARAMETER_FILE, *_ENCLAVE, *_OTHER_WITH_VALUE))
 
 
-class ParameterFile(NamedTuple):
+class ParameterFileArgument(NamedTuple):
     """``--params-file PATH``."""
 
     path: str
@@ -39,20 +39,20 @@ class RosArguments(NamedTuple):
     """In command-line order. Of remap rules the first match wins, of parameters and enclaves the last."""
 
     remaps: tuple[str, ...] = ()
-    parameters: tuple[ParameterFile | ParameterRule, ...] = ()
+    parameters: tuple[ParameterFileArgument | ParameterRule, ...] = ()
     enclave: str | None = None
 
 
 def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
     """Read the words after the executable. What rcl would refuse is skipped: the process says so itself."""
     remaps: list[str] = []
-    parameters: list[ParameterFile | ParameterRule] = []
+    parameters: list[ParameterFileArgument | ParameterRule] = []
     enclave: str | None = None
     for flag, value in _flags(arguments):
         if flag in _REMAP:
             remaps.append(value)
         elif flag in _PARAMETER_FILE:
-            parameters.append(ParameterFile(value))
+            parameters.append(ParameterFileArgument(value))
         elif flag in _ENCLAVE:
             enclave = value
         elif flag in _PARAMETER and ":=" in value:

@@ -11,7 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.frontend.xml_tree import MAX_ENTITY_LENGTH, MAX_NESTING, RefusedXml, XmlElement, parse_xml
+from enclave_launch.frontend.xml_tree import (
+    MAX_ENTITY_LENGTH,
+    MAX_NESTING,
+    RefusedXml,
+    XmlElement,
+    parse_launch_xml,
+)
 
 
 def shape(element: XmlElement | ET.Element) -> tuple[object, ...]:
@@ -19,13 +25,13 @@ def shape(element: XmlElement | ET.Element) -> tuple[object, ...]:
 
 
 def test_elements_know_their_lines() -> None:
-    root = parse_xml('<launch>\n  <arg\n    name="a"/>\n\n  <group><node/></group>\n</launch>')
+    root = parse_launch_xml('<launch>\n  <arg\n    name="a"/>\n\n  <group><node/></group>\n</launch>')
     assert [(child.tag, child.sourceline) for child in root] == [("arg", 2), ("group", 5)]
     assert root.children[1].children[0].sourceline == 5
 
 
 def test_lines_beyond_65535_are_right() -> None:
-    assert parse_xml("<launch>" + "\n" * 70_000 + "<arg/></launch>").children[0].sourceline == 70_001
+    assert parse_launch_xml("<launch>" + "\n" * 70_000 + "<arg/></launch>").children[0].sourceline == 70_001
 
 
 AS_ELEMENTTREE = {
@@ -45,7 +51,7 @@ AS_ELEMENTTREE = {
 
 @pytest.mark.parametrize("text", AS_ELEMENTTREE.values(), ids=AS_ELEMENTTREE.keys())
 def test_same_elements_as_elementtree(text: str) -> None:
-    assert shape(parse_xml(text)) == shape(ET.parse(io.StringIO(text)).getroot())
+    assert shape(parse_launch_xml(text)) == shape(ET.parse(io.StringIO(text)).getroot())
 
 
 MALFORMED = {
@@ -70,7 +76,7 @@ def test_malformed_text_has_elementtrees_error_and_position(text: str) -> None:
     with pytest.raises(ET.ParseError) as theirs:
         ET.parse(io.StringIO(text))
     with pytest.raises(ET.ParseError) as ours:
-        parse_xml(text)
+        parse_launch_xml(text)
     assert str(ours.value) == str(theirs.value)
     assert ours.value.position == theirs.value.position
     assert ours.value.code == theirs.value.code
@@ -80,7 +86,7 @@ def test_an_external_entity_is_refused_and_not_read(tmp_path: Path) -> None:
     secret = tmp_path / "secret"
     secret.write_text("do not leak")
     with pytest.raises(RefusedXml, match="external: nothing outside the file is read") as caught:
-        parse_xml(f'<!DOCTYPE a [\n<!ENTITY e SYSTEM "file://{secret}">]><a b="1">&e;</a>')
+        parse_launch_xml(f'<!DOCTYPE a [\n<!ENTITY e SYSTEM "file://{secret}">]><a b="1">&e;</a>')
     assert caught.value.line == 2
     assert "do not leak" not in str(caught.value)
 
@@ -88,34 +94,34 @@ def test_an_external_entity_is_refused_and_not_read(tmp_path: Path) -> None:
 def test_billion_laughs_end_in_an_error() -> None:
     entities = '<!ENTITY l0 "lol">' + "".join(f'<!ENTITY l{i} "{f"&l{i - 1};" * 10}">' for i in range(1, 10))
     with pytest.raises(RefusedXml, match="entity 'l2' has more than 256 characters"):
-        parse_xml(f"<!DOCTYPE a [{entities}]><a>&l9;</a>")
+        parse_launch_xml(f"<!DOCTYPE a [{entities}]><a>&l9;</a>")
 
 
 def test_a_long_entity_is_refused() -> None:
-    parse_xml(f'<!DOCTYPE a [<!ENTITY e "{"x" * MAX_ENTITY_LENGTH}">]><a b="&e;"/>')
+    parse_launch_xml(f'<!DOCTYPE a [<!ENTITY e "{"x" * MAX_ENTITY_LENGTH}">]><a b="&e;"/>')
     with pytest.raises(RefusedXml, match=f"more than {MAX_ENTITY_LENGTH} characters"):
-        parse_xml(f'<!DOCTYPE a [<!ENTITY e "{"x" * (MAX_ENTITY_LENGTH + 1)}">]><a b="&e;"/>')
+        parse_launch_xml(f'<!DOCTYPE a [<!ENTITY e "{"x" * (MAX_ENTITY_LENGTH + 1)}">]><a b="&e;"/>')
 
 
 def test_parameter_entities_are_refused() -> None:
     with pytest.raises(RefusedXml, match="entity 'p' is more than plain text"):
-        parse_xml('<!DOCTYPE a [<!ENTITY % p "x">%p;]><a/>')
+        parse_launch_xml('<!DOCTYPE a [<!ENTITY % p "x">%p;]><a/>')
 
 
 def test_deep_nesting_is_refused() -> None:
-    parse_xml("<a>" * (MAX_NESTING - 1) + "</a>" * (MAX_NESTING - 1))
+    parse_launch_xml("<a>" * (MAX_NESTING - 1) + "</a>" * (MAX_NESTING - 1))
     with pytest.raises(RefusedXml, match=f"nested more than {MAX_NESTING} deep"):
-        parse_xml("<a>" * 100_000)
+        parse_launch_xml("<a>" * 100_000)
 
 
 def test_a_huge_attribute_is_fine() -> None:
-    assert len(parse_xml(f'<a b="{"x" * 20_000_000}"/>').attrib["b"]) == 20_000_000
+    assert len(parse_launch_xml(f'<a b="{"x" * 20_000_000}"/>').attrib["b"]) == 20_000_000
 
 
 @given(st.text())
 def test_any_text_parses_or_is_an_error(text: str) -> None:
     with contextlib.suppress(ET.ParseError, RefusedXml):
-        parse_xml(text)
+        parse_launch_xml(text)
 
 
 NAMES = st.sampled_from(["launch", "node", "arg"])
@@ -138,4 +144,4 @@ ELEMENTS = st.recursive(
 
 @given(ELEMENTS)
 def test_what_elementtree_writes_is_read_back(element: ET.Element) -> None:
-    assert shape(parse_xml(ET.tostring(element, encoding="unicode"))) == shape(element)
+    assert shape(parse_launch_xml(ET.tostring(element, encoding="unicode"))) == shape(element)

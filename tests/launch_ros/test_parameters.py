@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.process import Evaluation
 from enclave_launch.ros_rules.rcl_parameters import as_rcl_reads, resolve_parameters
-from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule, parse_ros_arguments
+from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule, parse_ros_arguments
 
 Evaluate = Callable[..., Evaluation]
 
@@ -112,7 +112,7 @@ def test_a_file_that_cannot_be_read_is_never_nothing(tmp_path: Path, text: str |
     if text is not None:
         (tmp_path / "a.yaml").write_text(text)
     found = resolve_parameters(
-        ["n"], [ParameterRule("p", "1"), ParameterFile("a.yaml")], directory=str(tmp_path)
+        ["n"], [ParameterRule("p", "1"), ParameterFileArgument("a.yaml")], directory=str(tmp_path)
     )
     assert found.values == {"p": 1}
     ((path, why),) = found.unread
@@ -121,7 +121,9 @@ def test_a_file_that_cannot_be_read_is_never_nothing(tmp_path: Path, text: str |
 
 def test_a_relative_file_is_read_where_the_process_runs(tmp_path: Path) -> None:
     (tmp_path / "a.yaml").write_text("/**: {ros__parameters: {x: 3}}")
-    assert resolve_parameters(["n"], [ParameterFile("a.yaml")], directory=str(tmp_path)).values == {"x": 3}
+    assert resolve_parameters(["n"], [ParameterFileArgument("a.yaml")], directory=str(tmp_path)).values == {
+        "x": 3
+    }
 
 
 def test_a_file_that_changes_is_read_again(tmp_path: Path) -> None:

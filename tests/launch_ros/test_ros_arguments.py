@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from enclave_launch.ros_rules.ros_arguments import (
-    ParameterFile,
+    ParameterFileArgument,
     ParameterRule,
     RosArguments,
     parse_ros_arguments,
@@ -36,7 +36,11 @@ from enclave_launch.ros_rules.ros_arguments import (
         (
             "--ros-args -p a:=1 --params-file f.yaml --param n:b:=x:=y",
             RosArguments(
-                parameters=(ParameterRule("a", "1"), ParameterFile("f.yaml"), ParameterRule("b", "x:=y", "n"))
+                parameters=(
+                    ParameterRule("a", "1"),
+                    ParameterFileArgument("f.yaml"),
+                    ParameterRule("b", "x:=y", "n"),
+                )
             ),
         ),
         ("--ros-args -p nothing", RosArguments()),

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.parameters.types import SomeParameters
     from enclave_launch.description.remap_rules import SomeRemapRules
     from enclave_launch.description.substitution import SomeSubstitutionsType
-    from enclave_launch.source_location import SourceLocation
+    from enclave_launch.process import ResolvedProcess
 
 
 class RosSpecificArgument(Substitution):
@@ -202,23 +202,23 @@ class Node(ExecuteProcess):
             warn_about_repeats(context, self.node_name, self.name)
         return actions
 
-    def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
-        fields = super().resolved_fields(context)
-        place: SourceLocation = fields["location"]
+    def resolve(self, context: LaunchContext) -> ResolvedProcess:
+        process = super().resolve(context)
         sources = self.ros_arguments().parameters
-        parameters = self.__parameters.resolve(self.__name_tokens(), sources, fields["cwd"])
-        return fields | {
-            "kind": self.process_kind,
-            "package": None if self.__package is None else _performed(context, self.__package),
-            "executable": _performed(context, self.__executable),
-            "name": self.__expanded_name,
-            "namespace": self.__expanded_namespace,
-            "fqn": self.node_name,
-            "remaps": tuple([placed(rule, place) for rule in self.__expanded_remappings or ()]),
-            "parameters": parameters.values,
-            "unread_parameter_files": parameters.unread,
-            "parameter_files": self.__parameters.written_files(context),
-        }
+        parameters = self.__parameters.resolve(self.__name_tokens(), sources, process.cwd)
+        rules = [placed(rule, process.location) for rule in self.__expanded_remappings or ()]
+        return process._replace(
+            kind=self.process_kind,
+            package=None if self.__package is None else _performed(context, self.__package),
+            executable=_performed(context, self.__executable),
+            name=self.__expanded_name,
+            namespace=self.__expanded_namespace,
+            fqn=self.node_name,
+            remaps=tuple(rules),
+            parameters=parameters.values,
+            unread_parameter_files=parameters.unread,
+            parameter_files=self.__parameters.written_files(context),
+        )
 
     def __name_tokens(self) -> list[str | None]:
         """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""

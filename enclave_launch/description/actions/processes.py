@@ -219,34 +219,30 @@ class ExecuteLocal(Action):
         context.register_event_handler(OnProcessExit(target_action=self, on_exit=on_exit))
 
     def resolve(self, context: LaunchContext) -> ResolvedProcess:
-        """The prepared process as a value."""
-        return ResolvedProcess(**self.resolved_fields(context))
-
-    def resolved_fields(self, context: LaunchContext) -> dict[str, Any]:
-        """The fields of ``resolve``'s value. Subclasses replace what they know better of their node."""
+        """The prepared process as a value. Subclasses replace what they know better of their node."""
         description = self.__process_description
         name, cmd = description.final_name or "", tuple(description.final_cmd or ())
-        return {
-            "number": int(name.rpartition("-")[2]),
-            "kind": "executable",
-            "package": None,
-            "executable": first_word(cmd),
-            "process_name": name,
-            "name": None,
-            "namespace": None,
-            "fqn": None,
-            "cmd": cmd,
-            "remaps": (),
-            "parameters": {},
-            "environment": self.__changed_environment(context),
-            "enclave": self.enclave_request(context)._replace(argument=self.ros_arguments().enclave),
-            "location": location_of(self, context),
-            "on_event": context.on_event,
-            "cwd": description.final_cwd,
-            "shell": self.__shell is True,  # other true values do not make one, as upstream
-            "prefix": description.final_prefix,
-            "final_environment": description.final_env or {},
-        }
+        return ResolvedProcess(
+            number=int(name.rpartition("-")[2]),
+            kind="executable",
+            package=None,
+            executable=first_word(cmd),
+            process_name=name,
+            name=None,
+            namespace=None,
+            fqn=None,
+            cmd=cmd,
+            remaps=(),
+            parameters={},
+            environment=self.__changed_environment(context),
+            enclave=self.enclave_request(context)._replace(argument=self.ros_arguments().enclave),
+            location=location_of(self, context),
+            on_event=context.on_event,
+            cwd=description.final_cwd,
+            shell=self.__shell is True,  # other true values do not make one, as upstream
+            prefix=description.final_prefix,
+            final_environment=description.final_env or {},
+        )
 
     def ros_arguments(self) -> RosArguments:
         """What rcl would find on the prepared command line."""

@@ -11,7 +11,7 @@ from enclave_launch.description.markup.parser import Parser as BaseParser
 from enclave_launch.description.typed_values import get_typed_value
 from enclave_launch.frontend import launch_file
 from enclave_launch.frontend.error_location import mark_at
-from enclave_launch.frontend.xml_tree import parse_xml
+from enclave_launch.frontend.xml_tree import parse_launch_xml
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ class Parser(BaseParser):
     @classmethod
     def load_source(cls, source: launch_file.LaunchFile) -> tuple[Entity, Parser]:
         try:
-            root = source.parsed_by(parse_xml)
+            root = source.parsed_by(parse_launch_xml)
         except (SyntaxError, ValueError) as error:
             line = getattr(error, "line", None) or getattr(error, "position", (0, 0))[0]
             mark_at(error, SourceLocation(source.name, line))

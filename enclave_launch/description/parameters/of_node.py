@@ -20,7 +20,7 @@ from enclave_launch.ros_rules.rcl_parameters import (
     parameters_of_text,
     resolve_parameters,
 )
-from enclave_launch.ros_rules.ros_arguments import ParameterFile, ParameterRule
+from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
@@ -70,7 +70,7 @@ class NodeParameters:
     def resolve(
         self,
         name_tokens: Sequence[str | None],
-        sources: Sequence[ParameterFile | ParameterRule],
+        sources: Sequence[ParameterFileArgument | ParameterRule],
         directory: str | None,
     ) -> ResolvedParameters:
         """What the node sees after rcl has merged everything on its command line."""
