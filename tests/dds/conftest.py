@@ -76,17 +76,17 @@ def patched_dds() -> Path:
     """To preload into an attacker: a DDS library that believes everything."""
     if shutil.which("gcc") is None:
         missing("A C compiler", "apt-get install gcc libc6-dev")
-    return _built([HERE / "patched_attacker.c"], ["gcc", "-shared", "-fPIC"], ["-ldl"])
+    return build([HERE / "patched_attacker.c"], ["gcc", "-shared", "-fPIC"], ["-ldl"])
 
 
 def _built_fastdds_probe() -> Path:
     if shutil.which("g++") is None or not Path("/usr/include/fastdds/dds").is_dir():
         missing("Fast DDS", "apt-get install g++ libfastrtps-dev")
     sources = sorted((HERE / "fastdds_probe").iterdir())
-    return _built(sources, ["g++", "-std=c++17", "-O1"], ["-lfastrtps", "-lfastcdr"])
+    return build(sources, ["g++", "-std=c++17", "-O1"], ["-lfastrtps", "-lfastcdr"])
 
 
-def _built(sources: list[Path], compiler: list[str], libraries: list[str]) -> Path:
+def build(sources: list[Path], compiler: list[str], libraries: list[str]) -> Path:
     """Compiled once per version of its source, also when several test processes come at once."""
     version = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
     folder = Path(tempfile.gettempdir()) / f"enclave-launch-dds-tests-{os.getuid()}"

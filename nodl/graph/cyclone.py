@@ -1,0 +1,302 @@
+"""Listens to a DDS domain with the Python binding of Cyclone DDS: no ROS, and nothing is published. Acts.
+
+Participants of all vendors are seen. One observer for each process: Cyclone DDS 0.10 judges the endpoints of all
+participants of a process by the permissions of the first.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+from nodl.errors import NoDLError
+from nodl.graph.discovery_info import TYPE_NAME, decode
+from nodl.graph.model import Graph
+from nodl.graph.quality import INFINITE, Quality
+from nodl.graph.seen import SeenEndpoint, SeenParticipant, claimed_enclave
+from nodl.graph.state import GraphState
+from nodl.graph.wire_names import DISCOVERY_TOPIC
+
+_MOST_AT_ONCE = 4096
+_MOST_PARTICIPANTS = 119  # of one domain on one host: what its ports have room for (DDSI-RTPS 9.6.1)
+_FILES = {
+    "dds.sec.auth.identity_ca": "identity_ca.cert.pem",
+    "dds.sec.auth.identity_certificate": "cert.pem",
+    "dds.sec.auth.private_key": "key.pem",
+    "dds.sec.access.permissions_ca": "permissions_ca.cert.pem",
+    "dds.sec.access.governance": "governance.p7s",
+    "dds.sec.access.permissions": "permissions.p7s",
+}
+_PLUGINS = {
+    "dds.sec.auth": ("dds_security_auth", "authentication"),
+    "dds.sec.crypto": ("dds_security_crypto", "crypto"),
+    "dds.sec.access": ("dds_security_ac", "access_control"),
+}
+
+
+class ObserverError(NoDLError):
+    """The domain cannot be observed; says why and what helps."""
+
+
+class CycloneObserver:
+    """Is up from its construction until ``close``; ``look`` takes in what was announced since. Raises
+    ``ObserverError`` where DDS refuses the participant, and ``ImportError`` without the binding."""
+
+    def __init__(
+        self, domain_id: int, environment: Mapping[str, str], enclave_directory: Path | None = None
+    ) -> None:
+        from cyclonedds.builtin import (
+            BuiltinDataReader,
+            BuiltinTopicDcpsParticipant,
+            BuiltinTopicDcpsPublication,
+            BuiltinTopicDcpsSubscription,
+        )
+        from cyclonedds.core import DDSException
+        from cyclonedds.domain import Domain, DomainParticipant
+        from cyclonedds.qos import Policy, Qos
+
+        properties = security_properties(enclave_directory) if enclave_directory else {}
+        policies = [Policy.Property(name, value) for name, value in properties.items()]
+        try:
+            self._domain = Domain(domain_id, configuration(environment))
+            self._participant = DomainParticipant(domain_id, Qos(*policies))
+            self._lists = _list_reader(self._participant)
+        except DDSException as error:
+            raise ObserverError(_refused(domain_id, enclave_directory, error)) from error
+        self._readers = [
+            (BuiltinDataReader(self._participant, topic), read)
+            for topic, read in (
+                (BuiltinTopicDcpsParticipant, self._participant_seen),
+                (BuiltinTopicDcpsPublication, self._writer_seen),
+                (BuiltinTopicDcpsSubscription, self._reader_seen),
+            )
+        ]
+        self._guids: dict[int, str] = {}  # by handle of the instance, for the notice that it ended
+        self._vendors: dict[str, SeenParticipant] = {}
+        self.state = GraphState(self._participant.guid.bytes.hex())
+
+    def look(self) -> int:
+        """Gives how many changes there have been in all."""
+        for reader, read in self._readers:
+            for sample in reader.take(N=_MOST_AT_ONCE):
+                self._take_in(sample, read)
+        for message in self._lists.take(N=_MOST_AT_ONCE):
+            listed = decode(getattr(message, "raw", b""))
+            if listed is not None:
+                writer = self._guids.get(message.sample_info.publication_handle, "")
+                self.state.listed(listed, _participant_guid(writer))
+        return self.state.changes
+
+    def graph(self, *, past: bool = False) -> Graph:
+        return self.state.graph(past=past)
+
+    def close(self) -> None:
+        """Deletes the entities while the interpreter still works: DDS threads may be calling it until then."""
+        for entity in (
+            *(reader for reader, _ in self._readers),
+            self._lists,
+            self._participant,
+            self._domain,
+        ):
+            entity._delete(entity._ref)
+
+    def _take_in(self, sample: Any, read: Any) -> None:
+        info = sample.sample_info
+        if hasattr(sample, "key"):
+            self._guids[info.instance_handle] = sample.key.bytes.hex()
+            if sample.qos is not None:  # else only the notice that it ended is left
+                read(sample)
+        if not _alive(info):
+            self.state.gone(self._guids.get(info.instance_handle, ""))
+
+    def _participant_seen(self, sample: Any) -> None:
+        seen = participant_from(sample.key.bytes.hex(), sample.qos)
+        self._vendors[seen.guid] = seen
+        self.state.participant(seen)
+
+    def _writer_seen(self, sample: Any) -> None:
+        self._endpoint_seen(sample, writes=True)
+
+    def _reader_seen(self, sample: Any) -> None:
+        self._endpoint_seen(sample, writes=False)
+
+    def _endpoint_seen(self, sample: Any, *, writes: bool) -> None:
+        participant = sample.participant_key.bytes.hex()
+        owner = self._vendors.get(participant)
+        quality = quality_from(sample.qos, has_history=bool(owner and owner.own_history))
+        self.state.endpoint(
+            SeenEndpoint(
+                sample.key.bytes.hex(), participant, writes, sample.topic_name, sample.type_name, quality
+            )
+        )
+
+
+def configuration(environment: Mapping[str, str]) -> str:
+    """What Cyclone DDS is told: ROS's variables for how far to look, as rmw_cyclonedds reads them, then the user's
+    ``CYCLONEDDS_URI``, which wins.
+
+    ``LOCALHOST`` keeps the machine's own address: newer Fast DDS does not answer a peer that is on 127.0.0.1 alone.
+    """
+    loopback = environment.get("ROS_LOCALHOST_ONLY") == "1"  # of releases up to Humble
+    local = loopback or environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+    peers = [each for each in environment.get("ROS_STATIC_PEERS", "").split(";") if each]
+    general = '<Interfaces><NetworkInterface name="lo"/></Interfaces>' if loopback else ""
+    general += "<AllowMulticast>false</AllowMulticast>" if local else ""
+    addresses = (["127.0.0.1"] if local else []) + peers
+    found = "".join(f"<Peer Address={quoteattr(each)}/>" for each in addresses)
+    own = (
+        f'<CycloneDDS><Domain Id="any"><General>{general}</General>'
+        f"<Discovery><ParticipantIndex>auto</ParticipantIndex>"
+        f"<MaxAutoParticipantIndex>{_MOST_PARTICIPANTS}</MaxAutoParticipantIndex>"
+        f"<Peers>{found}</Peers></Discovery></Domain></CycloneDDS>"
+    )
+    theirs = environment.get("CYCLONEDDS_URI", "")
+    return f"{own},{theirs}" if theirs else own
+
+
+def security_properties(directory: Path) -> dict[str, str]:
+    """Of a participant in the enclave whose files are in ``directory``; names as rmw_dds_common ``security.cpp`` has
+    them. Raises ``ObserverError`` for a file that is missing."""
+    missing = [name for name in _FILES.values() if not (directory / name).is_file()]
+    if missing:
+        raise ObserverError(f"{directory} is not the directory of an enclave: it has no {', '.join(missing)}")
+    properties = {key: f"file:{directory / name}" for key, name in _FILES.items()}
+    if (directory / "crl.pem").is_file():
+        properties["org.eclipse.cyclonedds.sec.auth.crl"] = f"file:{directory / 'crl.pem'}"
+    for prefix, (library, what) in _PLUGINS.items():
+        properties[f"{prefix}.library.path"] = _library(library)
+        properties[f"{prefix}.library.init"] = f"init_{what}"
+        properties[f"{prefix}.library.finalize"] = f"finalize_{what}"
+    return properties
+
+
+def _library(name: str) -> str:
+    """Debian keeps the plugins in a folder beside libddsc that the loader does not search."""
+    loaded = re.findall(r"(/\S*)/libddsc\.so", Path("/proc/self/maps").read_text(encoding="utf-8"))
+    for place in dict.fromkeys(loaded):
+        for path in sorted(Path(place).glob(f"libddsc*/**/lib{name}.so")):
+            return str(path)
+    return name
+
+
+def participant_from(guid: str, qos: Any) -> SeenParticipant:
+    """What the participant's QoS tells of it; never its security properties, which name files of keys."""
+    properties: dict[str, str] = {}
+    user_data = b""
+    for policy in qos:
+        kind = type(policy).__qualname__
+        if kind == "Policy.Property":
+            properties[policy.key] = policy.value
+        elif kind == "Policy.Userdata":
+            user_data = bytes(policy.data)
+    pid = properties.get("__Pid") or properties.get("fastdds.physical_data.process", "")
+    host = properties.get("__Hostname") or properties.get("fastdds.physical_data.host", "")
+    return SeenParticipant(
+        guid,
+        claimed_enclave(user_data),
+        int(pid) if pid.isdigit() else None,
+        host.partition(":")[0],
+        properties.get("__ProcessName", ""),
+        _is_cyclone(guid, properties),
+    )
+
+
+def _is_cyclone(guid: str, properties: Mapping[str, str]) -> bool:
+    """Vendor numbers begin unsecured GUIDs (DDSI-RTPS: eProsima has 01.0f); physical data is announced in clear."""
+    return not guid.startswith("010f") and not any(name.startswith("fastdds.") for name in properties)
+
+
+def quality_from(qos: Any, *, has_history: bool) -> Quality:
+    """Of an endpoint. Fast DDS does not announce its history, and the binding then shows a default."""
+    fields: dict[str, Any] = {}
+    for policy in qos:
+        reader = _POLICIES.get(policy.__scope__)
+        if reader is not None:
+            fields.update(reader(type(policy).__qualname__.rpartition(".")[2], policy))
+    if not has_history:
+        fields.update(history="", depth=0)
+    return Quality(**fields)
+
+
+_WORDS = {
+    "BestEffort": "BEST_EFFORT",
+    "Reliable": "RELIABLE",
+    "Volatile": "VOLATILE",
+    "TransientLocal": "TRANSIENT_LOCAL",
+    "Transient": "TRANSIENT",
+    "Persistent": "PERSISTENT",
+    "KeepLast": "KEEP_LAST",
+    "KeepAll": "KEEP_ALL",
+    "Automatic": "AUTOMATIC",
+    "ManualByParticipant": "MANUAL_BY_PARTICIPANT",
+    "ManualByTopic": "MANUAL_BY_TOPIC",
+    "Shared": "SHARED",
+    "Exclusive": "EXCLUSIVE",
+}
+_POLICIES: Mapping[str, Callable[[str, Any], dict[str, Any]]] = {
+    "Reliability": lambda word, _: {"reliability": _WORDS[word]},
+    "Durability": lambda word, _: {"durability": _WORDS[word]},
+    "History": lambda word, policy: {"history": _WORDS[word], "depth": getattr(policy, "depth", 0)},
+    "Deadline": lambda _, policy: {"deadline": _duration(policy.deadline)},
+    "Liveliness": lambda word, policy: {
+        "liveliness": _WORDS[word],
+        "lease": _duration(policy.lease_duration),
+    },
+    "Ownership": lambda word, _: {"ownership": _WORDS[word]},
+}
+
+
+def _duration(nanoseconds: int) -> int:
+    return INFINITE if nanoseconds >= (1 << 63) - 1 else nanoseconds
+
+
+def _alive(info: Any) -> bool:
+    from cyclonedds.core import InstanceState
+
+    return bool(info.instance_state == InstanceState.Alive)
+
+
+def _participant_guid(endpoint: str) -> str:
+    """The entity id of a participant is fixed (DDSI-RTPS 9.3.1.5)."""
+    return f"{endpoint[:24]}000001c1" if endpoint else ""
+
+
+def _list_reader(participant: Any) -> Any:
+    """A reader that hands out the bytes of each message: peers of both sizes must be understood.
+
+    What rmw sends carries no description of its type, which this binding always adds to its own; with it, peers whose
+    description differs would not match. So it is left empty.
+    """
+    from cyclonedds.idl import make_idl_struct
+    from cyclonedds.idl.types import sequence, uint8
+    from cyclonedds.qos import Policy, Qos
+    from cyclonedds.sub import DataReader
+    from cyclonedds.topic import Topic
+    from cyclonedds.util import duration
+
+    message: Any = make_idl_struct("ParticipantEntitiesInfo", TYPE_NAME, {"content": sequence[uint8]})  # type: ignore[misc]
+    message.__idl__._xt_data = (message, message)
+    message.__idl__._xt_bytedata = (b"", b"")
+    message.deserialize = classmethod(lambda cls, data, **_: _Raw(data))
+    reliable = Policy.Reliability.Reliable(duration(seconds=1))
+    qos = Qos(reliable, Policy.Durability.TransientLocal, Policy.History.KeepAll)
+    return DataReader(participant, Topic(participant, DISCOVERY_TOPIC, message), qos)
+
+
+class _Raw:
+    """A message, undecoded; the binding adds ``sample_info``."""
+
+    def __init__(self, raw: bytes) -> None:
+        self.raw = bytes(raw)
+
+
+def _refused(domain_id: int, directory: Path | None, error: Exception) -> str:
+    if directory is None:
+        return f"DDS domain {domain_id} cannot be joined: {error}"
+    return (
+        f"DDS domain {domain_id} cannot be joined with the enclave in {directory}: {error}. Is the domain in its "
+        "governance, and has the enclave not ended? secure-keystore tool-enclave KEYSTORE --for observe makes one"
+    )

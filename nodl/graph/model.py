@@ -1,0 +1,237 @@
+"""Announcements → processes, nodes and their interfaces. Pure.
+
+Which node owns an endpoint is told by ``ros_discovery_info`` only. Where its list is missing, a participant with one
+node owns its endpoints, and parameter services tell the names of nodes (programs that publish no list, or one that this
+observer may not read). What no rule gives to a node stays the process's: nothing is guessed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from enum import Enum
+from typing import NamedTuple
+
+from nodl.graph.discovery_info import ParticipantList
+from nodl.graph.seen import SeenEndpoint, SeenParticipant
+from nodl.graph.wire_names import DISCOVERY_TOPIC, PARTS, Part, part_of
+from nodl.node_interface import EndpointKind
+from nodl.remap import ACTION_TOPICS
+
+_ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
+_AS_TOPICS = {
+    EndpointKind.ACTION_SERVER: EndpointKind.PUBLISHER,
+    EndpointKind.ACTION_CLIENT: EndpointKind.SUBSCRIPTION,
+}
+_NAMED_BY = "/get_parameters"  # every node has it, unless its program switches parameter services off
+
+
+class Attribution(str, Enum):
+    """How it is known whose an endpoint is."""
+
+    LIST = "ros_discovery_info"
+    ALONE = "the only node of its participant"
+    PARAMETER_SERVICES = "parameter services"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class Owner(NamedTuple):
+    """A node of a participant; ``ordinal`` tells several of one name apart."""
+
+    fqn: str
+    ordinal: int = 0
+
+
+class Interface(NamedTuple):
+    """One ROS endpoint of a node. ``missing``: the DDS endpoints of it that were not seen (yet): it is half open."""
+
+    kind: EndpointKind
+    name: str
+    type: str
+    endpoints: tuple[SeenEndpoint, ...]
+    missing: tuple[str, ...] = ()
+    by: Attribution = Attribution.LIST
+
+    @property
+    def complete(self) -> bool:
+        return not self.missing
+
+
+class GraphNode(NamedTuple):
+    """One node under its final name."""
+
+    fqn: str
+    interfaces: tuple[Interface, ...]
+    ordinal: int = 0
+
+
+class GraphProcess(NamedTuple):
+    """One participant. ``unowned``: ROS endpoints that no node of it is known to have; ``foreign``: what is not ROS;
+    ``listed``: it published a list of its nodes, which this observer could read."""
+
+    participant: SeenParticipant
+    nodes: tuple[GraphNode, ...] = ()
+    unowned: tuple[Interface, ...] = ()
+    foreign: tuple[SeenEndpoint, ...] = ()
+    listed: bool = False
+    gid_size: int = 0
+
+    @property
+    def interfaces(self) -> Iterator[Interface]:
+        for node in self.nodes:
+            yield from node.interfaces
+        yield from self.unowned
+
+    @property
+    def endpoints(self) -> Iterator[SeenEndpoint]:
+        for interface in self.interfaces:
+            yield from interface.endpoints
+        yield from self.foreign
+
+
+class Graph(NamedTuple):
+    """All participants but the observer, sorted by their GUIDs."""
+
+    processes: tuple[GraphProcess, ...] = ()
+
+    @property
+    def nodes(self) -> Iterator[GraphNode]:
+        for process in self.processes:
+            yield from process.nodes
+
+    @property
+    def half_open(self) -> bool:
+        """Whether discovery is under way somewhere."""
+        return any(not each.complete for process in self.processes for each in process.interfaces)
+
+
+Owners = Mapping[str, Owner]
+"""GUID of an endpoint → the node that has it, by all lists that were trusted."""
+
+
+def process_of(
+    participant: SeenParticipant,
+    endpoints: Iterable[SeenEndpoint],
+    listed: ParticipantList | None,
+    owners: Owners,
+) -> GraphProcess:
+    """``endpoints`` are the participant's; ``listed`` the newest list that it published itself."""
+    parts: list[tuple[SeenEndpoint, Part]] = []
+    foreign = []
+    for endpoint in sorted(endpoints):
+        part = part_of(endpoint.topic, endpoint.type, writes=endpoint.writes)
+        if part is not None:
+            parts.append((endpoint, part))
+        elif endpoint.topic != DISCOVERY_TOPIC:
+            foreign.append(endpoint)
+    attribute = _Attributor(parts, listed, owners)
+    groups: dict[Owner | None, list[tuple[SeenEndpoint, Part]]] = {owner: [] for owner in attribute.nodes}
+    by: dict[str, Attribution] = {}
+    for endpoint, part in parts:
+        owner, how = attribute.owner(endpoint, part)
+        groups.setdefault(owner, []).append((endpoint, part))
+        by[endpoint.guid] = how
+    nodes = tuple(
+        GraphNode(owner.fqn, _interfaces(group, by), owner.ordinal)
+        for owner, group in sorted(groups.items(), key=lambda item: item[0] or Owner(""))
+        if owner is not None
+    )
+    unowned = _interfaces(groups.get(None, ()), by)
+    size = listed.gid_size if listed else 0
+    return GraphProcess(participant, nodes, unowned, tuple(foreign), listed is not None, size)
+
+
+def owners_in(listed: ParticipantList) -> dict[str, Owner]:
+    """What one list says."""
+    return {
+        guid: owner
+        for owner, node in zip(_owners(listed), listed.nodes, strict=True)
+        for guid in (*node.readers, *node.writers)
+    }
+
+
+def _owners(listed: ParticipantList) -> list[Owner]:
+    found: list[Owner] = []
+    for node in listed.nodes:
+        found.append(Owner(node.fqn, sum(each.fqn == node.fqn for each in found)))
+    return found
+
+
+class _Attributor:
+    """Whose the endpoints of one participant are."""
+
+    def __init__(
+        self, parts: Sequence[tuple[SeenEndpoint, Part]], listed: ParticipantList | None, owners: Owners
+    ) -> None:
+        self._owners = owners
+        past = {owners[endpoint.guid] for endpoint, _ in parts if endpoint.guid in owners}
+        self.nodes = sorted({*(_owners(listed) if listed else ()), *past})
+        self._how = Attribution.ALONE
+        if listed is None and not self.nodes:
+            self.nodes = sorted(_named_by_parameter_services(parts))
+            self._how = Attribution.PARAMETER_SERVICES
+
+    def owner(self, endpoint: SeenEndpoint, part: Part) -> tuple[Owner | None, Attribution]:
+        if endpoint.guid in self._owners:
+            return self._owners[endpoint.guid], Attribution.LIST
+        if len(self.nodes) == 1:
+            return self.nodes[0], self._how
+        if self._how is Attribution.PARAMETER_SERVICES and part.kind is EndpointKind.SERVICE_SERVER:
+            fqn = part.name.rpartition("/")[0]
+            return next((each for each in self.nodes if each.fqn == fqn), None), self._how
+        return None, self._how
+
+
+def _named_by_parameter_services(parts: Iterable[tuple[SeenEndpoint, Part]]) -> set[Owner]:
+    return {
+        Owner(part.name.removesuffix(_NAMED_BY))
+        for _, part in parts
+        if part.kind is EndpointKind.SERVICE_SERVER
+        and part.name.endswith(_NAMED_BY)
+        and part.type == "rcl_interfaces/srv/GetParameters"
+    }
+
+
+def _interfaces(
+    group: Iterable[tuple[SeenEndpoint, Part]], by: Mapping[str, Attribution]
+) -> tuple[Interface, ...]:
+    found: dict[tuple[EndpointKind, str], list[tuple[SeenEndpoint, Part]]] = {}
+    for endpoint, part in group:
+        found.setdefault((part.kind, part.name), []).append((endpoint, part))
+    return tuple(
+        sorted(
+            (each for key, members in found.items() for each in _joined(*key, members, by)),
+            key=lambda each: (each.kind.value, each.name, each.type),
+        )
+    )
+
+
+def _joined(
+    kind: EndpointKind,
+    name: str,
+    members: Sequence[tuple[SeenEndpoint, Part]],
+    by: Mapping[str, Attribution],
+) -> Iterator[Interface]:
+    """The parts of one name; the topics of an action without any of its services are topics (``ros2 topic echo``)."""
+    if kind in _ACTIONS and all(part.part in ACTION_TOPICS for _, part in members):
+        for endpoint, part in members:
+            topic = part_of(
+                "rt/_" + endpoint.topic[3:].replace("/_action/", "/_"), endpoint.type, writes=True
+            )
+            type_name = topic.type if topic else endpoint.type
+            full = f"{name}/_action/{part.part}"
+            yield Interface(_AS_TOPICS[kind], full, type_name, (endpoint,), (), by[endpoint.guid])
+        return
+    for type_name, same in _by_type(members).items():
+        endpoints = tuple(endpoint for endpoint, _ in same)
+        missing = tuple(sorted(PARTS[kind] - {part.part for _, part in same}))
+        yield Interface(kind, name, type_name, endpoints, missing, by[endpoints[0].guid])
+
+
+def _by_type(
+    members: Sequence[tuple[SeenEndpoint, Part]],
+) -> dict[str, list[tuple[SeenEndpoint, Part]]]:
+    """Parts that do not tell a type belong to each that the others tell."""
+    types = sorted({part.type for _, part in members if part.type}) or [""]
+    return {each: [(e, part) for e, part in members if part.type in ("", each)] for each in types}

@@ -1,0 +1,123 @@
+"""Which observer is used, and how long it looks. Acts."""
+
+from __future__ import annotations
+
+import importlib.util
+import time
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import NamedTuple, Protocol
+
+from nodl.graph.cyclone import CycloneObserver, ObserverError
+from nodl.graph.model import Graph
+
+INTERVAL = 0.1  # seconds between two looks: clients that call once and leave are there for about that long
+SOURCES = ("auto", "cyclonedds", "rclpy")
+
+
+class Observer(Protocol):
+    """What both have."""
+
+    def look(self) -> int: ...
+
+    def graph(self, *, past: bool = False) -> Graph: ...
+
+    def close(self) -> None: ...
+
+
+class Where(NamedTuple):
+    """What is observed, and how. ``enclave_directory`` ``None``: without security."""
+
+    domain_id: int = 0
+    source: str = "auto"
+    enclave_directory: Path | None = None
+
+
+def chosen_source(wanted: str) -> str:
+    """``auto``: Cyclone DDS's binding, which sees more (processes, what is not ROS), else rclpy. Raises
+    ``ObserverError`` where that is not installed."""
+    packages = {"cyclonedds": "cyclonedds", "rclpy": "rclpy"}
+    for name in (wanted,) if wanted != "auto" else tuple(packages):
+        if importlib.util.find_spec(packages[name]) is not None:
+            return name
+    raise ObserverError(
+        f"nothing to observe with ({wanted}): install the Python binding of Cyclone DDS (pip install "
+        "'enclave-launch[observe]'; it is built against an installed Cyclone DDS 0.10), or source a ROS 2 workspace, "
+        "which has rclpy"
+    )
+
+
+@contextmanager
+def observer(where: Where, environment: Mapping[str, str]) -> Iterator[Observer]:
+    """Up inside the block. Raises ``ObserverError``."""
+    source = chosen_source(where.source)
+    up: Observer
+    if source == "rclpy":
+        from nodl.graph.rclpy_graph import RclpyObserver
+
+        with _ros_variables(where):
+            up = RclpyObserver()
+    else:
+        up = CycloneObserver(where.domain_id, environment, where.enclave_directory)
+    try:
+        yield up
+    finally:
+        up.close()
+
+
+def look_until(up: Observer, done: Callable[[], bool]) -> None:
+    """Keep looking until ``done`` says so, once after each look."""
+    up.look()
+    while not done():
+        time.sleep(INTERVAL)
+        up.look()
+
+
+class Quiet:
+    """Done when nothing has changed, and nothing is half open, for ``settle`` seconds; at the latest after
+    ``longest``. An empty domain is not quiet: somebody may be about to be discovered."""
+
+    def __init__(
+        self, up: Observer, settle: float, longest: float, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._up, self._settle, self._clock = up, settle, clock
+        self._end = clock() + longest
+        self._since = clock()
+        self._changes = -1
+
+    def __call__(self) -> bool:
+        now, changes = self._clock(), self._up.look()
+        graph = self._up.graph()
+        if changes != self._changes or graph.half_open or not graph.processes:
+            self._changes = changes
+            self._since = now
+        return now >= self._end or now - self._since >= self._settle
+
+
+@contextmanager
+def _ros_variables(where: Where) -> Iterator[None]:
+    """rclpy reads the domain and the enclave from the environment when its context is made."""
+    import os
+
+    wanted = {"ROS_DOMAIN_ID": str(where.domain_id)}
+    if where.enclave_directory is not None:
+        keystore, slash, enclave = str(where.enclave_directory.resolve()).rpartition("/enclaves/")
+        if not slash:
+            raise ObserverError(f"{where.enclave_directory} is not below the enclaves of a keystore")
+        wanted |= {
+            "ROS_SECURITY_ENABLE": "true",
+            "ROS_SECURITY_STRATEGY": "Enforce",
+            "ROS_SECURITY_KEYSTORE": keystore,
+            "ROS_SECURITY_ENCLAVE_OVERRIDE": f"/{enclave}",
+        }
+    before = {name: os.environ.get(name) for name in wanted}
+    os.environ.update(wanted)
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name, None)
+            else:
+                os.environ[name] = value

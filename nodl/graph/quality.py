@@ -1,0 +1,71 @@
+"""Quality of service of an endpoint, and whether a writer and a reader can meet. Pure.
+
+Rules of request and offer: DDS 1.4, 2.2.3, the table of policies with "RxO = yes". Words as NoDL v2 has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+INFINITE = -1
+_RELIABILITY = ("BEST_EFFORT", "RELIABLE")
+_DURABILITY = ("VOLATILE", "TRANSIENT_LOCAL", "TRANSIENT", "PERSISTENT")
+_LIVELINESS = ("AUTOMATIC", "MANUAL_BY_PARTICIPANT", "MANUAL_BY_TOPIC")
+_OWNERSHIP = ("SHARED", "EXCLUSIVE")
+# As rmw numbers them (rmw/types.h); what it has no number for is its "unknown".
+_RMW_HISTORY = {"": 0, "KEEP_LAST": 1, "KEEP_ALL": 2}
+_RMW_RELIABILITY = {"RELIABLE": 1, "BEST_EFFORT": 2}
+_RMW_DURABILITY = {"TRANSIENT_LOCAL": 1, "VOLATILE": 2}
+
+
+class Quality(NamedTuple):
+    """Times in nanoseconds, ``INFINITE`` for none. ``history`` is empty where it was not announced (Fast DDS)."""
+
+    reliability: str = "RELIABLE"
+    durability: str = "VOLATILE"
+    history: str = ""
+    depth: int = 0
+    deadline: int = INFINITE
+    liveliness: str = "AUTOMATIC"
+    lease: int = INFINITE
+    ownership: str = "SHARED"
+
+    @property
+    def rmw_numbers(self) -> tuple[int, int, int, int]:
+        """History, depth, reliability, durability as ``rmw_qos_profile_t`` has them; 0 where it was not announced."""
+        return (
+            _RMW_HISTORY.get(self.history, 0),
+            self.depth,
+            _RMW_RELIABILITY.get(self.reliability, 0),
+            _RMW_DURABILITY.get(self.durability, 0),
+        )
+
+
+def unmet(offered: Quality, requested: Quality) -> tuple[str, ...]:
+    """Why a reader that asks for ``requested`` gets nothing from a writer of ``offered``; empty when they meet."""
+    return tuple(_unmet(offered, requested))
+
+
+def _unmet(offered: Quality, requested: Quality) -> Iterator[str]:
+    for what, order in (
+        ("reliability", _RELIABILITY),
+        ("durability", _DURABILITY),
+        ("liveliness", _LIVELINESS),
+    ):
+        has, wants = getattr(offered, what), getattr(requested, what)
+        if has in order and wants in order and order.index(has) < order.index(wants):
+            yield f"{what}: {has} is offered, {wants} asked for"
+    for what in ("deadline", "lease"):
+        has, wants = getattr(offered, what), getattr(requested, what)
+        if wants != INFINITE and (has == INFINITE or has > wants):
+            yield f"{_TIMES[what]}: {_seconds(has)} is offered, {_seconds(wants)} asked for"
+    if {offered.ownership, requested.ownership} == set(_OWNERSHIP):
+        yield f"ownership: {offered.ownership} is offered, {requested.ownership} asked for"
+
+
+_TIMES = {"deadline": "deadline", "lease": "liveliness lease"}
+
+
+def _seconds(nanoseconds: int) -> str:
+    return "none" if nanoseconds == INFINITE else f"{nanoseconds / 1e9:g} s"
