@@ -53,19 +53,22 @@ class FurtherNode(NamedTuple):
     """A node that the program makes beside its main one, with options of its own.
 
     ``document``: ``package/name`` of its description. ``namespace`` is relative to the main node's unless absolute;
-    empty: the program sets none, the process's counts.
+    empty: the program sets none, the process's counts. ``renamed``: so does a node name that launch gives the process.
     """
 
     document: str
     node: str
     namespace: str = ""
     when: When = When()
+    renamed: bool = False
 
 
 class PluginList(NamedTuple):
     """Plugins that the node loads. ``parameter`` holds the names of the instances (a list, a text, or a pattern with
     ``*``); the parameter ``type`` (a template with ``$(plugin)``) holds the class of each. ``types``: default classes.
-    ``spawned``: spawners of the launch name instances too.
+    ``plugin_class``: a template for the class itself, where no parameter holds it. ``always``: instances that are
+    loaded whatever the parameter says, except those that the parameter ``without`` names. ``spawned``: spawners of the
+    launch name instances too.
     """
 
     parameter: str
@@ -74,6 +77,9 @@ class PluginList(NamedTuple):
     types: Mapping[str, str] = MappingProxyType({})
     when: When = When()
     spawned: bool = False
+    plugin_class: str = ""
+    always: tuple[str, ...] = ()
+    without: str = ""
 
 
 class Transport(NamedTuple):

@@ -112,7 +112,7 @@ class _Application:
         if depth >= _DEPTH:
             self.gaps.append(Gap(by.source, "plugins that load plugins are nested too deep"))
             return
-        instances = list(scope.items(plugins.parameter))
+        instances = [*plugins.always, *scope.items(plugins.parameter)]
         types = dict(plugins.types)
         if plugins.spawned:
             for spawned in self._spawned():
@@ -120,28 +120,31 @@ class _Application:
                 types |= {spawned.controller: spawned.type} if spawned.type else {}
         if not instances and scope.value(plugins.parameter) is None:
             instances = [scope.fill(name).text or "" for name in plugins.default]
+        left_out = set(scope.items(plugins.without)) if plugins.without else set()
         for instance in dict.fromkeys(instances):
-            self._load_one(instance, plugins._replace(types=types), by, depth)
+            if instance not in left_out:
+                self._load_one(instance, plugins._replace(types=types), by, depth)
 
     def _load_one(self, instance: str, plugins: PluginList, by: NodeInterface, depth: int) -> None:
         inner = Scope(self._situation, (by.depends or _NOTHING).defaults, {}, instance)
         class_parameter = inner.fill(plugins.type).text
         value = inner.value(class_parameter or "", plugins.types.get(instance))
-        if value is None:
+        plugin_class = inner.fill(plugins.plugin_class).text or (None if value is None else str(value.value))
+        if plugin_class is None:
             self.gaps.append(
                 Gap(by.source, f"the class of plugin '{instance}' is not known: {class_parameter} is not set")
             )
             return
-        described = self._documents.of_class(str(value.value))
+        described = self._documents.of_class(plugin_class)
         if described is None:
             self.gaps.append(
-                Gap(by.source, f"plugin '{instance}' is of class {value.value}, which no document describes")
+                Gap(by.source, f"plugin '{instance}' is of class {plugin_class}, which no document describes")
             )
             return
         if described.depends is not None and described.depends.own_node:
             self.further.append(self._own_node(described, instance))
             return
-        self.describe(described, instance, (f"plugin {instance} of class {value.value}",), depth + 1)
+        self.describe(described, instance, (f"plugin {instance} of class {plugin_class}",), depth + 1)
 
     def _own_node(self, described: NodeInterface, instance: str) -> NodeInterface:
         """A plugin that is a node: a controller, with what its spawner gives it."""
@@ -196,7 +199,7 @@ class _Application:
         if described is None or name is None:
             self.gaps.append(Gap(by.source, f"no document {node.document} describes its node '{node.node}'"))
             return
-        rules = [f"__node:={name}"]
+        rules = [] if node.renamed else [f"__node:={name}"]
         if node.namespace:
             relative = scope.fill(node.namespace).text or ""
             absolute = relative.startswith("/")

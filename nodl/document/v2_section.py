@@ -56,7 +56,7 @@ _CONDITION: dict[str, Checker] = {"when": _WHEN, "since": _DISTRO, "until": _DIS
 _TEXTS = list_of(text_of())
 _VARIATION = map_of({"name": text_of(), "each": text_of(), **_CONDITION})
 _NODE = map_of(
-    {"document": text_of(), "node": text_of(), "namespace": text_of(), **_CONDITION},
+    {"document": text_of(), "node": text_of(), "namespace": text_of(), "renamed": boolean, **_CONDITION},
     required=("document", "node"),
 )
 _PLUGINS = map_of(
@@ -65,6 +65,9 @@ _PLUGINS = map_of(
         "default": _TEXTS,
         "type": text_of(),
         "types": map_of(others=text_of()),
+        "class": text_of(),
+        "always": _TEXTS,
+        "without": text_of(),
         "spawned": boolean,
         **_CONDITION,
     },
@@ -159,7 +162,9 @@ def dependence_of(root: YamlMap) -> Dependence | None:
     return Dependence(
         variations=_variations(given.get("names") or {}),
         nodes=tuple(
-            FurtherNode(each["document"], each["node"], each.get("namespace", ""), _when(each))
+            FurtherNode(
+                each["document"], each["node"], each.get("namespace", ""), _when(each), _true(each, "renamed")
+            )
             for each in _maps(given, "nodes")
         ),
         plugins=tuple(_plugins(each) for each in _maps(given, "plugins")),
@@ -217,13 +222,29 @@ def _variations(names: object) -> dict[tuple[EndpointKind, str], Variation]:
 
 
 def _plugins(each: Mapping[str, object]) -> PluginList:
-    default, types = each.get("default") or (), each.get("types") or {}
-    assert isinstance(default, (list, tuple))
+    types = each.get("types") or {}
     assert isinstance(types, dict)
-    kind = str(each.get("type") or PluginList("").type)
     return PluginList(
-        str(each["parameter"]), tuple(default), kind, types, _when(each), each.get("spawned") is True
+        parameter=str(each["parameter"]),
+        default=_names(each, "default"),
+        type=str(each.get("type") or PluginList("").type),
+        types=types,
+        when=_when(each),
+        spawned=_true(each, "spawned"),
+        plugin_class=str(each.get("class") or ""),
+        always=_names(each, "always"),
+        without=str(each.get("without") or ""),
     )
+
+
+def _true(each: Mapping[str, object], key: str) -> bool:
+    return each.get(key) is True
+
+
+def _names(each: Mapping[str, object], key: str) -> tuple[str, ...]:
+    listed = each.get(key) or ()
+    assert isinstance(listed, (list, tuple))
+    return tuple(listed)
 
 
 def _when(each: Mapping[str, object]) -> When:

@@ -231,3 +231,79 @@ def test_the_service_of_a_calibration_is_private_since_iron(launch: Launch) -> N
         "/cameras/set_camera_info",
         "/cameras/set_capture",
     ]
+
+
+MOVE_GROUP = """
+move_group:
+  ros__parameters:
+    planning_pipelines: [ompl]
+    ompl: {planning_plugins: [PLANNER], response_adapters: [default_planning_response_adapters/ValidateSolution]}
+    capabilities: pilz_industrial_motion_planner/MoveGroupSequenceAction
+    disable_capabilities: move_group/ClearOctomapService
+    moveit_controller_manager: moveit_simple_controller_manager/MoveItSimpleControllerManager
+    moveit_simple_controller_manager:
+      controller_names: [arm, hand]
+      arm: {type: FollowJointTrajectory, action_ns: follow_joint_trajectory}
+      hand: {type: GripperCommand, action_ns: ''}
+"""
+
+
+def test_move_group_has_its_capabilities_pipelines_and_controllers(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "move_group.yaml"
+    node = f'<node pkg="moveit_ros_move_group" exec="move_group"><param from="{file}"/></node>'
+    file.write_text(MOVE_GROUP.replace("PLANNER", "ompl_interface/OMPLPlanner"))
+    plan = launch(node)
+    assert not plan.problems
+    assert allowed(plan, "call_actions") == ["/arm/follow_joint_trajectory", "/hand"]
+    assert {"/move_action", "/sequence_move_group"} <= set(allowed(plan, "serve_actions"))
+    assert "/get_planning_scene" in allowed(plan, "serve_services")
+    assert "/clear_octomap" not in allowed(plan, "serve_services")
+    assert {"/display_contacts", "/pipeline_state"} <= set(allowed(plan, "publish"))
+    file.write_text(MOVE_GROUP.replace("PLANNER", "my/Planner"))
+    assert "plugin 'my/Planner' is of class my/Planner, which no document describes" in problems(launch(node))
+
+
+def test_a_node_name_of_launch_renames_the_further_nodes_that_take_it(launch: Launch) -> None:
+    node = '<node pkg="moveit_ros_move_group" exec="move_group" {}/>'
+    assert "/moveit_simple_controller_manager" in [each.fqn for each in launch(node.format("")).nodes]
+    named = [each.fqn for each in launch(node.format('name="arm"')).nodes]
+    assert "/moveit_simple_controller_manager" not in named and "/arm_private_*" in named
+
+
+REALSENSE = (
+    '<node pkg="realsense2_camera" exec="realsense2_camera_node" name="d435" namespace="front">{}</node>'
+)
+
+
+def test_a_depth_camera_publishes_the_streams_that_are_switched_on(launch: Launch) -> None:
+    plain = allowed(launch(REALSENSE.format("")), "publish")
+    assert {"/front/d435/color/image_raw", "/front/d435/depth/image_rect_raw", "/tf_static"} <= set(plain)
+    assert not {"/tf", "/front/d435/infra1/image_rect_raw", "/front/d435/depth/color/points"} & set(plain)
+    more = REALSENSE.format(
+        '<param name="enable_infra1" value="true"/><param name="pointcloud.enable" value="true"/>'
+    )
+    added = set(allowed(launch(more), "publish")) - set(plain)
+    assert {"/front/d435/infra1/image_rect_raw", "/front/d435/depth/color/points"} <= added
+
+
+def test_rtabmap_subscribes_what_its_switches_say(launch: Launch) -> None:
+    node = (
+        '<node pkg="rtabmap_slam" exec="rtabmap" name="rtabmap"><param name="subscribe_depth" value="false"/>'
+        '<param name="subscribe_rgb" value="false"/><param name="subscribe_scan" value="true"/>'
+        '<remap from="scan" to="/lidar"/></node>'
+    )
+    subscribed = allowed(launch(node), "subscribe")
+    assert {"/lidar", "/odom"} <= set(subscribed)
+    assert not {"/depth/image", "/rgb/image", "/scan_cloud", "/rgbd_image"} & set(subscribed)
+
+
+@pytest.mark.parametrize(
+    ("pkg", "exe"),
+    [
+        ("micro_ros_agent", "micro_ros_agent"),
+        ("depthai_ros_driver", "camera_node"),
+        ("rmf_traffic_ros2", "rmf_traffic_schedule"),
+    ],
+)
+def test_what_only_devices_or_others_decide_is_a_gap(launch: Launch, pkg: str, exe: str) -> None:
+    assert "say with --policy" in problems(launch(f'<node pkg="{pkg}" exec="{exe}" name="n"/>'))
