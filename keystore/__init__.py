@@ -21,6 +21,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from keystore.disk.share_files import LaunchHold as LaunchHold
     from keystore.errors import KeystoreError as KeystoreError
+    from keystore.formats.hosts import Hosts as Hosts
+    from keystore.formats.hosts import load_hosts as load_hosts
     from keystore.formats.subject import SubjectScheme as SubjectScheme
     from keystore.signing.ca_access import CaAccess as CaAccess
     from keystore.signing.ca_access import Secret as Secret
@@ -39,8 +41,18 @@ if TYPE_CHECKING:
     from keystore.steps.expiry import StatusReport as StatusReport
     from keystore.steps.expiry import expires_soon as expires_soon
     from keystore.steps.expiry import status as status
+    from keystore.steps.fleet import FleetReport as FleetReport
+    from keystore.steps.fleet import fleet_status as fleet_status
     from keystore.steps.governance_setting import GovernanceOptions as GovernanceOptions
     from keystore.steps.governance_setting import set_governance as set_governance
+    from keystore.steps.host_bundles import BundleOptions as BundleOptions
+    from keystore.steps.host_bundles import HostBundle as HostBundle
+    from keystore.steps.host_bundles import export_hosts as export_hosts
+    from keystore.steps.host_keys import RequestOptions as RequestOptions
+    from keystore.steps.host_keys import request as request
+    from keystore.steps.importing import ImportOptions as ImportOptions
+    from keystore.steps.importing import ImportReport as ImportReport
+    from keystore.steps.importing import import_bundle as import_bundle
     from keystore.steps.options import ProvisionOptions as ProvisionOptions
     from keystore.steps.provisioning import provision as provision
     from keystore.steps.removal import RemoveOptions as RemoveOptions
@@ -50,6 +62,8 @@ if TYPE_CHECKING:
     from keystore.steps.renewal import renew as renew
     from keystore.steps.report import EnclaveReport as EnclaveReport
     from keystore.steps.report import ProvisionReport as ProvisionReport
+    from keystore.steps.request_signing import SigningOptions as SigningOptions
+    from keystore.steps.request_signing import sign_requests as sign_requests
     from keystore.steps.rollover import Step as Step
     from keystore.steps.rollover import roll_over as roll_over
     from keystore.steps.sharing import LaunchShares as LaunchShares
@@ -96,6 +110,20 @@ _HOMES = {
     "expires_soon": "steps.expiry",
     "status": "steps.expiry",
     "SubjectScheme": "formats.subject",
+    "BundleOptions": "steps.host_bundles",
+    "HostBundle": "steps.host_bundles",
+    "export_hosts": "steps.host_bundles",
+    "ImportOptions": "steps.importing",
+    "ImportReport": "steps.importing",
+    "import_bundle": "steps.importing",
+    "RequestOptions": "steps.host_keys",
+    "request": "steps.host_keys",
+    "SigningOptions": "steps.request_signing",
+    "sign_requests": "steps.request_signing",
+    "FleetReport": "steps.fleet",
+    "fleet_status": "steps.fleet",
+    "Hosts": "formats.hosts",
+    "load_hosts": "formats.hosts",
     "Finding": "verification",
     "Severity": "verification",
     "Requirements": "verification",

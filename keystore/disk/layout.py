@@ -10,7 +10,7 @@ All paths here are POSIX text relative to the keystore, so that they read the sa
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from functools import cache
 
 from keystore.formats.enclave_name import segments, validate_enclave_name
@@ -31,10 +31,20 @@ SUPERSEDED = "private/superseded.json"
 """Of earlier versions; taken over into the register."""
 REGISTER = "private/register.json"
 SHARES = "private/shares"
+BUNDLE = "bundle.p7s"
+"""The signed manifest: first in a bundle, and beside ``public/`` where one was imported."""
+REQUESTS = "private/requests"
+"""Of enclaves whose keys were made on their hosts: the certificate requests, in the place of the keys."""
+BUNDLES = "private/bundles"
+"""The manifest that was signed last for each host."""
 CRL_UNLINKED = "private/crl-unlinked"
 """There while a published CRL is given to the enclaves: an interrupted run left some without."""
 
 KEY, CERT = "key.pem", "cert.pem"
+KEY_URI = "key.p11"
+"""In the place of a key: the ``pkcs11:`` URI of one in a token (rmw_dds_common security.cpp)."""
+REQUEST = "request.csr"
+"""Beside a key that waits on its host for a certificate."""
 PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"
 ENCLAVE_GOVERNANCE = "governance.p7s"
 ENCLAVE_CRL = "crl.pem"
@@ -67,9 +77,16 @@ def enclave_directory(enclave: str) -> str:
 
 
 def shares(enclave: str) -> str:
-    """``private/shares/e.front.camera.json``; ``.`` cannot occur in a name."""
-    name = "".join(f".{part}" for part in segments(validate_enclave_name(enclave)))
-    return f"{SHARES}/e{name}.json"
+    return f"{SHARES}/{flat_name(enclave)}.json"
+
+
+def request(enclave: str) -> str:
+    return f"{REQUESTS}/{flat_name(enclave)}.csr"
+
+
+def flat_name(enclave: str) -> str:
+    """``e.front.camera``; ``.`` cannot occur in a name."""
+    return "e" + "".join(f".{part}" for part in segments(validate_enclave_name(enclave)))
 
 
 def enclave_links(enclave: str, *, crl: bool = False) -> dict[str, str]:
@@ -108,3 +125,17 @@ CA_LINKS = {
     **{ca_key(role): "ca.key.pem" for role in Role},
 }
 """The links SROS2 makes for its single CA: the only ones allowed in ``public/`` and ``private/``."""
+
+
+def signed_bundle(host: str) -> str:
+    """Where the manifest lies that was signed last for ``host``, an already checked name."""
+    return f"{BUNDLES}/{host}.p7s"
+
+
+def bundle_files(enclaves: Iterable[tuple[str, bool]], *, crl: bool) -> set[str]:
+    """Every file that a host's bundle of these enclaves has besides its manifest; True: with its private key."""
+    names = {*(ca_cert(role) for role in Role), GOVERNANCE, *([CRL] if crl else [])}
+    for enclave, has_key in enclaves:
+        own = (CERT, PERMISSIONS, *([KEY] if has_key else []))
+        names |= {f"{enclave_directory(enclave)}/{name}" for name in own}
+    return names

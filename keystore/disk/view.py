@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 _OWN_ENTRIES = frozenset({
     layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS,
+    layout.BUNDLE,
 })  # fmt: skip
 
 
@@ -121,6 +122,10 @@ class KeystoreView:
     @cached_property
     def has_crl(self) -> bool:
         return os.path.lexists(self.root / layout.CRL)
+
+    def has_request(self, enclave: str) -> bool:
+        """Whether the enclave's key was made on its host: here is only the request that was signed."""
+        return os.path.lexists(self.root / layout.request(enclave))
 
     def common_name(self, enclave: str) -> str | None:
         """Of the certificate that an enclave has; None without one."""

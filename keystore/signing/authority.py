@@ -189,7 +189,7 @@ class IdentityIssuer:
         for serial, moment in sorted(serials.items()):
             entry = x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(moment).build()
             builder = builder.add_revoked_certificate(entry)
-        crl = builder.sign(_signing_key(self._authority.signer), hashes.SHA256())
+        crl = builder.sign(signing_key(self._authority.signer), hashes.SHA256())
         return crl.public_bytes(serialization.Encoding.PEM)
 
 
@@ -241,10 +241,10 @@ def _builder(
 def _sign(builder: x509.CertificateBuilder, signer: Signer) -> bytes:
     from cryptography.hazmat.primitives import hashes, serialization
 
-    return builder.sign(_signing_key(signer), hashes.SHA256()).public_bytes(serialization.Encoding.DER)
+    return builder.sign(signing_key(signer), hashes.SHA256()).public_bytes(serialization.Encoding.DER)
 
 
-def _signing_key(signer: Signer) -> PrivateKey:
+def signing_key(signer: Signer) -> PrivateKey:
     """What ``cryptography``'s builders sign with: its own key, or a shell around the token's."""
     if isinstance(signer, FileSigner):
         return signer.private_key

@@ -47,5 +47,10 @@ def certify(
 
 
 def public_half(pem: bytes, place: str) -> PublicKey:
-    """The public key of an enclave's ``key.pem``; raises SigningUnavailableError without showing any of it."""
+    """The public key of an enclave's ``key.pem``, or of the request in its place; raises SigningUnavailableError
+    without showing any of it."""
+    if b"CERTIFICATE REQUEST" in pem:
+        from keystore.signing.requests import request_key
+
+        return request_key(pem, place).key
     return FileSigner(load_private_key(pem, None, place)).public_key()

@@ -8,17 +8,15 @@ those of the enclaves below it), strays. Every file is named one by one from the
 from __future__ import annotations
 
 import fnmatch
-import io
 import os
 import shutil
-import tarfile
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
+from keystore.disk.archive import ExportedFile, archive_bytes, parents
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
@@ -33,16 +31,6 @@ class PublicFiles(str, Enum):
 
     LINK = "link"  # as in the keystore: public/ and governance once, relative links to them
     COPY = "copy"  # every enclave directory stands alone; public/ is there for ``verify`` and a launch
-
-
-@dataclass(frozen=True, slots=True)
-class ExportedFile:
-    """``path`` is relative to the bundle; either ``data`` or ``link`` (a relative target)."""
-
-    path: str
-    mode: int
-    data: bytes = field(default=b"", repr=False)
-    link: str | None = None
 
 
 def export(
@@ -63,8 +51,9 @@ def export(
     """
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
-    names = _matching(view.enclaves(), list(patterns))
-    _refuse_unfit(view, names, now or utc_now(), accept_exposures)
+    names = matching(view.enclaves(), list(patterns))
+    refuse_unfit(view, names, now or utc_now(), accept_exposures)
+    _refuse_without_key(view, names)
     files = list(_files(view, names, public))
     target = Path(output)
     if target.exists() or target.is_symlink():
@@ -78,7 +67,17 @@ def export(
     return tuple(names)
 
 
-def _matching(names: list[str], patterns: list[str]) -> list[str]:
+def _refuse_without_key(view: KeystoreView, names: list[str]) -> None:
+    for name in names:
+        if view.has_request(name):
+            raise InvalidInputError(
+                f"the key of enclave {name} was made on its host and is only there; export a signed bundle for that "
+                f"host (--host NAME --enclave {name}) and import it there"
+            )
+
+
+def matching(names: list[str], patterns: list[str]) -> list[str]:
+    """Those of ``names`` that fit a pattern; raises InvalidInputError for a pattern that fits none."""
     for pattern in patterns:
         if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
             raise InvalidInputError(
@@ -87,11 +86,13 @@ def _matching(names: list[str], patterns: list[str]) -> list[str]:
     return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
-def _refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_exposures: bool) -> None:
+def refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_exposures: bool) -> None:
     """What ``verify`` finds wrong with these enclaves or with the keystore itself would travel with the bundle."""
     for name in names:
         directory = layout.enclave_directory(name)
         for file in layout.RUNTIME_FILES:
+            if file == layout.KEY and view.has_request(name):
+                continue  # made on its host, and only there
             if safe_files.read_if_there(view.root, f"{directory}/{file}") is None:
                 raise DamagedKeystoreError(
                     f"enclave {name} is incomplete ({file}); secure-keystore renew completes it"
@@ -156,7 +157,8 @@ def _write(target: Path, files: list[ExportedFile]) -> None:
     aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
     try:
         if target.name.endswith((".tar", ".tar.gz")):
-            _write_archive(aside, files, compressed=target.name.endswith(".gz"))
+            content = archive_bytes(files, compressed=target.name.endswith(".gz"))
+            _create(aside, content, store.PRIVATE_MODE)  # it holds keys
         else:
             _write_directory(aside, files)
         os.rename(aside, target)
@@ -181,7 +183,7 @@ def _write_directory(aside: Path, files: list[ExportedFile]) -> None:
 
 def _make_directories(aside: Path, relative: str) -> None:
     """Modes are ours, whatever the umask: who can write in a directory can replace the key in it."""
-    for parent in reversed(list(_parents(relative))):
+    for parent in reversed(list(parents(relative))):
         try:
             os.mkdir(aside / parent, 0o755)
             os.chmod(aside / parent, 0o755)
@@ -196,35 +198,3 @@ def _create(path: Path, data: bytes, mode: int) -> None:
         stream.write(data)
         stream.flush()
         os.fsync(descriptor)
-
-
-def _write_archive(aside: Path, files: list[ExportedFile], *, compressed: bool) -> None:
-    """Sorted, without times and owners; holds keys, so the archive itself is private."""
-    buffer = io.BytesIO()
-    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.GNU_FORMAT) as archive:
-        for directory in sorted({parent for file in files for parent in _parents(file.path)}):
-            archive.addfile(_entry(directory, 0o755, tarfile.DIRTYPE))
-        for file in sorted(files, key=lambda file: file.path):
-            entry = _entry(
-                file.path, file.mode, tarfile.SYMTYPE if file.link is not None else tarfile.REGTYPE
-            )
-            entry.linkname = file.link or ""
-            entry.size = len(file.data)
-            archive.addfile(entry, io.BytesIO(file.data))
-    content = buffer.getvalue()
-    if compressed:
-        import gzip
-
-        content = gzip.compress(content, mtime=0)
-    _create(aside, content, store.PRIVATE_MODE)
-
-
-def _parents(path: str) -> Iterator[str]:
-    while path := os.path.dirname(path):
-        yield path
-
-
-def _entry(path: str, mode: int, kind: bytes) -> tarfile.TarInfo:
-    entry = tarfile.TarInfo(path)
-    entry.mode, entry.type = mode, kind
-    return entry

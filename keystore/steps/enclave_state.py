@@ -141,6 +141,8 @@ def _identity(
     key = safe_files.read_if_there(view.root, f"{directory}/{layout.KEY}")
     cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
     facts = _facts(cert)
+    if key is None and (request := safe_files.read_if_there(view.root, layout.request(enclave))) is not None:
+        return _made_on_host(view, register, enclave, request, facts, now, due)
     if key is None:
         return _Found(Reissue.KEY_PAIR, facts, "no private key" if cert is not None else NEW)
     if mode & 0o077:
@@ -155,6 +157,22 @@ def _identity(
     if register is not None and not _key_is_ours(view, register, enclave, key):
         return _Found(Reissue.KEY_PAIR, facts, f"its private key was not issued here ({problem})", True)
     return _Found(Reissue.CERTIFICATE, facts, problem)
+
+
+def _made_on_host(
+    view: KeystoreView,
+    register: Register | None,
+    enclave: str,
+    request: bytes,
+    facts: CertificateFacts | None,
+    now: datetime,
+    due: datetime,
+) -> _Found:
+    """The key is on its host; ``private/`` holds the request that somebody accepted, so it may be certified again."""
+    if facts is None:
+        return _Found(Reissue.CERTIFICATE, None, "no certificate")
+    problem = _certificate_problem(view, register, enclave, request, facts, now, due)
+    return _Found(Reissue.CERTIFICATE if problem else Reissue.NOTHING, facts, problem or "")
 
 
 def _key_mode(view: KeystoreView, directory: str) -> int:

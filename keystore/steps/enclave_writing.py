@@ -197,11 +197,18 @@ class EnclaveWriter:
         return made.common_name, made.validity
 
     def _issue(self, state: EnclaveState, cn: str, actions: list[str]) -> Identity:
+        made_on_host = self._view.has_request(state.enclave)
+        if state.reissue is Reissue.KEY_PAIR and made_on_host:
+            raise InvalidInputError(
+                f"the key of enclave {state.enclave} was made on its host, so a new one is made there: "
+                f"secure-keystore request KEYSTORE {state.enclave}, then sign it here"
+            )
         if state.reissue is Reissue.KEY_PAIR:
             known = state.facts is not None or bool(self._register.of_enclave(state.enclave))
             actions.append("key and certificate" if known and not _is_new(state) else "created")
             return new_identity(self._issuer, cn, self._validity, self._view.settings.curve)
-        relative = f"{layout.enclave_directory(state.enclave)}/{layout.KEY}"
+        directory = layout.enclave_directory(state.enclave)
+        relative = layout.request(state.enclave) if made_on_host else f"{directory}/{layout.KEY}"
         key = safe_files.read_private(self._view.root, relative)
         actions.append("certificate")
         return certify(

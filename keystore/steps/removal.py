@@ -81,6 +81,7 @@ def remove(
         warnings = _strike(opened, wanted, chosen, now)
         for name in wanted:
             opened.remove(layout.shares(name))
+            opened.remove(layout.request(name))
             if opened.is_directory(layout.enclave_directory(name)):
                 _delete(opened, name)
         issuer = fingerprint(KeystoreView(root).ca(Role.IDENTITY).der)

@@ -19,7 +19,7 @@ from keystore.formats.policy import PolicyError
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
-    "governance", "shares",
+    "import", "request", "sign", "fleet", "governance", "shares",
 )  # fmt: skip
 
 

@@ -1,7 +1,8 @@
-"""Write a bundle for one host: the chosen enclaves, no CA keys, no other enclaves' keys.
+"""Write bundles for hosts: the chosen enclaves, no CA keys, no other enclaves' keys.
 
-OUT is a new directory, or an archive when it ends in .tar or .tar.gz (the same keystore gives the same
-bytes).
+With --hosts FILE (glob of enclaves -> host) or --host NAME: one signed bundle for each host, OUT/NAME.bundle, which
+secure-keystore import puts in force there; the same keystore gives the same bytes. Without: OUT is a new directory,
+or an archive when it ends in .tar or .tar.gz, for whoever unpacks it himself.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import argparse
 import sys
 from pathlib import Path
 
+from keystore.errors import InvalidInputError
 from keystore.verb import common
 
 
@@ -17,8 +19,15 @@ def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True)
     parser.add_argument(
-        "--enclave", metavar="PATTERN", action="append", required=True,
+        "--enclave", metavar="PATTERN", action="append", default=[],
         help="name or fnmatch pattern such as '/robot1/*'; repeatable",
+    )  # fmt: skip
+    parser.add_argument(
+        "--hosts", metavar="FILE", type=Path, help="YAML: which enclaves belong to which host"
+    )
+    parser.add_argument(
+        "--host", metavar="NAME", action="append", default=[],
+        help="with --hosts only these; without, the one host that gets the enclaves of --enclave",
     )  # fmt: skip
     parser.add_argument(
         "--public", choices=("link", "copy"), default="link",
@@ -28,11 +37,23 @@ def describe(parser: argparse.ArgumentParser) -> None:
         "--accept-exposures", action="store_true",
         help="export although verify finds exposures (errors are never exported)",
     )  # fmt: skip
+    parser.add_argument(
+        "--accept-shared-enclaves", action="store_true",
+        help="export although an enclave, and so its key, would be on several hosts",
+    )  # fmt: skip
+    common.add_signing(parser)
+    common.add_lock(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
+    if arguments.hosts or arguments.host:
+        return _export_hosts(arguments)
     from keystore.steps.bundle import PublicFiles, export
 
+    if not arguments.enclave:
+        raise InvalidInputError(
+            "say what to export: --hosts FILE, --host NAME --enclave PATTERN, or --enclave PATTERN"
+        )
     names = export(
         arguments.keystore, arguments.output, arguments.enclave,
         public=PublicFiles(arguments.public), accept_exposures=arguments.accept_exposures,
@@ -40,6 +61,58 @@ def run(arguments: argparse.Namespace) -> int:
     common.print_lines(names)
     print(f"to pin its CAs where it is unpacked: {_pinned(arguments.keystore)}", file=sys.stderr)
     return 0
+
+
+def _export_hosts(arguments: argparse.Namespace) -> int:
+    from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned
+
+    options = BundleOptions(
+        accept_exposures=arguments.accept_exposures,
+        accept_shared=arguments.accept_shared_enclaves,
+        access=common.access(arguments),
+        lock_timeout=arguments.lock_timeout,
+    )
+    made = export_hosts(arguments.keystore, arguments.output, _assigned(arguments), options=options)
+    for one in made:
+        state = "" if one.is_new else " (as last time)"
+        print(f"{one.path}: number {one.manifest.number}, {len(one.manifest.enclaves)} enclaves{state}")
+    pins = " ".join(f"--require-ca {one}" for one in pinned(made[0].manifest))
+    print(f"the first import on a host wants these, by another way than the bundle: {pins}", file=sys.stderr)
+    return 0
+
+
+def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
+    """Host -> names or patterns of its enclaves. Raises InvalidInputError."""
+    if arguments.hosts is None:
+        if len(arguments.host) != 1 or not arguments.enclave:
+            raise InvalidInputError("without --hosts FILE give one --host NAME and its --enclave PATTERN")
+        return {arguments.host[0]: arguments.enclave}
+    from keystore.formats.hosts import load_hosts
+    from keystore.steps.enclaves import list_enclaves
+    from keystore.steps.host_bundles import enclaves_of_hosts
+
+    if arguments.enclave:
+        raise InvalidInputError("--hosts FILE says which enclaves: leave --enclave out")
+    hosts = load_hosts(arguments.hosts)
+    enclaves = list_enclaves(arguments.keystore)
+    assigned = enclaves_of_hosts(enclaves, hosts)
+    unknown = sorted(set(arguments.host) - set(assigned))
+    if unknown:
+        raise InvalidInputError(f"{arguments.hosts} has no host {', '.join(unknown)}")
+    if by_node := [host.name for host in hosts.hosts if host.nodes]:
+        common.warn([
+            f"{arguments.hosts}: the nodes of {', '.join(by_node)} are not looked at here: a keystore knows enclaves. "
+            "secure-plan hosts PLAN --hosts FILE --write-enclaves NEW.yaml names the enclaves"
+        ])  # fmt: skip
+    left = sorted(set(enclaves) - {one for listed in assigned.values() for one in listed})
+    if left:
+        common.warn([f"on no host: {', '.join(left)}"])
+    chosen = {
+        host: listed for host, listed in assigned.items() if not arguments.host or host in arguments.host
+    }
+    if not chosen:
+        raise InvalidInputError(f"{arguments.hosts} names no host")
+    return chosen
 
 
 def _pinned(keystore: Path) -> str:

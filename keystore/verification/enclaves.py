@@ -145,7 +145,10 @@ class _EnclaveCheck:
             yield self.error("unreadable", "", str(error))
 
     def _missing(self) -> Iterator[Finding]:
+        elsewhere = self._view.has_request(self._enclave) or self._read(layout.KEY_URI) is not None
         for name in layout.RUNTIME_FILES:
+            if name == layout.KEY and elsewhere:
+                continue  # the key is on its host, or in a token
             if self._read(name) is None:
                 yield self.error("missing", name, "missing: a process cannot start with this enclave")
 

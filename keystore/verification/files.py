@@ -21,12 +21,14 @@ _TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES})
 _KNOWN = frozenset({
     layout.LOCK, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
     layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER, layout.CRL_UNLINKED,
+    layout.BUNDLE,
     *(layout.ca_cert(role) for role in Role),
     *(layout.ca_key(role) for role in Role), *(layout.ca_key_uri(role) for role in Role),
 })  # fmt: skip
 _NEXT_CAS = frozenset(
     f"{layout.NEXT}/{role.value}/{name}" for role in Role for name in (layout.KEY, layout.CERT)
 )
+_PRIVATE_FOLDERS = (layout.RETIRED, layout.SHARES, layout.BUNDLES, layout.REQUESTS)
 _UNFINISHED = (layout.STAGING, layout.INCOMING)
 
 
@@ -87,7 +89,7 @@ def _check_directory(root: Path, relative: str, info: os.stat_result, names: lis
         )  # fmt: skip
         return
     yield from _check_owner(root, relative, info, private=relative.split("/")[0] == layout.PRIVATE)
-    if relative in _TOP or relative in (layout.RETIRED, layout.SHARES) or relative.startswith(layout.NEXT):
+    if relative in _TOP or relative in _PRIVATE_FOLDERS or relative.startswith(layout.NEXT):
         return
     if relative.startswith(layout.ENCLAVES + "/"):
         name = relative.removeprefix(layout.ENCLAVES)
@@ -137,10 +139,16 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
         return
     if directory == layout.SHARES and name.endswith((".json", ".lock")):
         return
+    if (directory == layout.BUNDLES and name.endswith(".p7s")) or (
+        directory == layout.REQUESTS and name.endswith(".csr")
+    ):
+        return
     if relative in _NEXT_CAS:
         return
     if directory.split("/")[0] == layout.ENCLAVES and name in layout.ENCLAVE_FILES:
         return
+    if name == layout.KEY_URI and not os.path.lexists(root / directory / layout.KEY):
+        return  # the enclave's key is in a token
     if name.endswith(".p11"):
         yield _stray(root, relative, "rcl prefers it to the .pem beside it, and Fast DDS takes only keys so")
     else:

@@ -17,10 +17,15 @@ from keystore.signing import authority
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.pkcs11_signer import Pkcs11Signer, parse_uri
 from keystore.steps.creation import ImportedCa
+from keystore.steps.host_bundles import export_hosts, pinned
+from keystore.steps.host_keys import RequestOptions, request
+from keystore.steps.importing import ImportOptions, import_bundle
 from keystore.steps.provisioning import provision
 from keystore.steps.removal import RemoveOptions, remove
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.request_signing import SigningOptions, sign_requests
 from keystore.verification import verify
-from tests.keystore.kit import DAY, created, openssl, options, policy
+from tests.keystore.kit import DAY, created, filled, openssl, options, policy
 
 MODULES = ("/usr/lib/softhsm/libsofthsm2.so", "/usr/lib/x86_64-linux-gnu/softhsm/libsofthsm2.so")
 PIN = "1234"
@@ -161,3 +166,22 @@ def test_uris_are_decoded() -> None:
     assert parse_uri("pkcs11:token=My%20robots;id=%01%02?module-path=/a/b.so") == {
         "token": "My robots", "id": "\x01\x02", "module-path": "/a/b.so",
     }  # fmt: skip
+
+
+def test_an_enclaves_key_in_a_token_is_asked_for_and_used_by_its_uri(
+    token: Mapping[str, str], tmp_path: Path
+) -> None:
+    """As REP 2015 has it: rcl takes ``key.p11``, which Fast DDS reads; the key in a file of before is gone."""
+    ca = filled(tmp_path / "ca", ["/arm"])
+    asking = RequestOptions(token=uri(Role.IDENTITY), access=access(token))
+    asked = request(tmp_path / "ks", ["/arm"], options=asking)
+    for _ in range(2):  # the second time renewed, for the same key
+        sign_requests(ca, asked, options=SigningOptions(provisioning=options()))
+        bundle = export_hosts(ca, tmp_path / "out", {"arm": ["/arm"]})[0]
+        import_bundle(tmp_path / "ks", bundle.path, options=ImportOptions("arm", pinned(bundle.manifest)))
+        assert (tmp_path / "ks/enclaves/arm/key.p11").read_text() == uri(Role.IDENTITY) + "\n"
+        assert not (tmp_path / "ks/enclaves/arm/key.pem").exists()
+        assert verify(tmp_path / "ks").is_good
+        renew(ca, ["/arm"], options=RenewOptions(provisioning=options()))
+    with pytest.raises(InvalidInputError, match="one key in a token is for one enclave"):
+        request(tmp_path / "ks", ["/arm", "/leg"], options=asking)

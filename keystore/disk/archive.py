@@ -1,0 +1,83 @@
+"""Files of a keystore as one tar archive, and back: the same files give the same bytes, and nothing strange is read.
+
+An archive from elsewhere may name paths outside of the keystore, links, devices, one file twice, or never end. Only its
+regular files are taken, by name, into memory; what is written from them is decided by whoever knows the manifest.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import tarfile
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+
+from keystore.errors import DamagedKeystoreError
+
+MAX_ARCHIVE = 256_000_000
+"""Bytes; some 20 000 enclaves."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFile:
+    """``path`` is relative to the bundle; either ``data`` or ``link`` (a relative target)."""
+
+    path: str
+    mode: int
+    data: bytes = field(default=b"", repr=False)
+    link: str | None = None
+
+
+def archive_bytes(files: Iterable[ExportedFile], *, compressed: bool = False) -> bytes:
+    """Sorted, without times and owners."""
+    listed = list(files)
+    buffer = io.BytesIO()
+    with tarfile.open(fileobj=buffer, mode="w", format=tarfile.GNU_FORMAT) as archive:
+        for directory in sorted({parent for file in listed for parent in parents(file.path)}):
+            archive.addfile(_entry(directory, 0o755, tarfile.DIRTYPE))
+        for file in sorted(listed, key=lambda file: file.path):
+            kind = tarfile.SYMTYPE if file.link is not None else tarfile.REGTYPE
+            entry = _entry(file.path, file.mode, kind)
+            entry.linkname = file.link or ""
+            entry.size = len(file.data)
+            archive.addfile(entry, io.BytesIO(file.data))
+    if not compressed:
+        return buffer.getvalue()
+    import gzip
+
+    return gzip.compress(buffer.getvalue(), mtime=0)
+
+
+def read_archive(content: bytes, place: str) -> dict[str, bytes]:
+    """Name -> bytes of each regular file. Raises DamagedKeystoreError for what is cut off, names a file twice, or
+    holds anything but files and directories."""
+    found: dict[str, bytes] = {}
+    try:
+        with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as archive:
+            for entry in archive:
+                if entry.isdir():
+                    continue
+                if not entry.isreg() or entry.name in found:
+                    raise DamagedKeystoreError(f"{place}: {entry.name!r} is not a file of its own")
+                stream = archive.extractfile(entry)
+                data = stream.read() if stream is not None else b""
+                if len(data) != entry.size:
+                    raise DamagedKeystoreError(f"{place} is cut off within {entry.name!r}; copy it again")
+                found[entry.name] = data
+    except (tarfile.TarError, EOFError, OSError, ValueError) as error:
+        raise DamagedKeystoreError(
+            f"{place} is not a bundle, or is cut off ({error}); copy it again"
+        ) from None
+    return found
+
+
+def parents(path: str) -> Iterator[str]:
+    """The directories above a relative path, the innermost first."""
+    while path := os.path.dirname(path):
+        yield path
+
+
+def _entry(path: str, mode: int, kind: bytes) -> tarfile.TarInfo:
+    entry = tarfile.TarInfo(path)
+    entry.mode, entry.type = mode, kind
+    return entry

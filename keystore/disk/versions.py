@@ -1,0 +1,136 @@
+"""A keystore that was imported: versions beside each other, and one link that says which counts.
+
+    /etc/ros/keystore        -> keystore.d/1763774400      what ROS_SECURITY_KEYSTORE names
+    /etc/ros/keystore.d/1763774400/                        a whole keystore without private/
+    /etc/ros/keystore.d/pending/                           keys made here that wait for their certificates
+
+A version is written aside, made durable, and put in force by one rename of the link: whoever looks at any moment sees
+the old one or the new one, whole. What a dead run left is never seen and cleared by the next.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+
+from keystore.disk import layout, lock, safe_files
+from keystore.disk.archive import parents
+from keystore.disk.store import Content, Link, create_root
+from keystore.errors import NotAKeystoreError, StorageError, printable
+
+PENDING = "pending"
+_STAGING = ".staging"
+
+
+class Versions:
+    """The imported keystore at ``root``, which is a link or not there yet. Raises NotAKeystoreError otherwise."""
+
+    def __init__(self, root: Path | str):
+        given = Path(os.path.abspath(root))
+        self.root = Path(os.path.realpath(given.parent)) / given.name
+        self.folder = self.root.with_name(f"{self.root.name}.d")
+        if os.path.lexists(self.root) and not self._is_ours():
+            raise NotAKeystoreError(
+                f"{printable(self.root)} exists and was not imported; choose another place, or move it away "
+                "and import with --require-ca"
+            )
+
+    @property
+    def current(self) -> Path | None:
+        """The version in force; None before the first import."""
+        return self.folder / os.readlink(self.root).rpartition("/")[2] if self.root.is_symlink() else None
+
+    @property
+    def pending(self) -> Path:
+        return self.folder / PENDING
+
+    @contextmanager
+    def opened(self, timeout: float = lock.DEFAULT_TIMEOUT) -> Iterator[None]:
+        """Under the lock of whoever imports or makes keys here; what a dead run left is cleared first."""
+        create_root(self.folder)
+        safe_files.refuse_unsafe_directory(self.folder)
+        with lock.exclusive(self.folder, timeout):
+            self._clear()
+            yield
+
+    def stage(self, entries: Mapping[str, Content | Link]) -> Path:
+        """Write a version aside; its place, for ``switch``. Raises StorageError."""
+        staging = self.folder / _STAGING
+        try:
+            os.mkdir(staging, 0o700)
+            os.chmod(staging, 0o755)
+            for relative, entry in entries.items():
+                _make_directories(staging, relative)
+                if isinstance(entry, Link):
+                    os.symlink(entry.target, staging / relative)
+                else:
+                    write_new(staging / relative, entry.data, entry.mode)
+        except OSError as error:
+            raise StorageError.of(error, "writing the bundle's files") from None
+        return staging
+
+    def switch(self, number: int) -> None:
+        """Put what was staged in force, then delete what was before: its keys are no longer used."""
+        link = self.folder / f"{_STAGING}.link"
+        try:
+            _sync_tree(self.folder / _STAGING)
+            os.rename(self.folder / _STAGING, self.folder / str(number))
+            os.symlink(f"{self.folder.name}/{number}", link)
+            _sync(self.folder)
+            os.rename(link, self.root)
+            _sync(self.root.parent)
+            self._clear()
+        except OSError as error:
+            raise StorageError.of(error, "putting the bundle in force") from None
+
+    def discard(self) -> None:
+        """Forget what was staged."""
+        shutil.rmtree(self.folder / _STAGING, ignore_errors=True)
+
+    def _is_ours(self) -> bool:
+        target = os.readlink(self.root) if self.root.is_symlink() else ""
+        folder, _, number = target.partition("/")
+        return folder == self.folder.name and number.isascii() and number.isdigit()
+
+    def _clear(self) -> None:
+        kept = {PENDING, layout.LOCK, *([self.current.name] if self.current else [])}
+        for name in sorted(set(os.listdir(self.folder)) - kept):
+            path = self.folder / name
+            if path.is_dir() and not path.is_symlink():
+                shutil.rmtree(path)
+            else:
+                os.unlink(path)
+
+
+def write_new(path: Path, data: bytes, mode: int) -> None:
+    """A file that was not there, private from its first byte, with exactly this mode; not yet durable."""
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
+    with os.fdopen(descriptor, "wb") as stream:
+        os.fchmod(descriptor, mode)
+        stream.write(data)
+
+
+def _make_directories(root: Path, relative: str) -> None:
+    for parent in reversed(list(parents(relative))):
+        if not (root / parent).is_dir():
+            os.mkdir(root / parent, 0o755)
+            os.chmod(root / parent, 0o755)
+
+
+def _sync_tree(root: Path) -> None:
+    for folder, _, files in os.walk(root):
+        for name in files:
+            if not os.path.islink(os.path.join(folder, name)):
+                _sync(Path(folder, name))
+        _sync(Path(folder))
+
+
+def _sync(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,116 @@
+"""What a bundle for one host says about itself: the manifest, signed by the permissions CA. Pure.
+
+    bundle.p7s      the manifest, as S/MIME like governance and permissions
+    public/...      trust anchors and CRL          enclaves/...    governance and each enclave's files
+
+The manifest names every file with its SHA-256, so that nothing can be added, left out or exchanged; the host, so that
+another host's bundle is refused; a number that only grows, so that an earlier bundle is; the fingerprints of the
+CAs; and of each enclave what the register of the CA holds: serial, hash of the key, hash of the permissions, dates.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Mapping
+from datetime import datetime
+from typing import Any, NamedTuple
+
+from keystore.errors import DamagedKeystoreError, KeystoreError
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.hosts import refuse_host_name
+from keystore.formats.role import Role
+from keystore.formats.validity import iso, parse_moment
+
+TYPE = "enclave-launch bundle"
+_VERSION = 1
+
+
+class BundledEnclave(NamedTuple):
+    """``key`` and ``document`` are the register's: SHA-256 of the public key and of the signed permissions.
+    ``has_key``: the private key lies in the bundle; otherwise it was made on the host and never left it."""
+
+    enclave: str
+    serial: int
+    key: str
+    document: str
+    not_before: datetime
+    not_after: datetime
+    has_key: bool
+
+
+class Manifest(NamedTuple):
+    """``authorities``: SHA-256 of each trusted CA certificate. ``ends``: when the first thing in it ends."""
+
+    host: str
+    number: int
+    authorities: Mapping[Role, tuple[str, ...]]
+    crl_number: int
+    enclaves: tuple[BundledEnclave, ...]
+    files: Mapping[str, str]
+    ends: datetime
+
+    def same_content(self, other: Manifest) -> bool:
+        """Whether both say the same apart from their numbers."""
+        return self == other._replace(number=self.number)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(one.enclave for one in self.enclaves)
+
+
+def manifest_json(manifest: Manifest) -> bytes:
+    """One line for each enclave and file: differences between two can be read."""
+    head = {
+        "type": TYPE,
+        "version": _VERSION,
+        "host": manifest.host,
+        "number": manifest.number,
+        "authorities": {role.value: list(manifest.authorities[role]) for role in Role},
+        "crl_number": manifest.crl_number,
+        "ends": iso(manifest.ends),
+    }
+    lines = [f"{json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
+    lines += _block("enclaves", (_row(one) for one in manifest.enclaves), "],")
+    lines += _block("files", ([name, digest] for name, digest in sorted(manifest.files.items())), "]")
+    return "\n".join(("{", *lines, "}", "")).encode()
+
+
+def _block(name: str, rows: Iterable[list[Any]], end: str) -> Iterator[str]:
+    yield f'"{name}": ['
+    yield ",\n".join(json.dumps(row) for row in rows)
+    yield end
+
+
+def _row(one: BundledEnclave) -> list[Any]:
+    dates = (iso(one.not_before), iso(one.not_after))
+    return [one.enclave, f"{one.serial:x}", one.key, one.document, *dates, one.has_key]
+
+
+def parse_manifest(text: bytes, place: str) -> Manifest:
+    """Raises DamagedKeystoreError for anything but what ``manifest_json`` writes."""
+    try:
+        content: Any = json.loads(text)
+        if content["type"] != TYPE or content["version"] != _VERSION:
+            raise DamagedKeystoreError(f"{place}: not a bundle of this version; update secure-keystore")
+        refuse_host_name(content["host"], place)
+        return Manifest(
+            str(content["host"]),
+            int(content["number"]),
+            {role: tuple(map(str, content["authorities"][role.value])) for role in Role},
+            int(content["crl_number"]),
+            tuple(map(_enclave, content["enclaves"])),
+            {str(name): str(digest) for name, digest in content["files"]},
+            parse_moment(content["ends"]),
+        )
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError) as error:
+        if isinstance(error, KeystoreError):
+            raise
+        raise DamagedKeystoreError(f"{place} is not the manifest of a bundle") from None
+
+
+def _enclave(row: list[Any]) -> BundledEnclave:
+    name, serial, key, document, not_before, not_after, has_key = row
+    dates = (parse_moment(not_before), parse_moment(not_after))
+    return BundledEnclave(
+        validate_enclave_name(name), int(serial, 16), str(key), str(document), *dates, bool(has_key)
+    )

@@ -1,0 +1,159 @@
+"""Which host an enclave or a node belongs to: a small YAML file, read strictly. Pure but for reading it.
+
+    version: 1
+    hosts:
+      base:
+        enclaves: [/base, "/base/*"]       # names or fnmatch patterns; * also covers further /
+      arm:
+        enclaves: ["/arm*"]
+        nodes: ["/camera/*"]               # final node names; for secure-plan, which knows nodes
+    needs:                                 # what the hardening of secure-plan export must leave open
+      - nodes: ["/camera/*"]
+        devices: [/dev/video0]
+        realtime: false                    # may choose its own scheduling
+        writable_code: false               # makes code while it runs (JIT compilers)
+        memory: 256Mi                      # limit
+
+A name that is written out counts before any pattern. Two hosts whose patterns both fit, or whose files both write a
+name out, is an error: nobody should have to know which line wins.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import NamedTuple
+
+from pydantic import Field, StrictBool, StrictInt, StrictStr
+
+from keystore.errors import InvalidInputError, printable
+from keystore.formats.strict_yaml import Strict, parse_strict, read_given
+
+_HOST = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]{0,61}[A-Za-z0-9])?\Z")
+_MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")
+_DEVICE = re.compile(r"/dev/[A-Za-z0-9._/-]+\Z")
+
+
+class Host(NamedTuple):
+    """Patterns of what belongs on one host."""
+
+    name: str
+    enclaves: tuple[str, ...] = ()
+    nodes: tuple[str, ...] = ()
+
+
+class Needs(NamedTuple):
+    """What a process needs of its host beyond the network. ``memory``: its limit, such as ``256Mi``."""
+
+    devices: tuple[str, ...] = ()
+    realtime: bool = False
+    writable_code: bool = False
+    memory: str = "256Mi"
+
+
+class NodeNeeds(NamedTuple):
+    nodes: tuple[str, ...]
+    needs: Needs
+
+
+class Hosts(NamedTuple):
+    """``where`` names the file in errors."""
+
+    hosts: tuple[Host, ...] = ()
+    needs: tuple[NodeNeeds, ...] = ()
+    where: str = "the hosts file"
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(host.name for host in self.hosts)
+
+    def of_enclave(self, enclave: str) -> str | None:
+        """Raises InvalidInputError when patterns of several hosts fit."""
+        return self._of("enclave", enclave, {host.name: host.enclaves for host in self.hosts})
+
+    def of_node(self, node: str) -> str | None:
+        """As ``of_enclave``, for a node's fully qualified name."""
+        return self._of("node", node, {host.name: host.nodes for host in self.hosts})
+
+    def needs_of(self, nodes: Iterable[str]) -> Needs:
+        """All that the nodes of one process need together; of ``memory`` the last entry that fits counts."""
+        names = list(nodes)
+        found = [
+            entry.needs
+            for entry in self.needs
+            if any(fnmatchcase(name, pattern) for name in names for pattern in entry.nodes)
+        ]
+        return Needs(
+            tuple(sorted({device for one in found for device in one.devices})),
+            any(one.realtime for one in found),
+            any(one.writable_code for one in found),
+            found[-1].memory if found else Needs().memory,
+        )
+
+    def _of(self, what: str, name: str, patterns: dict[str, tuple[str, ...]]) -> str | None:
+        exact = [host for host, listed in patterns.items() if name in listed]
+        fitting = exact or [
+            host for host, listed in patterns.items() if any(fnmatchcase(name, one) for one in listed)
+        ]
+        if len(fitting) > 1:
+            raise InvalidInputError(
+                f"{self.where}: {what} {name} belongs to several hosts: {', '.join(fitting)}; "
+                "write the name out for one of them, or make the patterns narrower"
+            )
+        return fitting[0] if fitting else None
+
+
+# Only what pydantic 1.8 and 2 have in common, see strict_yaml.
+class _Host(Strict):
+    enclaves: list[StrictStr] = Field(default_factory=list)
+    nodes: list[StrictStr] = Field(default_factory=list)
+
+
+class _Needs(Strict):
+    nodes: list[StrictStr]
+    devices: list[StrictStr] = Field(default_factory=list)
+    realtime: StrictBool = False
+    writable_code: StrictBool = False
+    memory: StrictStr = Needs().memory
+
+
+class _Document(Strict):
+    version: StrictInt
+    hosts: dict[StrictStr, _Host] = Field(default_factory=dict)
+    needs: list[_Needs] = Field(default_factory=list)
+
+
+def load_hosts(path: Path) -> Hosts:
+    """Raises InvalidInputError naming the file and the line or the entry."""
+    return parse_hosts(read_given(path), str(path))
+
+
+def parse_hosts(text: bytes, where: str) -> Hosts:
+    """As ``load_hosts``, from the file's content."""
+    document = parse_strict(_Document, text, where)
+    if document.version != 1:
+        raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
+    for name in document.hosts:
+        refuse_host_name(name, where)
+    hosts = tuple(Host(name, tuple(one.enclaves), tuple(one.nodes)) for name, one in document.hosts.items())
+    return Hosts(hosts, tuple(_needs(one, where) for one in document.needs), where)
+
+
+def refuse_host_name(name: str, where: str) -> None:
+    """Raises InvalidInputError for what cannot name a file, a Compose service and a Kubernetes node."""
+    if not _HOST.match(name):
+        raise InvalidInputError(
+            f"{where}: {printable(name)} is not a host name: 1 to 63 of letters, digits, '.', '_' and '-', "
+            "a letter or digit first and last"
+        )
+
+
+def _needs(one: _Needs, where: str) -> NodeNeeds:
+    if not _MEMORY.match(one.memory):
+        raise InvalidInputError(f"{where}: memory: {printable(one.memory)} is not a size such as 256Mi")
+    for device in one.devices:
+        if not _DEVICE.match(device) or ".." in device:
+            raise InvalidInputError(f"{where}: devices: {printable(device)} is not a path below /dev")
+    return NodeNeeds(tuple(one.nodes), Needs(tuple(one.devices), one.realtime, one.writable_code, one.memory))

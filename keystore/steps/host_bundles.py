@@ -1,0 +1,223 @@
+"""One signed bundle for each host: its enclaves, no CA key, and a manifest that the host can hold everything against.
+
+The same keystore and the same enclaves give the same bytes: what was signed last for a host is kept in
+``private/bundles`` and used again while it is true. A new manifest gets a higher number, by which the host tells an
+earlier bundle.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from datetime import datetime
+from pathlib import Path
+
+from keystore.disk import layout, lock, safe_files, store
+from keystore.disk.archive import ExportedFile, archive_bytes
+from keystore.disk.crl_file import crl_number, crl_validity
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.store import Store
+from keystore.disk.versions import write_new
+from keystore.disk.view import KeystoreView
+from keystore.errors import InvalidInputError, StorageError, printable
+from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest
+from keystore.formats.certificate import read_certificate
+from keystore.formats.hosts import Hosts, refuse_host_name
+from keystore.formats.role import Role
+from keystore.formats.validity import utc_now
+from keystore.signing import smime
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.public_key import fingerprint
+from keystore.signing.records import permissions_record
+from keystore.steps.bundle import matching, refuse_unfit
+from keystore.steps.creation import sign_document
+from keystore.steps.opening import opened_for_change
+
+SUFFIX = ".bundle"
+
+
+@dataclass(frozen=True, slots=True)
+class BundleOptions:
+    """``accept_shared``: enclaves that live on several hosts, whose keys are then on all of them."""
+
+    accept_exposures: bool = False
+    accept_shared: bool = False
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+    now: datetime | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class HostBundle:
+    """What was written for one host. ``is_new`` False: it is the bundle of the last time, byte by byte."""
+
+    path: Path
+    manifest: Manifest
+    is_new: bool
+
+
+def enclaves_of_hosts(enclaves: Iterable[str], hosts: Hosts) -> dict[str, list[str]]:
+    """Host -> its enclaves; those that no pattern names are on none. Raises InvalidInputError."""
+    found: dict[str, list[str]] = {host: [] for host in hosts.names}
+    for enclave in enclaves:
+        host = hosts.of_enclave(enclave)
+        if host is not None:
+            found[host].append(enclave)
+    return found
+
+
+def export_hosts(
+    keystore: Path | str,
+    output: Path | str,
+    assigned: Mapping[str, Iterable[str]],
+    *,
+    options: BundleOptions | None = None,
+) -> tuple[HostBundle, ...]:
+    """Write ``output``/HOST.bundle for each host of ``assigned`` (host -> enclave names or patterns).
+
+    Raises InvalidInputError for a host without enclaves and for an enclave on several hosts, DamagedKeystoreError for
+    what ``verify`` calls an error of these enclaves, SigningUnavailableError without the permissions CA's key.
+    """
+    chosen = options or BundleOptions()
+    root, now = resolve_root(keystore), chosen.now or utc_now()
+    view = KeystoreView(root)
+    view.require_complete()
+    names = {host: _enclaves_of(host, view, list(patterns)) for host, patterns in assigned.items()}
+    if not chosen.accept_shared:
+        _refuse_shared(names)
+    refuse_unfit(
+        view, sorted({one for listed in names.values() for one in listed}), now, chosen.accept_exposures
+    )
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        return tuple(
+            _export(opened, Path(output), host, listed, chosen, now) for host, listed in names.items()
+        )
+
+
+def _enclaves_of(host: str, view: KeystoreView, patterns: list[str]) -> list[str]:
+    refuse_host_name(host, "host")
+    if not patterns:
+        raise InvalidInputError(f"host {host} has no enclave")
+    return matching(view.enclaves(), patterns)
+
+
+def _refuse_shared(names: Mapping[str, Iterable[str]]) -> None:
+    holders: dict[str, list[str]] = {}
+    for host, enclaves in names.items():
+        for enclave in enclaves:
+            holders.setdefault(enclave, []).append(host)
+    for enclave, several in holders.items():
+        if len(several) > 1:
+            raise InvalidInputError(
+                f"enclave {enclave} would live on several hosts ({', '.join(several)}): who takes one of them is it "
+                "on all. Give the nodes enclaves of their own, or export with --accept-shared-enclaves"
+            )
+
+
+def _export(
+    opened: Store, output: Path, host: str, names: list[str], options: BundleOptions, now: datetime
+) -> HostBundle:
+    view = KeystoreView(opened.root)
+    files = {file.path: file for file in _files(view, names)}
+    manifest = _manifest(view, host, names, files)
+    present = last_signed(view, host)
+    is_new = present is None or not manifest.same_content(present[0])
+    if present is None or is_new:
+        number = max(int(now.timestamp()), present[0].number + 1 if present is not None else 0)
+        manifest = manifest._replace(number=number)
+        signed = sign_document(manifest_json(manifest), view.authority(Role.PERMISSIONS, options.access), now)
+        with opened.batch() as batch:
+            batch.file(layout.signed_bundle(host), signed, store.PRIVATE_MODE)
+    else:
+        manifest, signed = present
+    content = archive_bytes([ExportedFile(layout.BUNDLE, store.PUBLIC_MODE, signed), *files.values()])
+    return HostBundle(_write(output, host, content, opened.root), manifest, is_new)
+
+
+def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
+    """The manifest signed last for ``host`` and its file; None when there is none by the permissions CA in use."""
+    relative = layout.signed_bundle(host)
+    signed = safe_files.read_if_there(view.root, relative)
+    if signed is None:
+        return None
+    place = printable(view.root / relative)
+    document = smime.read(signed, place)
+    manifest = parse_manifest(document.document, place)
+    if not document.embeds(view.ca(Role.PERMISSIONS).der):
+        # By an earlier CA: signed anew, with a higher number.
+        return manifest._replace(files={}), signed
+    smime.check(document, [view.ca(Role.PERMISSIONS)], place)
+    return manifest, signed
+
+
+def _files(view: KeystoreView, names: list[str]) -> list[ExportedFile]:
+    crl = [layout.CRL] if view.has_crl else []
+    public = (*(layout.ca_cert(role) for role in Role), layout.GOVERNANCE, *crl)
+    files = [ExportedFile(name, store.PUBLIC_MODE, safe_files.read(view.root, name)) for name in public]
+    for enclave in names:
+        directory = layout.enclave_directory(enclave)
+        for name in (layout.CERT, layout.PERMISSIONS):
+            path = f"{directory}/{name}"
+            files.append(ExportedFile(path, store.PUBLIC_MODE, safe_files.read(view.root, path)))
+        if not view.has_request(enclave):
+            path = f"{directory}/{layout.KEY}"
+            key = safe_files.read_private(view.root, path)
+            files.append(ExportedFile(path, store.PRIVATE_MODE, key))
+    return files
+
+
+def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[str, ExportedFile]) -> Manifest:
+    enclaves = tuple(_bundled(enclave, files) for enclave in names)
+    ends = [ca.validity.not_after for role in Role for ca in view.ca_bundle(role)]
+    ends += [one.not_after for one in enclaves]
+    ends += [crl_validity(view).not_after] if view.has_crl else []
+    return Manifest(
+        host=host,
+        number=0,
+        authorities={role: tuple(fingerprint(ca.der) for ca in view.ca_bundle(role)) for role in Role},
+        crl_number=crl_number(view) if view.has_crl else 0,
+        enclaves=enclaves,
+        files={name: fingerprint(file.data) for name, file in files.items()},
+        ends=min(ends),
+    )
+
+
+def _bundled(enclave: str, files: Mapping[str, ExportedFile]) -> BundledEnclave:
+    """From the very bytes that are exported; they were checked to be what the register holds."""
+    directory = layout.enclave_directory(enclave)
+    cert = read_certificate(files[f"{directory}/{layout.CERT}"].data, f"{directory}/{layout.CERT}")
+    signed = smime.read(files[f"{directory}/{layout.PERMISSIONS}"].data, f"{directory}/{layout.PERMISSIONS}")
+    record = permissions_record(enclave, cert.common_name or "", signed.document)
+    return BundledEnclave(
+        enclave,
+        cert.serial,
+        fingerprint(cert.public_key),
+        record.document,
+        cert.validity.not_before,
+        min(cert.validity.not_after, record.not_after),
+        f"{directory}/{layout.KEY}" in files,
+    )
+
+
+def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
+    """Replaces the bundle of before: complete or as it was."""
+    target = output / f"{host}{SUFFIX}"
+    if Path(os.path.realpath(output)).is_relative_to(root):
+        raise InvalidInputError(f"{printable(output)} lies in the keystore; choose another place")
+    aside = output / f".{host}{SUFFIX}.{os.getpid()}.partial"
+    try:
+        output.mkdir(parents=True, exist_ok=True)
+        write_new(aside, content, store.PRIVATE_MODE)
+        os.rename(aside, target)
+    except OSError as error:
+        raise StorageError.of(error, "writing the bundle") from None
+    finally:
+        aside.unlink(missing_ok=True)
+    return target
+
+
+def pinned(manifest: Manifest) -> tuple[str, ...]:
+    """The fingerprints that the first import wants to be told."""
+    return tuple(dict.fromkeys(one for role in Role for one in manifest.authorities[role]))

@@ -1,0 +1,96 @@
+"""Show what a fleet has, from its bundles and imported keystores: secure-keystore fleet status DIR...
+
+Who has which enclaves until when, who is behind, who still trusts an old CA, who carries a revoked enclave. With
+--keystore, the CA's, signatures are checked and its register is asked.
+
+exit status: 0 all well, 1 something to look at (or unreadable), 3 something ends within the margin, 4 has ended
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.boundary.terminal import printable
+from keystore.verb import common
+
+if TYPE_CHECKING:
+    from keystore.steps.fleet import FleetReport, HostStatus
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("what", metavar="status", choices=("status",))
+    parser.add_argument("places", metavar="DIR", type=Path, nargs="+", help="bundles, or directories of them")
+    parser.add_argument("--keystore", metavar="KEYSTORE", type=Path, help="the CA's own, to compare with")
+    parser.add_argument("--within", metavar="TIME", default="30d", help="what counts as soon (30d)")
+    common.add_format(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.formats.validity import parse_duration
+    from keystore.steps.fleet import fleet_status
+    from keystore.verb.status import ENDED, SOON
+
+    report = fleet_status(
+        arguments.places, keystore=arguments.keystore, within=parse_duration(arguments.within)
+    )
+    if arguments.format == "json":
+        common.print_json(_json(report))
+    else:
+        _print(report)
+    if any(one.ended for one in report.hosts):
+        return ENDED
+    if any(one.due for one in report.hosts):
+        return SOON
+    return 0 if report.is_good else 1
+
+
+def _print(report: FleetReport) -> None:
+    from keystore.formats.validity import iso
+
+    for one in report.hosts:
+        manifest = one.manifest
+        print(
+            f"{manifest.host}: number {manifest.number}, {len(manifest.enclaves)} enclaves, until {iso(manifest.ends)}"
+        )
+        common.print_lines(f"  {text}" for text in one.found)
+    for place, why in report.unreadable:
+        print(f"{printable(str(place))}: cannot be used: {why}")
+    good = sum(not one.found for one in report.hosts)
+    print(f"{len(report.hosts)} hosts, {good} of them as they should be, {len(report.unreadable)} unreadable")
+
+
+def _json(report: FleetReport) -> dict[str, Any]:
+    from keystore.formats.validity import iso
+
+    return {
+        "version": 1,
+        "now": iso(report.now),
+        "hosts": [_host(one) for one in report.hosts],
+        "unreadable": [{"place": str(place), "why": why} for place, why in report.unreadable],
+    }
+
+
+def _host(one: HostStatus) -> dict[str, Any]:
+    from keystore.formats.validity import iso
+
+    manifest = one.manifest
+    return {
+        "host": manifest.host,
+        "place": str(one.place),
+        "number": manifest.number,
+        "ends": iso(manifest.ends),
+        "crl_number": manifest.crl_number,
+        "authorities": {role.value: list(listed) for role, listed in manifest.authorities.items()},
+        "enclaves": [
+            {
+                "enclave": entry.enclave,
+                "serial": f"{entry.serial:x}",
+                "not_after": iso(entry.not_after),
+                "key_made_on_host": not entry.has_key,
+            }
+            for entry in manifest.enclaves
+        ],
+        "found": list(one.found),
+    }

@@ -1,0 +1,56 @@
+"""Put a host's bundle in force, on that host: checked whole, then all at once. Needs no network and no CA key.
+
+The first import pins the CAs (--require-ca, twice) and the host's name; later ones refuse what another CA signed,
+another host's bundle, an earlier one, and what was changed or cut off. KEYSTORE becomes a link to the version in
+force; ROS_SECURITY_KEYSTORE names it. What is printed last is who has to be restarted.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("bundle", metavar="BUNDLE", type=Path, help="HOST.bundle of secure-keystore export")
+    parser.add_argument(
+        "--host", metavar="NAME", help="which host this is; for the first import (default: hostname)"
+    )
+    parser.add_argument(
+        "--require-ca", metavar="SHA256", action="append", default=[],
+        help="fingerprint of a CA to trust; both CAs at the first import; repeatable",
+    )  # fmt: skip
+    common.add_format(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.disk.versions import Versions
+    from keystore.steps.importing import ImportOptions, import_bundle
+
+    host = arguments.host
+    if host is None and Versions(arguments.keystore).current is None:
+        import socket
+
+        host = socket.gethostname()
+    options = ImportOptions(host, tuple(arguments.require_ca), arguments.lock_timeout)
+    report = import_bundle(arguments.keystore, arguments.bundle, options=options)
+    if arguments.format == "json":
+        common.print_json({
+            "version": 1,
+            "host": report.manifest.host,
+            "number": report.manifest.number,
+            "changed": list(report.changed),
+            "removed": list(report.removed),
+            "restart": report.restart.name.lower(),
+        })  # fmt: skip
+    else:
+        print(f"{report.keystore}: {report.manifest.host}, number {report.manifest.number} is in force")
+        common.print_lines(f"{one}: changed" for one in report.changed)
+        common.print_lines(f"{one}: removed" for one in report.removed)
+        print(f"to restart: {report.restart.value}")
+    common.warn(report.notes)
+    return 0

@@ -1,0 +1,53 @@
+"""On a host: make the keys of enclaves here, and a file with certificate requests for the CA.
+
+The private keys stay on this host, in KEYSTORE.d/pending, until a bundle with their certificates is imported. With
+--token the key is one that a PKCS#11 token holds: Fast DDS can use it, Cyclone DDS 0.10 cannot.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+")
+    parser.add_argument(
+        "-o", "--output", metavar="FILE", type=Path, help="where the requests go (standard output)"
+    )
+    parser.add_argument(
+        "--token", metavar="URI", help="pkcs11: URI of the enclave's key in a token (RFC 7512)"
+    )
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.steps.host_keys import RequestOptions, request, requests_text
+
+    options = RequestOptions(arguments.token, common.access(arguments), arguments.lock_timeout)
+    made = request(arguments.keystore, arguments.enclaves, options=options)
+    text = requests_text(made)
+    if arguments.output is None:
+        sys.stdout.write(text.decode())
+    else:
+        _write(arguments.output, text)
+    for one in made:
+        print(f"{one.enclave}: key SHA-256 {one.key}", file=sys.stderr)
+    return 0
+
+
+def _write(output: Path, text: bytes) -> None:
+    from keystore.errors import StorageError
+
+    aside = output.with_name(f".{output.name}.{os.getpid()}.partial")
+    try:
+        aside.write_bytes(text)
+        os.replace(aside, output)
+    except OSError as error:
+        raise StorageError.of(error, "writing the requests") from None

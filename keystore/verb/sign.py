@@ -1,0 +1,38 @@
+"""Where the CA is: certify keys that hosts made (secure-keystore request); then export and import their bundle.
+
+The enclaves must exist here with their permissions. Compare the printed fingerprints with those of the host: a
+request proves who holds the key, not who asks.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument("requests", metavar="FILE", type=Path, help="what secure-keystore request wrote")
+    parser.add_argument(
+        "--revoke-old", action="store_true", help="also revoke the certificates these enclaves had before"
+    )
+    common.add_validity(parser)
+    common.add_revocation(parser)
+    common.add_subjects(parser)
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.formats.strict_yaml import read_given
+    from keystore.steps.host_keys import parse_requests
+    from keystore.steps.request_signing import SigningOptions, sign_requests
+
+    requests = parse_requests(read_given(arguments.requests), str(arguments.requests))
+    options = SigningOptions(arguments.revoke_old, common.provision_options(arguments))
+    report = sign_requests(arguments.keystore, requests, options=options)
+    common.print_lines(f"{one.enclave}: key SHA-256 {one.key}" for one in requests)
+    common.print_report(report)
+    return 0
