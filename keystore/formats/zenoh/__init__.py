@@ -1,0 +1,12 @@
+"""Zenoh's configuration from the same policy that makes DDS permissions. Pure.
+
+    grants           what an enclave may do, as topics and services     <- DDS topics of its permissions
+    key_expressions  ROS names and types -> key expressions             (rmw_zenoh docs/design.md)
+    rules            grants -> the access-control rules of one enclave
+    router           all enclaves -> the file of ``rmw_zenohd``: it enforces
+    session          the file of one enclave's processes: clients of that router
+
+Where DDS-Security signs a document for each participant and every participant checks its peers, Zenoh has one
+place that enforces: the router's own configuration, by the common name of each client's certificate. The
+certificates are the same.
+"""
