@@ -82,7 +82,10 @@ def test_the_graph_is_the_one_that_rclpy_shows_and_each_node_is_in_its_process(
     assert {node.fqn for node in by_rclpy.nodes} >= WANTED
     observer = CycloneObserver(domain_id, environment)
     try:
-        graph = wait_for(observer, lambda graph: shown(graph) == shown(by_rclpy))
+        graph = wait_for(
+            observer,
+            lambda graph: shown(graph) == shown(by_rclpy) and all(each.listed for each in graph.processes),
+        )
     finally:
         observer.close()
     assert shown(graph) == shown(by_rclpy)
