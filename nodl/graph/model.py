@@ -102,8 +102,12 @@ class Graph(NamedTuple):
 
     @property
     def half_open(self) -> bool:
-        """Whether discovery is under way somewhere."""
-        return any(not each.complete for process in self.processes for each in process.interfaces)
+        """Whether discovery is under way somewhere: an interface lacks a part, or a participant has nothing at all
+        (what secured ones have is told only to those that they authenticate)."""
+        return any(not each.complete for process in self.processes for each in process.interfaces) or any(
+            not process.participant.claims_security and next(process.endpoints, None) is None
+            for process in self.processes
+        )
 
 
 Owners = Mapping[str, Owner]

@@ -29,6 +29,9 @@ _TF_LISTENER = "transform_listener_impl_*"
 """The node that tf2_ros makes for a ``TransformListener`` that was given none; our section has a word for it."""
 _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ros, when it is given no name
 
+OBSERVED = "observed"
+"""What ``AskedNode.started_as`` is for a node of the graph, which says nothing of states."""
+
 _UNKNOWN_TYPES = {
     EndpointKind.PUBLISHER: "unknown/msg/Unknown",
     EndpointKind.SUBSCRIPTION: "unknown/msg/Unknown",
@@ -41,7 +44,8 @@ _UNKNOWN_TYPES = {
 
 class Entry(NamedTuple):
     """One name of a node. ``written`` where the manifest cannot hold it as a plain name; ``moved``: rules of the
-    program itself made it of what the source writes, so that it is held as the final name."""
+    program itself made it of what the source writes, so that it is held as the final name; ``spellings``: what else the
+    source may write, as far as the runs can tell."""
 
     kind: EndpointKind
     name: str
@@ -51,6 +55,7 @@ class Entry(NamedTuple):
     origin: Origin = FIXED
     introspected: bool = False
     moved_from: str = ""
+    spellings: tuple[str, ...] = ()
 
 
 class ProgramKey(NamedTuple):
@@ -99,12 +104,17 @@ class _Seen(NamedTuple):
 
 def learn(records: Iterable[Record]) -> Learnt:
     """What all ``records`` together teach; order does not matter."""
+    return learn_from((record.run, all_asked(record.attributed())) for record in records)
+
+
+def learn_from(runs: Iterable[tuple[Run, Sequence[AskedNode]]]) -> Learnt:
+    """The same for runs whose nodes are known otherwise: by observing the graph."""
     groups: dict[ProgramKey, list[_Seen]] = {}
     listeners: set[ProgramKey] = set()
     unforeseeable: set[str] = set()
-    for record in sorted(records, key=lambda record: record.run.id):
+    for run, nodes in sorted(runs, key=lambda each: each[0].id):
         before: dict[tuple[str, str], ProgramKey] = {}  # the last node of each program in each process
-        for node in all_asked(record.attributed()):
+        for node in nodes:
             if not node.known_start or node.container or node.started_as == "executable":
                 continue  # no launch file can give an executable a manifest
             if node.started_as == "container":
@@ -117,10 +127,10 @@ def learn(records: Iterable[Record]) -> Learnt:
                 unforeseeable.add(f"{pattern} of {node.program}")
             else:
                 before[place] = _key(node)
-                groups.setdefault(_key(node), []).append(_Seen(node, record.run))
-    nodes = [_learnt(key, groups[key]) for key in sorted(groups)]
+                groups.setdefault(_key(node), []).append(_Seen(node, run))
+    learnt = [_learnt(key, groups[key]) for key in sorted(groups)]
     return Learnt(
-        tuple(node._replace(tf_listener=node.key in listeners) for node in nodes),
+        tuple(node._replace(tf_listener=node.key in listeners) for node in learnt),
         tuple(sorted(unforeseeable)),
     )
 
@@ -164,7 +174,9 @@ def _learnt(key: ProgramKey, seen: Sequence[_Seen]) -> LearntNode:
 
 
 def _missing(lifecycle: bool, seen: Sequence[_Seen]) -> Iterable[str]:
-    if lifecycle and not any("active" in each.node.states for each in seen):
+    if lifecycle and all(each.node.started_as == OBSERVED for each in seen):
+        yield "a lifecycle node: whether it was active while it was observed is not known"
+    elif lifecycle and not any("active" in each.node.states for each in seen):
         yield "a lifecycle node that was never active: what it makes when it is activated is not known"
 
 
@@ -173,6 +185,9 @@ def _notes(entries: Iterable[Entry], seen: Sequence[_Seen]) -> Iterable[str]:
         if entry.origin.undecided:
             said = ", ".join(map(str, entry.origin.candidates))
             yield f"{entry.name}: fixed, or from one of {said}: not decided; only this name is granted"
+        if entry.spellings:
+            others = ", ".join(entry.spellings)
+            yield f"{entry.name}: or {others}: the runs do not tell; one under another namespace and node name does"
         if entry.moved_from:
             yield f"{entry.name}: the program writes {entry.moved_from} and remaps it itself"
     bad = {(e.written, e.rc) for each in seen for e in each.node.endpoints if e.rc not in (0, 1)}
@@ -211,6 +226,7 @@ def _entry(name: Name, origin: Origin, names: set[Name], seen: Sequence[_Seen]) 
         origin,
         introspected,
         moved_from,
+        () if origin.source else first.spellings,
     )
 
 

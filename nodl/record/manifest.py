@@ -24,9 +24,14 @@ _RELIABILITY = {0: "SYSTEM_DEFAULT", 1: "RELIABLE", 2: "BEST_EFFORT", 4: "BEST_A
 _DURABILITY = {0: "SYSTEM_DEFAULT", 1: "TRANSIENT_LOCAL", 2: "VOLATILE", 4: "BEST_AVAILABLE"}
 
 
-def manifest_text(node: LearntNode, before: str = "") -> str:
-    """The document of ``node``; ``before`` is the text that stands there. Raises ``yaml.YAMLError`` for one that
-    is not YAML."""
+OBSERVED_HEAD = (
+    "# Observed by secure-nodl observe in the graph of a running system; see docs/running-systems.md.\n"
+)
+
+
+def manifest_text(node: LearntNode, before: str = "", head: str = _HEAD) -> str:
+    """The document of ``node``; ``before`` is the text that stands there, ``head`` says where it is from. Raises
+    ``yaml.YAMLError`` for a text that is not YAML."""
     import yaml
 
     old = yaml.safe_load(before) if before.strip() else None
@@ -34,7 +39,7 @@ def manifest_text(node: LearntNode, before: str = "") -> str:
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     notes = "".join(f"# {_line(text)}\n" for text in (*node.incomplete, *node.notes))
     text = yaml.dump(document, Dumper=dumper, sort_keys=False, width=110, allow_unicode=True)
-    return f"{_HEAD}{notes}{text}"
+    return f"{head}{notes}{text}"
 
 
 def manifest_file_name(node: LearntNode, alone: bool) -> str:
@@ -122,8 +127,8 @@ def _about(entry: Entry) -> dict[str, Any]:
         fields["each"] = origin.source.each
         fields["default"] = origin.default
         fields["proof"] = "another value was followed" if origin.proven else "one run"
-    if origin.undecided:
-        fields["undecided"] = [str(source) for source in origin.candidates]
+    if origin.undecided or entry.spellings:
+        fields["undecided"] = [*map(str, origin.candidates), *entry.spellings]
     fields["introspection"] = entry.introspected
     fields["runs"] = list(entry.runs)
     return {name: value for name, value in fields.items() if value not in (None, False, [])}

@@ -28,7 +28,7 @@ class Meant(NamedTuple):
 def meant_name(kind: EndpointKind, written: str, final: str, fqn: str, rules: RemapRules | None) -> Meant:
     """What the source of the node ``fqn`` means by ``written``, which became ``final`` by the launch's ``rules``."""
     name = private_name(written, fqn)
-    if rules is None or not final or not fqn or final in _candidates(kind, name, fqn, rules):
+    if rules is None or not final or not fqn or final in final_names(kind, name, fqn, rules):
         return Meant(name)
     return Meant(final, moved=True)
 
@@ -45,8 +45,8 @@ def private_name(written: str, fqn: str) -> str:
     return written
 
 
-def _candidates(kind: EndpointKind, name: str, fqn: str, rules: RemapRules) -> set[str]:
-    """What ``name`` may become by the launch's rules; actions with and without them, as distributions differ."""
+def final_names(kind: EndpointKind, name: str, fqn: str, rules: RemapRules) -> set[str]:
+    """What ``name`` may become in the node ``fqn``; actions with and without rules, as distributions differ."""
     namespace, node = split_fqn(fqn)
     names = NodeNames(node, namespace, rules)
     try:

@@ -13,7 +13,7 @@ from importlib import import_module
 from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.terminal import safe_output
 
-VERBS = ("check_record", "convert", "infer", "library", "show", "validate")
+VERBS = ("check_record", "convert", "infer", "library", "observe", "show", "validate")
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -1,0 +1,161 @@
+"""How a node was started: from the command line of its process, or from the plan of a launch file. Pure.
+
+A plan is the JSON of ``secure-launch --dry-run --format json`` (docs/dry-run-json.md).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+
+_IN_PREFIX = re.compile(r"(?:.*/)?lib/([^/]+)/([^/]+)\Z")  # an executable of an ament package
+_UNSPECIFIED = "<node_name_unspecified>"
+
+
+class Start(NamedTuple):
+    """What is known of how a node was started. ``fqn`` is empty where the launch file gives no name; ``command`` where
+    it is a component, whose rules are those of the load request."""
+
+    package: str = ""
+    executable: str = ""
+    plugin: str = ""
+    fqn: str = ""
+    namespace: str = ""
+    command: tuple[str, ...] = ()
+    rule_texts: tuple[str, ...] = ()
+    parameters: Mapping[str, object] = MappingProxyType({})
+    arguments: tuple[str, ...] = ()
+
+    @property
+    def program(self) -> str:
+        return f"{self.package}/{self.plugin or self.executable}"
+
+    @property
+    def rules(self) -> RemapRules:
+        """Those that rcl would take."""
+        parsed = tuple(_parsed(self.rule_texts))
+        return RemapRules(local=parsed) if self.plugin else RemapRules(process=parsed)
+
+
+def start_of_command(command: Sequence[str]) -> Start | None:
+    """Of a running process, by its command line; ``None`` for what is not a program of an ament package."""
+    place = next((i for i, word in enumerate(command[:3]) if _IN_PREFIX.match(word)), None)
+    if place is None:
+        return None
+    match = _IN_PREFIX.match(command[place])
+    assert match is not None
+    rules, parameters, arguments = _ros_words(command[place + 1 :])
+    return Start(
+        match[1],
+        match[2],
+        command=tuple(command),
+        rule_texts=rules,
+        parameters=parameters,
+        arguments=arguments,
+    )
+
+
+def starts_of_plan(document: Mapping[str, Any]) -> tuple[Start, ...]:
+    """What a launch file starts. Raises ``KeyError`` or ``TypeError`` for a document that is not a plan."""
+    return (*map(_of_process, document["processes"]), *map(_of_component, document["components"]))
+
+
+def start_for(fqn: str, command: Sequence[str], starts: Iterable[Start]) -> tuple[Start, ...]:
+    """The starts that may be those of the node ``fqn`` in the process of ``command`` (empty: not known); several when
+    nothing tells them apart."""
+    known = [each for each in starts if not each.command or not command or _within(each.command, command)]
+    named = [each for each in known if each.fqn == fqn]
+    if named:
+        return (
+            tuple(named[:1])
+            if len({(each.program, each.rule_texts) for each in named}) == 1
+            else tuple(named)
+        )
+    by_command = [each for each in known if command and each.command]
+    if by_command:  # a further node of a program, or one that the launch file does not name
+        return tuple(by_command[:1])
+    namespace = fqn.rpartition("/")[0] or "/"
+    return tuple(each for each in known if not each.fqn and each.namespace == namespace)
+
+
+def _within(planned: tuple[str, ...], running: Sequence[str]) -> bool:
+    """A running command line has an interpreter before the planned words and what ``--secure`` adds behind them."""
+    size = len(planned)
+    return any(tuple(running[i : i + size]) == planned for i in range(min(4, len(running) - size + 1)))
+
+
+def _of_process(fields: Mapping[str, Any]) -> Start:
+    command = tuple(map(str, fields["cmd"]))
+    program = next((i for i, word in enumerate(command) if word.endswith(str(fields["executable"]))), 0)
+    rules, _, arguments = _ros_words(command[program + 1 :])
+    fqn = str(fields["fqn"] or "")
+    return Start(
+        str(fields["package"] or ""),
+        str(fields["executable"]).rpartition("/")[2],
+        fqn="" if _UNSPECIFIED in fqn else fqn,
+        namespace=str(fields["namespace"] or "/"),
+        command=command,
+        rule_texts=rules,
+        parameters=dict(fields["parameters"]),
+        arguments=arguments,
+    )
+
+
+def _of_component(fields: Mapping[str, Any]) -> Start:
+    fqn = str(fields["fqn"])
+    named = _UNSPECIFIED not in fqn
+    namespace, _, name = fqn.rpartition("/")
+    rules = [f"{source}:={target}" for source, target in fields["remaps"]]
+    rules += [f"__node:={name}"] if named else []
+    rules += [f"__ns:={namespace}"] if namespace else []
+    return Start(
+        str(fields["package"]),
+        plugin=str(fields["plugin"]),
+        fqn=fqn if named else "",
+        namespace=namespace or "/",
+        rule_texts=tuple(rules),
+        parameters=dict(fields["parameters"]),
+    )
+
+
+def _ros_words(words: Sequence[str]) -> tuple[tuple[str, ...], dict[str, object], tuple[str, ...]]:
+    """Rules, parameters and the words that are not ROS's, of what follows the program (rcl ``arguments.c``)."""
+    rules: list[str] = []
+    parameters: dict[str, object] = {}
+    others: list[str] = []
+    ours, waiting = False, ""
+    for word in words:
+        if waiting:
+            if waiting in ("-r", "--remap"):
+                rules.append(word)
+            elif waiting in ("-p", "--param"):
+                name, _, value = word.partition(":=")
+                parameters[name] = value
+            waiting = ""
+        elif word == "--ros-args":
+            ours = True
+        elif ours and word == "--":
+            ours = False
+        elif ours:
+            waiting = word if word in _WITH_VALUE else ""
+        else:
+            others.append(word)
+    return tuple(rules), parameters, tuple(others)
+
+
+_WITH_VALUE = frozenset(
+    {"-r", "--remap", "-p", "--param", "--params-file", "--log-level", "--log-config-file", "--log-file-name"}
+    | {"-e", "--enclave"}
+)
+
+
+def _parsed(texts: Iterable[str]) -> Iterable[ParsedRule]:
+    for text in texts:
+        try:
+            yield parse_rule(text)
+        except InvalidRemapRuleError:
+            continue

@@ -1,0 +1,52 @@
+"""An observed graph for a person. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from nodl.graph.model import Attribution, Graph, GraphProcess, Interface
+
+
+def graph_text(graph: Graph) -> str:
+    """One block for each process: who it is, its nodes, and what they have."""
+    blocks = ["\n".join(_process(process)) for process in graph.processes]
+    nodes = sum(1 for _ in graph.nodes)
+    return "\n\n".join([*blocks, f"{len(graph.processes)} participants, {nodes} nodes"]) + "\n"
+
+
+def participant_text(process: GraphProcess) -> str:
+    """How a participant is called in messages."""
+    seen = process.participant
+    words = [f"process {seen.pid}" if seen.pid is not None else f"participant {seen.prefix}"]
+    if seen.program:
+        words.append(f"({seen.program})")
+    if seen.host:
+        words.append(f"on {seen.host}")
+    return " ".join(words)
+
+
+def _process(process: GraphProcess) -> Iterator[str]:
+    seen = process.participant
+    secured = "says that it is secured" if seen.claims_security else "not secured"
+    yield f"{participant_text(process)}, enclave {seen.enclave or '(none announced)'}, {secured}"
+    for node in process.nodes:
+        yield f"  {node.fqn}"
+        yield from (f"    {_interface(each)}" for each in node.interfaces)
+    if process.unowned:
+        yield "  of no node that is known:"
+        yield from (f"    {_interface(each)}" for each in process.unowned)
+    for endpoint in process.foreign:
+        verb = "writes" if endpoint.writes else "reads"
+        yield f"  not ROS: {verb} {endpoint.topic} [{endpoint.type}]"
+
+
+def _interface(interface: Interface) -> str:
+    words = [f"{interface.kind.value.replace('_', ' ')} {interface.name} [{interface.type}]"]
+    qualities = sorted({(e.quality.reliability, e.quality.durability) for e in interface.endpoints})
+    if interface.kind.value in ("publisher", "subscription") and qualities:
+        words.append("; ".join(" ".join(each).lower().replace("_", " ") for each in qualities))
+    if interface.by is not Attribution.LIST:
+        words.append(f"known by {interface.by}")
+    if interface.missing:
+        words.append(f"half open, without {', '.join(interface.missing)}")
+    return ", ".join(words)

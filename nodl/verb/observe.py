@@ -1,0 +1,254 @@
+"""Observe a running ROS system, whoever started it: its graph, manifests or a policy of what runs.
+
+Looks at the DDS domain until nothing has changed for a while, and writes down what was seen; with -o manifests, in
+which names go back through namespace, remap rules and parameters to what the source writes. A launch file (or the JSON
+of its dry run) tells how each node was started; without one the command lines of processes on this machine do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.boundary.terminal import json_text, printable
+from nodl.errors import NoDLError
+
+if TYPE_CHECKING:
+    from nodl.graph.model import Graph
+    from nodl.graph.observation import Observed
+    from nodl.graph.starts import Start
+    from nodl.record.learning import LearntNode
+
+FORMATS = ("text", "json", "policy", "v2")
+_SECONDS = re.compile(r"([0-9]+(?:\.[0-9]+)?)(s|m|h)?\Z")
+_UNITS = {None: 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    parser = subparsers.add_parser(
+        "observe",
+        help="observe a running system: its graph, manifests or a policy of what runs",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="exit status: 0 something was seen, 1 nothing was, or the domain cannot be observed, 2 wrong usage",
+    )
+    parser.add_argument(
+        "runs", nargs="*", metavar="RUN.json", type=Path, help="earlier observations, merged with this one"
+    )
+    looking = parser.add_argument_group("what to look at")
+    looking.add_argument("--domain-id", type=domain, metavar="N", help="default: ROS_DOMAIN_ID, else 0")
+    looking.add_argument(
+        "--for", dest="longest", type=seconds, default=60.0, metavar="TIME", help="at the longest (60s)"
+    )
+    looking.add_argument(
+        "--settle",
+        type=seconds,
+        default=5.0,
+        metavar="TIME",
+        help="end when nothing changed for this long (5s)",
+    )
+    looking.add_argument(
+        "--with", dest="source", choices=("auto", "cyclonedds", "rclpy"), default="auto",
+        help="what to look with: Cyclone DDS's Python binding (sees processes and more) or rclpy",
+    )  # fmt: skip
+    looking.add_argument(
+        "--merge-only", action="store_true", help="look at nothing; merge the observations that are named"
+    )
+    security = parser.add_argument_group("a secured system")
+    security.add_argument("--keystore", type=Path, metavar="DIR", help="default: ROS_SECURITY_KEYSTORE")
+    security.add_argument(
+        "--enclave", metavar="NAME",
+        help="the observer's own (secure-keystore tool-enclave KEYSTORE --for observe makes one); "
+        "default: ROS_SECURITY_ENCLAVE_OVERRIDE",
+    )  # fmt: skip
+    writing = parser.add_argument_group("what to write")
+    writing.add_argument(
+        "--launch", nargs="+", metavar="WORD", default=[],
+        help="how the nodes were started: PLAN.json, or PACKAGE LAUNCH_FILE | PATH [name:=value ...]",
+    )  # fmt: skip
+    writing.add_argument(
+        "--save", type=Path, metavar="RUN.json", help="keep this observation, to merge it later"
+    )
+    writing.add_argument("--format", choices=FORMATS, help="text (default); with -o: v2, NoDL manifests")
+    writing.add_argument("-o", "--output", type=Path, metavar="DIR", help="write files into DIR")
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from nodl.graph.observation import observed_text, read_observed
+
+    if arguments.merge_only and not arguments.runs:
+        print("secure-nodl observe: --merge-only needs observations to merge", file=sys.stderr)
+        return 2
+    runs = [read_observed(path) for path in arguments.runs]
+    if not arguments.merge_only:
+        now = _observe(arguments, _starts(arguments.launch))
+        if arguments.save is not None:
+            arguments.save.write_text(observed_text(now), encoding="utf-8")
+        runs.append(now)
+    chosen = arguments.format or ("v2" if arguments.output else "text")
+    documents = _documents(chosen, runs, arguments.output)
+    if arguments.output:
+        _write(arguments.output, documents)
+    else:
+        sys.stdout.write("".join(documents.values()))
+    seen = any(True for each in runs for _ in each.graph.nodes)
+    if not seen:
+        print(f"secure-nodl observe: no node was seen; {_nothing_seen(runs)}", file=sys.stderr)
+    return 0 if seen else 1
+
+
+def _observe(arguments: argparse.Namespace, starts: tuple[Start, ...]) -> Observed:
+    from datetime import datetime, timezone
+
+    from nodl.graph.observation import Observed, command_lines
+    from nodl.graph.observing import Quiet, Where, look_until, observer
+    from nodl.record.lines import Run
+
+    directory = _enclave_directory(arguments)
+    where = Where(_domain_id(arguments), arguments.source, directory)
+    commands: dict[str, tuple[str, ...]] = {}
+    with observer(where, os.environ) as up:
+        quiet = Quiet(up, arguments.settle, arguments.longest)
+
+        def done() -> bool:
+            commands.update(command_lines(up.graph(), socket.gethostname()))
+            return quiet()
+
+        look_until(up, done)
+        graph = up.graph(past=True)
+    date = datetime.now(timezone.utc)
+    run = Run(
+        f"{date:%Y%m%dT%H%M%S}-{os.urandom(3).hex()}",
+        launch_file=" ".join(arguments.launch),
+        distro=os.environ.get("ROS_DISTRO", ""),
+        date=f"{date:%Y-%m-%d}",
+        secured=directory is not None,
+    )
+    return Observed(run, graph, commands, starts)
+
+
+def _documents(chosen: str, runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
+    from nodl.graph.json_form import graph_document
+    from nodl.graph.policy import observed_policy
+    from nodl.graph.text import graph_text
+
+    if chosen == "v2":
+        return _manifests(runs, folder)
+    if chosen == "policy":
+        return {"policy.xml": observed_policy(each.graph for each in runs)}
+    last: Graph = runs[-1].graph
+    if chosen == "json":
+        return {"graph.json": json_text(graph_document(last), indent=2) + "\n"}
+    return {"graph.txt": graph_text(last)}
+
+
+def _manifests(runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
+    from nodl.graph.sources import learn_observed
+    from nodl.record.manifest import OBSERVED_HEAD, manifest_file_name, manifest_text
+
+    found = learn_observed(runs)
+    documents: dict[str, str] = {}
+    for node in found.learnt.nodes:
+        name = manifest_file_name(node, _alone(node, found.learnt.nodes))
+        path = folder / name if folder else None
+        before = path.read_text(encoding="utf-8") if path is not None and path.exists() else ""
+        documents[name] = manifest_text(node, before, OBSERVED_HEAD)
+    for text in (*found.left_out, *found.learnt.unforeseeable):
+        print(printable(f"secure-nodl observe: left out: {text}"), file=sys.stderr)
+    for node in found.learnt.nodes:
+        for note in (*node.incomplete, *node.notes):
+            which = f"{node.program}, {node.key.node or 'a node that the launch renames'}"
+            print(printable(f"secure-nodl observe: {which}: {note}"), file=sys.stderr)
+    return documents
+
+
+def _alone(node: LearntNode, nodes: Sequence[LearntNode]) -> bool:
+    return sum(each.program == node.program for each in nodes) == 1
+
+
+def _write(folder: Path, documents: dict[str, str]) -> None:
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in documents.items():
+        (folder / name).write_text(text, encoding="utf-8")
+        print(folder / name)
+
+
+def _starts(words: Sequence[str]) -> tuple[Start, ...]:
+    """Raises ``NoDLError`` for what is not a plan, and with what the dry run says of a launch file."""
+    from nodl.graph.starts import starts_of_plan
+
+    if not words:
+        return ()
+    try:
+        if len(words) == 1 and words[0].endswith(".json"):
+            return starts_of_plan(json.loads(Path(words[0]).read_text(encoding="utf-8")))
+        return starts_of_plan(_dry_run(words))
+    except (KeyError, TypeError, ValueError) as error:
+        what = " ".join(words)
+        raise NoDLError(f"--launch {what}: not the JSON of secure-launch --dry-run: {error}") from error
+
+
+def _dry_run(words: Sequence[str]) -> Any:
+    """In a process of its own: this package knows no launch files."""
+    command = [sys.executable, "-m", "enclave_launch", "--dry-run", "--format", "json", *words]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    if ran.returncode != 0:
+        raise NoDLError(f"--launch {' '.join(words)}: {ran.stderr.strip()}")
+    return json.loads(ran.stdout)
+
+
+def _enclave_directory(arguments: argparse.Namespace) -> Path | None:
+    """Where the observer's key and permissions are; ``None`` for an unsecured system."""
+    secured = os.environ.get("ROS_SECURITY_ENABLE") == "true"
+    keystore = arguments.keystore or (secured and os.environ.get("ROS_SECURITY_KEYSTORE"))
+    enclave = arguments.enclave or (secured and os.environ.get("ROS_SECURITY_ENCLAVE_OVERRIDE"))
+    if not keystore and not enclave:
+        return None
+    if not keystore or not enclave:
+        raise NoDLError("a secured system needs both --keystore and --enclave")
+    return Path(keystore).absolute() / "enclaves" / str(enclave).lstrip("/")
+
+
+def _domain_id(arguments: argparse.Namespace) -> int:
+    if arguments.domain_id is not None:
+        return int(arguments.domain_id)
+    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
+    try:
+        return domain(text)
+    except ValueError as error:
+        raise NoDLError(f"ROS_DOMAIN_ID is {text!r}, not a number from 0 to 232") from error
+
+
+def domain(text: str) -> int:
+    number = int(text)
+    if not 0 <= number <= 232:
+        raise ValueError
+    return number
+
+
+def seconds(text: str) -> float:
+    match = _SECONDS.match(text)
+    if not match:
+        raise ValueError
+    return float(match[1]) * _UNITS[match[2]]
+
+
+def _nothing_seen(runs: Sequence[Observed]) -> str:
+    others = sum(len(each.graph.processes) for each in runs)
+    if others:
+        return (
+            f"{others} participants were, but not what they have: is the system secured? Then give --keystore and "
+            "--enclave, of an enclave of the same keystore"
+        )
+    return (
+        "is it the right domain (--domain-id), and does discovery reach it (ROS_AUTOMATIC_DISCOVERY_RANGE)?"
+    )
