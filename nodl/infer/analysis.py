@@ -177,7 +177,7 @@ def _creates(run: Run, node: ast.AST, cls: ClassValue | None) -> bool:
 @functools.lru_cache(maxsize=4)
 def _creating_lines(module: SourceModule) -> list[int]:
     """The numbers of the lines with one of ``_CREATING``, in order."""
-    return [number for number, line in enumerate(module.text.split("\n"), 1) if _CREATING.search(line)]
+    return module.lines_with(_CREATING)
 
 
 def settle(run: Run, at_end: bool = True) -> None:
@@ -185,6 +185,10 @@ def settle(run: Run, at_end: bool = True) -> None:
     run.repeated += 1
     outermost = run.settle is not _no_settling
     run.settle = _no_settling
+    tries, run.tries = (
+        run.tries,
+        0,
+    )  # what a callback raises ends it, or the call that waits: one risk of a ``try``
     in_vain = run.in_vain
     expected: set[object] = set()
     for turn in range(MAX_ROUNDS):
@@ -204,6 +208,8 @@ def settle(run: Run, at_end: bool = True) -> None:
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
     run.repeated -= 1
+    run.tries = tries
+    run.risks += 1
     run.settle = _settle_meanwhile if outermost else _no_settling
 
 

@@ -17,6 +17,7 @@ from __future__ import annotations
 import ast
 import functools
 import re
+from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
@@ -167,20 +168,33 @@ class _Place:
 
 @functools.lru_cache(maxsize=256)
 def _places_of(module: SourceModule) -> tuple[_Place, ...]:
-    return tuple(_places_below(module.tree, ()))
+    return tuple(_places_below(module.tree, (), module.lines_with(_CREATING_TEXT)))
 
 
 def _mentioned(node: ast.Call | ast.Name | ast.Attribute) -> str:
     return _last_name(node.func if isinstance(node, ast.Call) else node)
 
 
-def _places_below(node: ast.AST, around: tuple[ast.AST, ...]) -> Iterator[_Place]:
+def _places_below(node: ast.AST, around: tuple[ast.AST, ...], lines: list[int]) -> Iterator[_Place]:
+    """The places in ``node``; what does not touch one of ``lines`` has none."""
     if isinstance(node, ast.stmt | ast.Lambda):
         around = (*around, node)
     if isinstance(node, ast.Call | ast.Name | ast.Attribute) and _mentioned(node) in _CREATING_NAMES:
         yield _Place(node, around)
     for child in ast.iter_child_nodes(node):
-        yield from _places_below(child, around)
+        if isinstance(child, ast.stmt):
+            inside = _touches(child, lines)
+        else:
+            inside = not isinstance(child, ast.expr_context | ast.Constant)
+        if inside:
+            yield from _places_below(child, around, lines)
+
+
+def _touches(node: ast.stmt, lines: list[int]) -> bool:
+    """Whether one of ``lines`` is in what ``node`` spans, its decorators included."""
+    first = min([node.lineno, *(each.lineno for each in getattr(node, "decorator_list", ()))])
+    index = bisect_left(lines, first)
+    return index < len(lines) and lines[index] <= (node.end_lineno or node.lineno)
 
 
 def _is_list_of_exports(statement: ast.stmt) -> bool:

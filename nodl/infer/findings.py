@@ -75,6 +75,10 @@ class Findings:
         self.homeless: NodeRecord | None = None
         self.global_arguments: Value = BOTTOM  # a list handed to rclpy.init(args=...)
 
+    def count(self) -> int:
+        """How much was found; it never shrinks."""
+        return len(self.nodes) + len(self.gaps) + sum(len(r.endpoints) + len(r.gaps) for r in self.nodes)
+
     def add_node(self, record: NodeRecord) -> NodeRecord:
         self.nodes.setdefault(record)
         return record

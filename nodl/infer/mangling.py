@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import re
 
-_PRIVATE = re.compile(r"\b__(?!\w*__\b)\w")
+_PRIVATE = re.compile(r"__(?!\w*__\b)\w")  # or the middle of a name, which does no harm
 
 
 def mangle(tree: ast.Module, text: str) -> ast.Module:

@@ -31,7 +31,7 @@ def refine(run: Run, follow: Follow) -> None:
     if (
         not run.undecided
         or 2 * run.steps > MAX_STEPS
-        or not (run.conditional or _has_alternatives(run.findings))
+        or not ((run.conditional and run.state.stakes) or _has_alternatives(run.findings))
     ):
         return
     try:
@@ -44,15 +44,18 @@ def refine(run: Run, follow: Follow) -> None:
 
 
 def _has_alternatives(findings: Findings) -> bool:
-    """Some place makes endpoints (or nodes) under more than one name."""
+    """Some place makes endpoints (or nodes) under more than one name, or of more than one type."""
     for record in findings.nodes:
-        names: dict[object, object] = {}
+        places: set[object] = set()
         for endpoint in record.endpoints:
-            if names.setdefault((endpoint.kind, endpoint.source), endpoint.name) is not endpoint.name:
+            place = endpoint.kind, endpoint.source
+            if place in places:
                 return True
-        if len(record.names) > 1:
+            places.add(place)
+        whole = record.names, record.namespaces, record.arguments, record.use_global_arguments
+        if any(len(value) > 1 for value in whole):
             return True
-    return False
+    return len(findings.global_arguments) > 1
 
 
 def _paths(follow: Follow) -> Iterator[Path]:

@@ -8,13 +8,16 @@ from __future__ import annotations
 
 import ast
 import errno
+import functools
 import os
+import re
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 from enclave_launch.boundary.files import read_bytes
 from nodl.infer.mangling import mangle
+from nodl.infer.source_text import source_text
 
 MAX_SOURCE_BYTES = 1_000_000
 
@@ -41,6 +44,21 @@ class SourceModule:
     error: str | None = None
     error_line: int = 0
     entry_functions: list[str] = field(default_factory=list)
+
+    @functools.cached_property
+    def has_yield(self) -> bool:
+        return "yield" in self.text
+
+    def lines_with(self, pattern: re.Pattern[str]) -> list[int]:
+        """The numbers of the lines where ``pattern`` is found, in order; it does not span lines."""
+        lines: list[int] = []
+        line, counted = 1, 0
+        for found in pattern.finditer(self.text):
+            line += self.text.count("\n", counted, found.start())
+            counted = found.start()
+            if not lines or lines[-1] != line:
+                lines.append(line)
+        return lines
 
     def package(self) -> str:
         return self.name if self.is_package else self.name.rpartition(".")[0]
@@ -155,10 +173,10 @@ def _parse(path: str, name: str) -> SourceModule:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # invalid escapes in foreign sources
             tree = ast.parse(data, path)
+        text = source_text(data)
     except SyntaxError as error:
         why = f"is not valid Python 3: {error.msg}"
         return SourceModule(name, path, empty, "", is_package, why, error.lineno or 0)
     except (ValueError, RecursionError, MemoryError) as error:
         return SourceModule(name, path, empty, "", is_package, f"cannot be parsed: {error}")
-    text = data.decode("utf-8", "replace")
     return SourceModule(name, path, mangle(tree, text), text, is_package)

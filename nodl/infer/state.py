@@ -38,6 +38,8 @@ class State:
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
         self.forks = 0  # how many of them are undecided: what happens there may not happen
+        self.found: Callable[[], int] = lambda: 0  # counts what the run found; set by who knows it
+        self.stakes = 0  # undecided branches that found something, or that left before their end
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
         """Strong update. ``local``: only the running function can see the cell (no new stamp)."""
@@ -93,6 +95,7 @@ class State:
     def _run_each(self, alternatives: Sequence[Alternative]) -> list[Written]:
         stamp = self.stamp
         outcomes: list[Written] = []
+        found = 0 if self.forks else self.found()
         self.depth += 1
         self.forks += 1
         for alternative in alternatives:
@@ -103,6 +106,8 @@ class State:
             self.stamp = stamp
         self.depth -= 1
         self.forks -= 1
+        if not self.forks and self.found() != found:
+            self.stakes += 1
         return outcomes
 
     def join_seen(self, mark: int, own: Cells | None = None) -> None:

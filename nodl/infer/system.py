@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import itertools
 import os
 import re
 from collections.abc import Iterable, Iterator
@@ -23,6 +24,8 @@ CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".hpp", ".hh", ".hxx", ".h")
 _SKIPPED_FOLDERS = frozenset(
     {"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"}
 )
+_ANALYSES_A_COLLECTION = 100
+_analyses = itertools.count(1)
 _NOT_PROGRAMS = re.compile(r"(?:setup|conf|conftest)\.py\Z|.*launch\.py\Z")
 
 
@@ -110,11 +113,19 @@ def _source_files(path: Path) -> Iterator[str]:
 
 @contextmanager
 def without_collector() -> Iterator[None]:
-    """Analysis makes many small objects that stay alive to its end; looking for garbage finds none."""
+    """Analysis makes many small objects that stay alive to its end; looking for garbage finds none.
+
+    What is left then counts as old, or the next new object would have all of it searched; now and then it is searched.
+    """
     enabled = gc.isenabled()
     gc.disable()
     try:
         yield
     finally:
-        if enabled:
+        if enabled and next(_analyses) % _ANALYSES_A_COLLECTION:
+            gc.freeze()
+            gc.unfreeze()  # puts everything into the oldest generation
             gc.enable()
+        elif enabled:
+            gc.enable()
+            gc.collect()

@@ -90,16 +90,19 @@ def forget_texts() -> None:
 def text_of(pieces: Iterable[Piece]) -> TextAtom:
     """The text made of ``pieces``; neighbouring literals and holes melt together."""
     merged: list[Piece] = []
+    last: Piece | None = None
     for piece in pieces:
-        if piece == "":
-            continue
-        if isinstance(piece, str) and len(piece) > MAX_LENGTH:
-            piece = Hole("a very long text")
-        last = merged[-1] if merged else None
-        if isinstance(piece, str) and isinstance(last, str):
-            merged[-1] = last + piece
-        elif not (isinstance(piece, Hole) and isinstance(last, Hole)):
+        if isinstance(piece, str):
+            if not piece:
+                continue
+            if len(piece) > MAX_LENGTH:
+                piece = Hole("a very long text")
+            elif isinstance(last, str):
+                last = merged[-1] = last + piece
+                continue
+        if not (isinstance(piece, Hole) and isinstance(last, Hole)):
             merged.append(piece)
+            last = piece
     if not merged:
         return ""
     if len(merged) == 1 and isinstance(merged[0], str):

@@ -170,11 +170,23 @@ class Sequence(HeapObject):
         return items
 
 
-@dataclass(frozen=True, slots=True)
+# Never changed once made; written out, since a frozen dataclass takes three times as long to make and to compare.
 class Key:
     """The cell of a dictionary under a constant key."""
 
-    constant: object
+    __slots__ = ("constant",)
+
+    def __init__(self, constant: object) -> None:
+        self.constant = constant
+
+    def __eq__(self, other: object) -> bool:
+        return type(other) is Key and other.constant == self.constant
+
+    def __hash__(self) -> int:
+        return hash(self.constant)
+
+    def __repr__(self) -> str:
+        return f"Key({self.constant!r})"
 
 
 class Dictionary(HeapObject):
@@ -296,10 +308,12 @@ class Instance(HeapObject):
         self.site = site
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class BoundMethod:
-    function: FunctionValue
-    receiver: object
+    __slots__ = ("function", "receiver")
+
+    def __init__(self, function: FunctionValue, receiver: object) -> None:
+        self.function = function
+        self.receiver = receiver
 
     def __eq__(self, other: object) -> bool:
         return (
@@ -312,21 +326,36 @@ class BoundMethod:
         return hash((id(self.function), id(self.receiver)))
 
 
-@dataclass(frozen=True, slots=True)
 class NativeMethod:
     """Attribute ``name`` of a string, container or modelled object."""
 
-    receiver: object
-    name: str
+    __slots__ = ("name", "receiver")
+
+    def __init__(self, receiver: object, name: str) -> None:
+        self.receiver = receiver
+        self.name = name
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, NativeMethod)
+            and other.name == self.name
+            and type(other.receiver) is type(self.receiver)
+            and other.receiver == self.receiver
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.receiver, self.name))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class ForeignMethod:
     """Method ``name`` that ``receiver`` inherits from the foreign class ``path``."""
 
-    path: str
-    receiver: object
-    name: str
+    __slots__ = ("name", "path", "receiver")
+
+    def __init__(self, path: str, receiver: object, name: str) -> None:
+        self.path = path
+        self.receiver = receiver
+        self.name = name
 
     def __eq__(self, other: object) -> bool:
         return (
@@ -490,8 +519,9 @@ def _join_items(items: list[Items]) -> Items:
 
 def widen(old: Value, new: Value, texts_too: bool) -> Value:
     """``join`` for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
-    if texts_too and any(type(atom) is Unknown for atom in old):  # it may be any text already
-        new = tuple(atom for atom in new if not isinstance(atom, str | Text) or contains(old, atom))
+    if len(new) > 0 and any(type(atom) is Unknown for atom in old):  # it may be any number or text already
+        covered = (int, float, str, Text) if texts_too else (int, float)
+        new = tuple(atom for atom in new if not isinstance(atom, covered) or contains(old, atom))
     joined = join(old, new)
     if joined is old:
         return old

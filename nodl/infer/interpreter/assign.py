@@ -37,7 +37,7 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
         store_attribute(run, run.evaluate(target.value, frame), target.attr, value, target, frame)
     elif isinstance(target, ast.Subscript):
         _store_subscript(run, target, value, frame)
-    elif isinstance(target, ast.Tuple | ast.List):
+    elif isinstance(target, (ast.Tuple, ast.List)):
         _unpack(run, target.elts, value, frame)
     elif isinstance(target, ast.Starred):
         assign(run, target.value, value, frame)
@@ -56,7 +56,7 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
         if isinstance(owner, FunctionValue):
             kept = BOTTOM if certain and not owner.shared else owner.attributes.get(name, BOTTOM)
             run.state.write(owner.attributes, name, join(kept, value))
-        elif isinstance(owner, Instance | ClassValue | ModuleValue):
+        elif isinstance(owner, (Instance, ClassValue, ModuleValue)):
             plain_store(run, owner, name, value, certain)
         else:
             run.escape_value(value)  # whoever holds it may call it

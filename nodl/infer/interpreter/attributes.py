@@ -14,7 +14,6 @@ from nodl.infer.values import (
     ANY,
     BOTTOM,
     RESULT,
-    Absent,
     BoundMethod,
     ClassMethod,
     ClassValue,
@@ -59,8 +58,7 @@ def plain_attribute(
     """What ``object.__getattribute__`` finds, and after it ``__getattr__``."""
     held = obj.cells.get(name)
     if held is not None:
-        certain = not obj.summary and not any(type(atom) is Absent for atom in held)
-        if certain:
+        if not obj.summary and ABSENT[0] not in held:
             return held
         held = tuple(atom for atom in held if atom is not ABSENT[0])
         in_class = _class_attribute(run, obj, linearized(cls), name, node, frame)
@@ -214,13 +212,19 @@ def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Fram
         return (atom.path.rpartition(".")[2],)
     if atom.path.endswith(RESULT) and not foreign.is_asked_of(name):
         return (atom,)
+    known = run.foreign_attributes.get((atom.path, name))
+    if known is not None:
+        return known
     if atom.path.count(".") > MAX_DOTS:
         return unknown(f"an attribute of {atom.path}")  # ``x = x.next`` in a loop would go on without end
     path = f"{atom.path}.{name}"
     module = imports.import_submodule(run, path, frame)
     if module is not None:
         return (module,)
-    return foreign.constant(path) or external(path)
+    found = foreign.constant(path) or external(path)
+    if not run.program.has_namespace_package(path.partition(".")[0], run.beside):
+        run.foreign_attributes[atom.path, name] = found
+    return found
 
 
 def _of_super(run: Run, proxy: SuperProxy, name: str, node: ast.AST, frame: Frame) -> Value:

@@ -70,9 +70,9 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     run.understood.add(call.node)
     if function.cached and not function.shared:
         return _cached(run, function, cells, call)
-    if generators.is_generator(node):
+    if generators.is_generator(function):
         return _generator(run, function, cells, call)
-    if node not in run.stack or _decided_recursion(run, node):
+    if node not in run.stack or _decided_recursion(run, node, call.frame):
         return _remembered(run, function, cells, call)
     summary = run.summaries.setdefault(node, Summary())
     _widen_parameters(run, summary, cells)
@@ -90,7 +90,11 @@ def _cached(run: Run, function: FunctionValue, cells: LocalCells, call: Call) ->
     if constant and held and not run.repeated:
         return held
     if function.node in run.stack:
-        return _remembered(run, function, cells, call) if _decided_recursion(run, function.node) else ANY
+        return (
+            _remembered(run, function, cells, call)
+            if _decided_recursion(run, function.node, call.frame)
+            else ANY
+        )
     result = _remembered(run, function, cells, call)
     if constant:
         run.state.write(function.attributes, key, result)
@@ -113,9 +117,9 @@ def _generator(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
     return (made,)
 
 
-def _decided_recursion(run: Run, node: ast.AST) -> bool:
+def _decided_recursion(run: Run, node: ast.AST, caller: Frame) -> bool:
     """Whether a function calls itself without an undecided test in between: it is followed as it runs."""
-    if run.entries.get(node) != (run.state.forks, run.repeated) or node in run.summaries:
+    if run.entries.get(node) != (run.state.forks, run.repeated) or node in run.summaries or caller.early:
         return False
     run.turns -= 1
     level = run.stack.count(node)

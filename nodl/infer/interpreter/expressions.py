@@ -90,7 +90,7 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
 
 
 def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:
-    args = Arguments()
+    args = Arguments([], {})
     for argument in node.args:
         if isinstance(argument, ast.Starred):
             items = elements(run, run.evaluate(argument.value, frame), argument, frame)

@@ -24,20 +24,27 @@ from nodl.infer.values import NONE, FunctionValue, LocalCells, NativeObject, Val
 Steps = Generator[Any, Any, bool]
 
 
-@functools.lru_cache(maxsize=8192)
-def is_generator(node: ast.AST) -> bool:
+def is_generator(function: FunctionValue) -> bool:
     """Whether a function's own body has a ``yield``."""
+    return function.module.source.has_yield and _is_generator(function.node)
+
+
+@functools.lru_cache(maxsize=8192)
+def _is_generator(node: ast.AST) -> bool:
     body = [node.body] if isinstance(node, ast.Lambda) else getattr(node, "body", [])
     return any(_yields(statement) for statement in body)
 
 
-@functools.lru_cache(maxsize=32768)
+@functools.lru_cache(maxsize=8192)
 def _yields(node: ast.AST) -> bool:
-    if isinstance(node, ast.Yield | ast.YieldFrom):
-        return True
-    if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
-        return False
-    return any(_yields(child) for child in ast.iter_child_nodes(node))
+    left = [node]
+    while left:
+        part = left.pop()
+        if isinstance(part, ast.Yield | ast.YieldFrom):
+            return True
+        if not isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
+            left.extend(ast.iter_child_nodes(part))
+    return False
 
 
 def steps(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Generator[Any, Any, None]:

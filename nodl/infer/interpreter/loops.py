@@ -308,6 +308,7 @@ def _repeated_while(run: Run, node: ast.While, frame: Frame, broken: bool) -> tu
 def _fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     run.repeated += 1
     run.state.depth += 1
+    found = 0 if run.state.forks else run.state.found()
     run.state.forks += 1
     start = run.state.mark()
     jumped = False
@@ -326,6 +327,8 @@ def _fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     run.state.depth -= 1
     run.state.forks -= 1
     run.repeated -= 1
+    if not run.state.forks and run.state.found() != found:
+        run.state.stakes += 1
     if jumped:
         run.state.join_seen(start)
 

@@ -62,7 +62,7 @@ def binary_operation(
         defined = special.binary(run, left, op, right, node, frame)
         if defined:
             return defined
-    if any(isinstance(atom, NativeObject) for atom in (*left, *right)):
+    if _holds(left, NativeObject) or _holds(right, NativeObject):
         return _native_binary(run, node, left, op, right, frame)
     containers = (Sequence, Dictionary)
     if len(left) == len(right) == 1 and isinstance(left[0], containers) and isinstance(right[0], containers):
@@ -80,6 +80,13 @@ def binary_operation(
     if isinstance(op, ast.BitOr):
         return join(left, right) if any(hasattr(atom, "cells") for atom in left) else ANY
     return ANY
+
+
+def _holds(value: Value, kind: type) -> bool:
+    for atom in value:  # noqa: SIM110 - asked at every operator
+        if type(atom) is kind:
+            return True
+    return False
 
 
 def _arithmetic(run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value) -> Value:

@@ -52,6 +52,12 @@ MAX_TURNS = 3_000  # of loops that are followed turn by turn, in one run
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
 
+_INERT = frozenset(
+    {str, int, float, bool, bytes, type(None), Text, Unknown}
+)  # others can do nothing with these
+_FUNCTIONS = frozenset({FunctionValue, BoundMethod, Partial})
+
+
 class BudgetExceeded(Exception):
     """The run was given up; what it found so far is kept, with a gap that says so."""
 
@@ -207,8 +213,10 @@ class Run:
         self._statements = tables.statements
         self.state = State()
         self.findings = Findings()
+        self.state.found = lambda: self.findings.count()
         self.modules: dict[str, ModuleValue] = {}
         self.no_submodules: set[tuple[str, ModuleValue]] = set()  # looked for and not found
+        self.foreign_attributes: dict[tuple[str, str], Value] = {}  # of libraries, by path and name
         self.at: tuple[ast.AST, Frame] | None = None  # the latest call of the program
         self.escaped: dict[ClassValue | Instance, None] = {}  # handed to code that is not analysed
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
@@ -332,7 +340,9 @@ class Run:
     def call(self, callee: Value, args: Arguments, node: ast.AST, frame: Frame) -> Value:
         """Call every callable that ``callee`` may be; the results are joined."""
         call = Call(args, node, frame)
-        self.spend(len(callee))
+        self.steps += len(callee)
+        if len(callee) == 1:
+            return self.call_atom(callee[0], call)
         if len(callee) > MAX_RECEIVERS:
             callee, merged = self._merge_receivers(callee, call)
         else:
@@ -386,9 +396,14 @@ class Run:
 
     def attribute(self, owner: Value, name: str, node: ast.AST, frame: Frame) -> Value:
         readers = self.tables.attributes
-        result: Value = BOTTOM
+        if len(owner) == 1:
+            reader = readers.get(type(owner[0]))
+            result = reader(self, owner[0], name, node, frame) if reader else ANY
+            self.steps += len(result)
+            return result or ANY
+        result = BOTTOM
         for atom in owner:
-            if atom is None and len(owner) > 1:
+            if atom is None:
                 continue  # an attribute of None is an error, not a value
             reader = readers.get(type(atom))
             result = join(result, reader(self, atom, name, node, frame) if reader else ANY)
@@ -451,20 +466,26 @@ class Run:
         neither make objects of classes they are given nor call methods of objects.
         """
         for value in args.all_values():
-            self.escape_value(value, opened, objects)
+            if len(value) != 1 or type(value[0]) not in _INERT:
+                self.escape_value(value, opened, objects)
 
     def escape_value(self, value: Value, opened: bool = True, objects: bool = True, depth: int = 0) -> None:
         self.steps += len(value)
         for atom in value:
-            if isinstance(atom, Sequence | Dictionary):
+            kind = type(atom)
+            if kind in _INERT:
+                continue
+            if isinstance(atom, (Sequence, Dictionary)):
                 self._escape_container(atom, opened, objects, depth)
-            elif isinstance(atom, FunctionValue | BoundMethod | Partial):
+            elif kind in _FUNCTIONS:
                 self.register_callback((atom,), None)
-            elif isinstance(atom, ClassValue | Instance) and objects:
-                self.escape_object(atom)
-            elif isinstance(atom, ForeignMethod | External) and self.tables.creates(atom):
-                self.callbacks.setdefault(atom, None)
-            elif isinstance(atom, Variables | SuperProxy) and objects:
+            elif isinstance(atom, (ClassValue, Instance)):
+                if objects:
+                    self.escape_object(atom)
+            elif kind is ForeignMethod or kind is External:
+                if self.tables.creates(atom):
+                    self.callbacks.setdefault(atom, None)
+            elif isinstance(atom, (Variables, SuperProxy)) and objects:
                 held = atom.owner if isinstance(atom, Variables) else atom.receiver
                 self.escape_value((held,), opened, objects, depth + 1)
 

@@ -131,6 +131,7 @@ def _leave(run: Run, frame: Frame) -> None:
     frame.jump = ""
     if run.state.forks > frame.forks:
         frame.early = True
+        run.state.stakes += not run.repeated
 
 
 def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
@@ -150,6 +151,7 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
         frame.jump = "break" if isinstance(node, ast.Break) else "continue"
     else:
         frame.unsettled = True
+        run.state.stakes += not run.repeated
     return False
 
 

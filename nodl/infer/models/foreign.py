@@ -6,6 +6,7 @@ container it was handed. A node handed to unknown code is a gap: it may create e
 
 from __future__ import annotations
 
+import functools
 import sys
 
 from nodl.infer.interpreter.assign import plain_store
@@ -18,6 +19,7 @@ from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE
 from nodl.infer.values import (
     ANY,
     NONE,
+    RESULT,
     ClassValue,
     External,
     ForeignMethod,
@@ -32,6 +34,7 @@ from nodl.infer.values import (
     unknown,
 )
 
+_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS}
 NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 
 # Libraries that create no endpoints on a node they are given, keep their hands off names and off the program's
@@ -67,10 +70,13 @@ _WAITS = frozenset(
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
     path = atom.path
+    if path.endswith(RESULT) and keeps_off(path):
+        run.escape(call.args, opened=False, objects=False)
+        return (atom,)
     computed = _computed(run, path, call)
     if computed is not None:
         return computed
-    model = builtin.FUNCTIONS.get(path) or stdlib.FUNCTIONS.get(path)
+    model = _MODELS.get(path)
     if model is not None:
         return model(run, call)
     found = ros.call_library(run, path, call)
@@ -127,6 +133,7 @@ def may_fail(atom: object) -> bool:
     return atom.cls.path not in endpoints.CLASSES or not all(isinstance(name, str) for name in names)
 
 
+@functools.lru_cache(maxsize=4096)
 def keeps_off(path: str) -> bool:
     """Whether the library of ``path`` leaves the program's classes and objects alone."""
     return path.partition(".")[0] in _KEEPS_OFF
@@ -136,16 +143,18 @@ def creates(atom: object) -> bool:
     """Whether calling this function, class or method of a library makes a node or an interface."""
     if isinstance(atom, ForeignMethod):
         return atom.name in NODE_ENDPOINTS
-    if not isinstance(atom, External):
-        return False
-    owner, _, leaf = atom.path.rpartition(".")
+    return isinstance(atom, External) and _creates(atom.path)
+
+
+@functools.lru_cache(maxsize=4096)
+def _creates(path: str) -> bool:
+    owner, _, leaf = path.rpartition(".")
     return (
-        is_node_class(atom.path)
-        or ros.makes_interfaces(atom.path)
-        or (leaf in NODE_ENDPOINTS and is_node_class(owner))
+        is_node_class(path) or ros.makes_interfaces(path) or (leaf in NODE_ENDPOINTS and is_node_class(owner))
     )
 
 
+@functools.lru_cache(maxsize=4096)
 def is_node_class(path: str) -> bool:
     if path.startswith("rclpy."):
         return path.endswith(("Node", ".LifecycleNode"))
@@ -347,6 +356,7 @@ def hooks_of(base: object) -> frozenset[str] | None:
     return None
 
 
+@functools.lru_cache(maxsize=4096)
 def constant(path: str) -> Value | None:
     """Constants of foreign modules that matter for names."""
     known = pure.constant_at(path)

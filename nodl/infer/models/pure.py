@@ -139,6 +139,15 @@ def _json(text: Any, **named: Any) -> Any:
     return json.loads(text)
 
 
+def _dumps(value: Any, *, default: Any = None, **named: Any) -> str:
+    def known(given: Any) -> Any:
+        if isinstance(given, Opaque):
+            raise NotConcrete  # asked again and again, ``default`` would not make it known
+        return default(given)
+
+    return json.dumps(value, default=None if default is None else known, **named)
+
+
 SHALLOW: dict[str, Function] = {
     **{f"builtins.{name}": getattr(builtins, name) for name in _BUILTINS},
     "builtins.range": _range,
@@ -181,7 +190,7 @@ DEEP: dict[str, Function] = {
     "builtins.str": str,
     "builtins.repr": repr,
     "builtins.ascii": ascii,
-    "json.dumps": json.dumps,
+    "json.dumps": _dumps,
     "json.loads": _json,
     "yaml.safe_load": _yaml,
     "copy.deepcopy": lambda value: value,
@@ -211,6 +220,7 @@ ANY_SIZE = frozenset(
 )  # fmt: skip
 
 
+@functools.lru_cache(maxsize=4096)
 def function_at(path: str) -> tuple[Function, bool] | None:
     """The function called ``path`` and whether it looks into containers; ``None``: not on the list."""
     if path in DEEP:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 
 from nodl.infer.findings import FoundEndpoint, NodeRecord
@@ -209,6 +210,7 @@ def types_of(value: Value) -> list[str]:
     return known or [""]
 
 
+@functools.lru_cache(maxsize=4096)
 def interface_type(path: str) -> str:
     """``std_msgs.msg.String`` or ``std_msgs.msg._string.String`` -> ``std_msgs/msg/String``."""
     steps = path.split(".")
@@ -450,26 +452,31 @@ NODE_METHODS: dict[str, NodeMethod] = {
 
 def call_library(run: Run, path: str, call: Call) -> Value | None:
     """``path(...)`` for what the tables know; ``None`` for the rest."""
-    root, _, _ = path.partition(".")
-    leaf = path.rpartition(".")[2]
-    made = ENDPOINT_CALLS.get((root, leaf))
+    key = _table_key(path)
+    made = ENDPOINT_CALLS.get(key)
     if made is not None:
         assert made.node is not None
         add_endpoints(run, made, records_of(run, argument(call, made.node), call), call)
         return instance_of(run, path, call)
-    helper = HELPERS.get((root, leaf))
+    helper = HELPERS.get(key)
     if helper is not None:
         _helper(run, helper, call)
         return instance_of(run, path, call)
-    function = _FUNCTIONS.get((root, leaf))
+    function = _FUNCTIONS.get(key)
     if function:
         run.understood.add(call.node)
     return function(run, path, call) if function else None
 
 
+@functools.lru_cache(maxsize=4096)
+def _table_key(path: str) -> tuple[str, str]:
+    """The top package and the last name of ``path``, under which tables of libraries know it."""
+    return path.partition(".")[0], path.rpartition(".")[2]
+
+
 def makes_interfaces(path: str) -> bool:
     """Whether a call of this library function or class is among those that make nodes or interfaces."""
-    key = (path.partition(".")[0], path.rpartition(".")[2])
+    key = _table_key(path)
     return key in ENDPOINT_CALLS or key in HELPERS or key in _MAKING
 
 
