@@ -10,7 +10,6 @@ was not seen this time.
 from __future__ import annotations
 
 import os
-import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -18,6 +17,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_launch.boundary.new_file import write_bytes
 from enclave_launch.errors import ManifestError
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchControl
@@ -167,14 +167,6 @@ def _write(path: Path, data: bytes) -> None:
     """Whole or not at all."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        try:
-            with os.fdopen(handle, "wb") as file:
-                file.write(data)
-            os.chmod(name, 0o644)
-            os.replace(name, path)
-        except BaseException:
-            os.unlink(name)
-            raise
+        write_bytes(path, data)
     except OSError as error:
         raise ManifestError(f"{path}: cannot be written: {error.strerror}") from error

@@ -185,9 +185,9 @@ def add_looking_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument("--dry-run", action="store_true", help="print the plan; start nothing, write nothing")
     group.add_argument(
         "--format",
-        choices=("tree", "json", "policy"),
+        choices=("tree", "json", "policy", "html", "markdown", "dot", "mermaid"),
         default="tree",
-        help="of the dry run: tree (default), json, or the derived SROS2 policy",
+        help="of the dry run: tree (default), json, the derived SROS2 policy, or a report as of secure-plan report",
     )
     group.add_argument(
         "--explain",

@@ -212,6 +212,11 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
         return plan_json(plan, security) + "\n"
     if options.format == "policy":
         return _policy_text(plan)
+    if options.format != "tree":
+        from enclave_launch.report.plan_json import plan_document
+        from enclave_launch.verb.secure_plan.report import report_text
+
+        return report_text(plan_document(plan), options.format, " ".join(options.words), keystore=keystore)
     from enclave_launch.report.tree import plan_tree
 
     return plan_tree(plan)

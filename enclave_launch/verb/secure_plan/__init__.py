@@ -8,9 +8,9 @@ from collections.abc import Sequence
 
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.verb.guard import guarded
-from enclave_launch.verb.secure_plan import check, diff, flow, show, suggest
+from enclave_launch.verb.secure_plan import check, diff, flow, report, show, suggest
 
-VERBS = (show, check, diff, flow, suggest)
+VERBS = (show, check, diff, flow, suggest, report)
 DESCRIPTION = """\
 Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
 revisions, ask which enclave can influence which. A plan is a launch file, given as to secure-launch, or the

@@ -1,0 +1,118 @@
+"""What a report for people shows of a plan, as values; ``markdown.py`` and ``html/`` give them a form. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from enclave_launch.report.graph import Graph, Use, plan_graph, short_path
+from enclave_launch.report.review_text import Judged
+from enclave_launch.review.document import PlanDocument, Told, plan_from_document
+from enclave_launch.review.information_flow import Step, flow_graph, opened_by_sharing, reached_from
+
+
+class Ending(NamedTuple):
+    """Something of the keystore that ends: ``ends`` as ISO 8601, ``days_left`` negative when it has ended."""
+
+    subject: str
+    ends: str
+    days_left: int
+
+
+class Count(NamedTuple):
+    """A column of table 2: its heading, all of it, and the part that every node has."""
+
+    column: str
+    meaning: str
+    all: int
+    system: int
+
+
+class Influence(NamedTuple):
+    """Direct ways out of an enclave, and how many enclaves it reaches over any number of hops."""
+
+    enclave: str
+    steps: tuple[Step, ...]
+    reached: int
+
+
+class ReportContents(NamedTuple):
+    """``endings`` is ``None`` where no keystore was asked."""
+
+    title: str
+    graph: Graph
+    judged: Judged
+    influences: tuple[Influence, ...]
+    opened: tuple[tuple[str, str, str], ...]
+    counts: tuple[Count, ...]
+    endings: tuple[Ending, ...] | None = None
+
+    def uses_of(self) -> dict[str, list[Use]]:
+        """Enclave -> what it may do, in the graph's order."""
+        found: dict[str, list[Use]] = {path: [] for path in self.graph.enclaves}
+        for use in self.graph.uses:
+            found[use.enclave].append(use)
+        return found
+
+
+def report_contents(
+    document: Mapping[str, Any],
+    judged: Judged,
+    *,
+    title: str,
+    root: str = "",
+    endings: Iterable[Ending] | None = None,
+) -> ReportContents:
+    """Of the dry run's JSON ``document`` and what ``check`` found in it; paths without ``root`` before them."""
+    plan = plan_from_document(document)
+    return ReportContents(
+        title,
+        plan_graph(document, root),
+        [(_short(told, root), accepted) for told, accepted in judged],
+        tuple(_influences(plan)),
+        tuple(opened_by_sharing(plan)),
+        counts(plan),
+        None if endings is None else tuple(endings),
+    )
+
+
+def _short(told: Told, root: str) -> Told:
+    return told._replace(file=told.file and short_path(told.file, root))
+
+
+def _influences(plan: PlanDocument) -> Iterator[Influence]:
+    graph = flow_graph(plan)
+    for source, targets in graph.items():
+        steps = tuple(Step(source, target, hops) for target, hops in targets.items())
+        yield Influence(source, steps, len(reached_from(graph, source)))
+
+
+def counts(plan: PlanDocument) -> tuple[Count, ...]:
+    """The columns of table 2 of the paper that a plan can tell; ``ros_discovery_info``, which is the middleware's,
+    is not counted."""
+    return (
+        Count("N", "nodes", len(plan.nodes), 0),
+        _names(plan, "T", "topics", "publish", "subscribe"),
+        _names(plan, "S", "services", "serve_services", "call_services"),
+        _names(plan, "A", "actions", "serve_actions", "call_actions"),
+        _uses(plan, "PUB", "publishers", "publish"),
+        _uses(plan, "SUB", "subscriptions", "subscribe"),
+        _uses(plan, "SS", "service servers", "serve_services"),
+        _uses(plan, "SC", "service clients", "call_services"),
+        _uses(plan, "AS", "action servers", "serve_actions"),
+        _uses(plan, "AC", "action clients", "call_actions"),
+    )
+
+
+def _names(plan: PlanDocument, column: str, meaning: str, *operations: str) -> Count:
+    own = {grant.name for node in plan.nodes for grant in node.own if grant.operation in operations}
+    everywhere = {
+        grant.name for node in plan.nodes for grant in node.built_in if grant.operation in operations
+    }
+    return Count(column, meaning, len(own | everywhere), len(everywhere - own))
+
+
+def _uses(plan: PlanDocument, column: str, meaning: str, operation: str) -> Count:
+    own = sum(grant.operation == operation for node in plan.nodes for grant in node.own)
+    system = sum(grant.operation == operation for node in plan.nodes for grant in node.built_in - node.own)
+    return Count(column, meaning, own + system, system)

@@ -1,0 +1,195 @@
+"""A plan as a graph: nodes in their enclaves, and the topics, services and actions that they share. Pure.
+
+What the HTML report, dot and Mermaid draw. Elements go by numbers, so that no name of a launch file becomes an
+identifier in another language.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from typing import Any, Literal, NamedTuple
+
+from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
+from enclave_launch.review.document import OPERATIONS, Operation
+
+Kind = Literal["topic", "service", "action"]
+
+KIND_OF: Mapping[str, Kind] = {
+    "publish": "topic",
+    "subscribe": "topic",
+    "call_services": "service",
+    "serve_services": "service",
+    "call_actions": "action",
+    "serve_actions": "action",
+}
+OUTWARD: frozenset[str] = frozenset({"publish", "call_services", "call_actions"})
+"""Drawn from the node to the name; the other operations from the name to the node."""
+
+NO_ENCLAVE = ""
+"""The group of programs that run without an enclave."""
+
+
+class Reason(NamedTuple):
+    """Why a permission is there. ``place``: file and line of the description, or a row of a table."""
+
+    place: str
+    written: str
+    remapped_by: tuple[str, ...]
+    note: str
+    type: str
+    built_in: bool
+
+
+class Member(NamedTuple):
+    """A node in its enclave. ``known`` is false for a program whose interfaces nobody knows: what it may need is a gap.
+
+    ``launched_at``: file and line of the launch file, empty where that is not known.
+    """
+
+    name: str
+    enclave: str
+    program: str
+    launched_at: str
+    known: bool = True
+
+    @property
+    def namespace(self) -> str:
+        return self.name.rpartition("/")[0] or "/"
+
+
+class Channel(NamedTuple):
+    """A topic, service or action by its final name, which may hold wildcards."""
+
+    kind: Kind
+    name: str
+    types: tuple[str, ...]
+
+    @property
+    def is_pattern(self) -> bool:
+        return any(character in self.name for character in "*?[")
+
+
+class Use(NamedTuple):
+    """What one member does with one channel, both by number; ``member`` is ``None`` where only the enclave's policy
+    says so and no node of it asks for it."""
+
+    member: int | None
+    enclave: str
+    channel: int
+    operation: Operation
+    reasons: tuple[Reason, ...]
+
+    @property
+    def built_in(self) -> bool:
+        """Every node has it, and this one has no other reason."""
+        return bool(self.reasons) and all(reason.built_in for reason in self.reasons)
+
+
+class Graph(NamedTuple):
+    """Everything sorted by name; ``uses`` by enclave, member, operation and name."""
+
+    enclaves: tuple[str, ...]
+    members: tuple[Member, ...]
+    channels: tuple[Channel, ...]
+    uses: tuple[Use, ...]
+
+
+_Key = tuple[str, "int | None", Operation, str]
+
+
+def plan_graph(document: Mapping[str, Any], root: str = "") -> Graph:
+    """Of the dry run's JSON; files below ``root`` get the names that a person there would type."""
+    members = tuple(sorted(_members(document, root)))
+    reasons: dict[_Key, list[Reason]] = dict(_reasons(document, members, root))
+    asked = {(enclave, operation, name) for enclave, _, operation, name in reasons}
+    for enclave, operation, name in _granted(document):
+        if (enclave, operation, name) not in asked:
+            reasons[enclave, None, operation, name] = []
+    channels = _channels(reasons)
+    number_of = {(channel.kind, channel.name): number for number, channel in enumerate(channels)}
+    uses = tuple(
+        Use(member, enclave, number_of[KIND_OF[operation], name], operation, tuple(why))
+        for (enclave, member, operation, name), why in sorted(reasons.items(), key=_order)
+    )
+    return Graph(tuple(sorted(document["enclaves"])), members, channels, uses)
+
+
+def _order(item: tuple[_Key, list[Reason]]) -> tuple[str, int, int, str]:
+    enclave, member, operation, name = item[0]
+    return enclave, -1 if member is None else member, OPERATIONS.index(operation), name
+
+
+def short_path(path: str, root: str) -> str:
+    """``path``, which may end in a line number, without ``root`` before it."""
+    return path.removeprefix(os.path.join(root, "")) if root.strip("/") else path
+
+
+def _members(document: Mapping[str, Any], root: str) -> Iterator[Member]:
+    launched = (*document["processes"], *document["components"])
+    places = {
+        item["fqn"].replace(UNSPECIFIED_NODE_NAMESPACE, ""): _place(item, root)
+        for item in launched
+        if item["fqn"]
+    }
+    for node in document["nodes"]:
+        yield Member(node["fqn"], node["enclave"], node["program"], places.get(node["fqn"], ""))
+    for path, enclave in document["enclaves"].items():
+        for name in enclave.get("permissions_unknown", ()):
+            yield Member(name, path, "interfaces unknown", places.get(name, ""), known=False)
+    for process in document["processes"]:
+        if process["enclave"] is None:
+            yield Member(
+                process["fqn"] or process["executable"],
+                NO_ENCLAVE,
+                "runs unsecured",
+                _place(process, root),
+                False,
+            )
+
+
+def _place(item: Mapping[str, Any], root: str) -> str:
+    file = short_path(item["launch_file"], root)
+    return f"{file}:{item['line']}" if item["line"] else file
+
+
+def _reasons(
+    document: Mapping[str, Any], members: tuple[Member, ...], root: str
+) -> Iterator[tuple[_Key, list[Reason]]]:
+    number_of = {
+        (member.enclave, member.name): number for number, member in enumerate(members) if member.known
+    }
+    for node in document["nodes"]:
+        found: dict[_Key, list[Reason]] = {}
+        for item in node["interfaces"]:
+            key = (node["enclave"], number_of[node["enclave"], node["fqn"]], item["operation"], item["name"])
+            found.setdefault(key, []).append(_reason(item, root))
+        yield from found.items()
+
+
+def _reason(item: Mapping[str, Any], root: str) -> Reason:
+    rules = (rule.rpartition(" at ") for rule in item["remapped_by"])
+    return Reason(
+        short_path(item["place"], root),
+        item["written"],
+        tuple(f"{rule}{at}{short_path(origin, root)}" for rule, at, origin in rules),
+        item["note"],
+        item["type"],
+        item["built_in"],
+    )
+
+
+def _granted(document: Mapping[str, Any]) -> Iterator[tuple[str, Operation, str]]:
+    for path, lists in document["enclaves"].items():
+        for operation in OPERATIONS:
+            for name in lists[operation]:
+                yield path, operation, name
+
+
+def _channels(reasons: Mapping[_Key, list[Reason]]) -> tuple[Channel, ...]:
+    types: dict[tuple[Kind, str], set[str]] = {}
+    for (_, _, operation, name), why in reasons.items():
+        types.setdefault((KIND_OF[operation], name), set()).update(
+            reason.type for reason in why if reason.type
+        )
+    return tuple(sorted(Channel(kind, name, tuple(sorted(found))) for (kind, name), found in types.items()))

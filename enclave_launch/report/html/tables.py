@@ -1,0 +1,131 @@
+"""The tables of the report as HTML. Each function gives one section."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from enclave_launch.report.contents import Ending, Influence, ReportContents
+from enclave_launch.report.flows import step_text
+from enclave_launch.report.graph import Graph, Use
+from enclave_launch.report.html.markup import row, table, text
+from enclave_launch.report.reasons import evidence_text
+from enclave_launch.review.document import Told
+
+SOON = 30
+"""Days within which an end is marked."""
+
+
+def permissions(contents: ReportContents) -> str:
+    """A folded table for each enclave; the first stands open. What every node has is counted, and added by the
+    page's script when somebody asks for it: it is most of all rows, and the same everywhere."""
+    parts = []
+    for number, (enclave, uses) in enumerate(contents.uses_of().items()):
+        own = [use for use in uses if not use.built_in]
+        members = sum(member.enclave == enclave for member in contents.graph.members)
+        opened = " open" if number == 0 else ""
+        parts.append(
+            f'<details class="enclave" data-enclave="{number}"{opened}><summary><code>{text(enclave)}</code> '
+            f"{_count(members, 'node')}, {_count(len(own), 'permission')} asked for, "
+            f"{len(uses) - len(own)} that every node has</summary>\n"
+            + table(
+                f"What enclave {text(enclave)} may do, and why",
+                ("operation", "name", "type", "asked for by", "evidence"),
+                (_permission(contents.graph, use) for use in own),
+            )
+            + "</details>\n"
+        )
+    return "".join(parts) or "<p>This launch has no enclaves.</p>"
+
+
+def _permission(graph: Graph, use: Use) -> str:
+    channel = graph.channels[use.channel]
+    who = "no node: a policy file" if use.member is None else graph.members[use.member].name
+    evidence = "<br>".join(dict.fromkeys(text(evidence_text(reason)) for reason in use.reasons))
+    mark = ' <strong class="mark">wildcard</strong>' if channel.is_pattern else ""
+    return row(
+        (
+            use.operation.replace("_", " "),
+            f"<code>{text(channel.name)}</code>{mark}",
+            text(", ".join(channel.types) or "not known"),
+            f"<code>{text(who)}</code>",
+            evidence,
+        )
+    )
+
+
+def findings(contents: ReportContents) -> str:
+    if not contents.judged:
+        return "<p>Nothing was found.</p>"
+    ordered = sorted(contents.judged, key=lambda item: (item[1] is not None, item[0].severity))
+    return table(
+        "What check finds in this plan",
+        ("severity", "rule", "place", "what", "what to do"),
+        (_finding(told, accepted) for told, accepted in ordered),
+    )
+
+
+def _finding(told: Told, accepted: str | None) -> str:
+    severity = told.severity if accepted is None else "accepted"
+    remedy = told.remedy if accepted is None else f"accepted: {accepted}"
+    return row(
+        (
+            f'<strong class="{severity}">{severity}</strong>',
+            f"<code>{text(told.code)}</code>",
+            text(f"{told.file}:{told.line}" if told.file else ""),
+            text(told.text),
+            text(remedy),
+        )
+    )
+
+
+def flows(contents: ReportContents) -> str:
+    parts = [
+        table(
+            "Which enclave can influence which",
+            ("from", "directly", "over any number of hops"),
+            (_influence(one) for one in contents.influences),
+        )
+    ]
+    if contents.opened:
+        parts.append(
+            table(
+                "Possible only because nodes share an enclave",
+                ("enclave", "from", "to"),
+                (row(f"<code>{text(name)}</code>" for name in one) for one in contents.opened),
+            )
+        )
+    return "".join(parts)
+
+
+def _influence(one: Influence) -> str:
+    ways = "<br>".join(text(step_text(step)) for step in one.steps)
+    return row((f"<code>{text(one.enclave)}</code>", ways or "nobody", _count(one.reached, "enclave")))
+
+
+def statistics(contents: ReportContents) -> str:
+    rows = (
+        row((one.column, one.meaning, str(one.all), str(one.system)), attributes=' class="numbers"')
+        for one in contents.counts
+    )
+    return table(
+        "As in table 2 of the LiSA4ROS2 paper, without ros_discovery_info, which is the middleware's",
+        ("column", "what", "all", "of them of every node"),
+        rows,
+    )
+
+
+def expiry(endings: Iterable[Ending] | None) -> str:
+    if endings is None:
+        return "<p>No keystore was given (<code>--keystore DIR</code>).</p>"
+    return table("What of the keystore ends when", ("ends", "days left", "what"), _endings(endings))
+
+
+def _endings(endings: Iterable[Ending]) -> Iterator[str]:
+    for one in endings:
+        left = "ended" if one.days_left < 0 else str(one.days_left)
+        mark = f'<strong class="error">{left}</strong>' if one.days_left < SOON else left
+        yield row((text(one.ends), mark, text(one.subject)))
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'' if number == 1 else 's'}"

@@ -1,0 +1,45 @@
+"""What ``check`` finds in a plan, each finding with the reason why the repository accepts it, if it does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from enclave_launch.review.document import Told
+    from enclave_launch.review.expectations import Expectations
+
+EXPECTATIONS = "enclaves.review.yaml"
+
+
+def judged(document: Mapping[str, Any], expect: Path | None) -> list[tuple[Told, str | None]]:
+    """Findings of the dry run's JSON ``document`` and of the rules in ``expect`` (default: ``EXPECTATIONS`` in the
+    working directory, if it is there). Raises ``UsageError`` for rules that are missing or not understood."""
+    from enclave_launch.review.checks import check_plan
+    from enclave_launch.review.expectations import rule_findings
+
+    expected = expectations(expect)
+    findings = [*check_plan(document), *rule_findings(document, expected.never)]
+    return [(told, expected.reason_to_accept(told)) for told in findings]
+
+
+def expectations(file: Path | None) -> Expectations:
+    """Raises ``UsageError`` for a file that was named and is missing, and for content that is not understood."""
+    import yaml
+
+    from enclave_launch.boundary.files import read_text
+    from enclave_launch.errors import UsageError
+    from enclave_launch.review.expectations import Expectations, read_expectations
+
+    if file is None:
+        if not os.path.exists(EXPECTATIONS):
+            return Expectations()
+        file = Path(EXPECTATIONS)
+    try:
+        return read_expectations(yaml.safe_load(read_text(file)) or {}, str(file))
+    except OSError as error:
+        raise UsageError(f"{file}: {error.strerror}") from error
+    except yaml.YAMLError as error:
+        raise UsageError(f"{file}: {error}") from error

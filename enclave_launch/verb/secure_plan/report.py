@@ -1,0 +1,94 @@
+"""Write a report for people: graph, findings, permissions with their reasons, flows, statistics, expiry.
+
+  secure-plan report PACKAGE LAUNCH_FILE -o report.html             one file; it needs no network
+  secure-plan report plan.json --format mermaid                     the graph alone; or dot
+
+Findings are those of check, with what enclaves.review.yaml accepts. --keystore adds what ends when.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.errors import UsageError
+from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
+from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+
+if TYPE_CHECKING:
+    from enclave_launch.report.contents import Ending
+
+FORMATS = ("html", "markdown", "dot", "mermaid")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_plan_arguments(parser)
+    parser.add_argument("--format", choices=FORMATS, default="html")
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
+    parser.add_argument("--keystore", metavar="DIR", type=Path, help="tell what of it ends when")
+    parser.add_argument("--expect", type=Path, metavar="FILE", help=f"default: {EXPECTATIONS}, if it exists")
+
+
+def run(options: argparse.Namespace) -> int:
+    from enclave_launch.boundary.new_file import write_text
+
+    document = read_plan(options.words, options)
+    title = " ".join(options.words)
+    text = report_text(document, options.format, title, keystore=options.keystore, expect=options.expect)
+    if options.output is None:
+        sys.stdout.write(text)
+        return 0
+    try:
+        write_text(options.output, text)
+    except OSError as error:
+        raise UsageError(f"{options.output}: {error.strerror}") from error
+    return 0
+
+
+def report_text(
+    document: Mapping[str, Any],
+    form: str,
+    title: str,
+    *,
+    keystore: Path | str | None = None,
+    expect: Path | None = None,
+) -> str:
+    """``document``: the dry run's JSON. Raises ``UsageError`` for rules, and a ``ProvisionError`` for a keystore, that
+    cannot be read."""
+    from enclave_launch.report.graph import plan_graph
+
+    if form in ("dot", "mermaid"):
+        from enclave_launch.report import diagrams
+
+        return (diagrams.dot if form == "dot" else diagrams.mermaid)(plan_graph(document))
+    from enclave_launch.report.contents import report_contents
+
+    endings = tuple(_endings(keystore)) if keystore is not None else None
+    found = judged(document, expect)
+    contents = report_contents(document, found, title=title, root=os.getcwd(), endings=endings)
+    if form == "markdown":
+        from enclave_launch.report.markdown import markdown_report
+
+        return markdown_report(contents)
+    from enclave_launch.report.html.page import html_report
+
+    return html_report(contents)
+
+
+def _endings(keystore: Path | str) -> Iterator[Ending]:
+    from enclave_launch.errors import ProvisionError
+    from enclave_launch.report.contents import Ending
+    from keystore.errors import KeystoreError
+    from keystore.formats.validity import iso
+    from keystore.steps.expiry import status
+
+    try:
+        report = status(keystore)
+    except KeystoreError as error:
+        raise ProvisionError(str(error)) from error
+    for one in report.expiries:
+        yield Ending(one.subject, iso(one.not_after), (one.not_after - report.now).days)

@@ -1,0 +1,96 @@
+"""Plans for reports: a small robot, one with names that try to break out of a page, one of 500 nodes."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from enclave_launch.report.contents import ReportContents, report_contents
+from enclave_launch.review.checks import check_plan
+from tests.report.browser import Page, browser, chromium
+from tests.review.conftest import ROBOT, Asked, document, interface
+
+HOSTILE = (
+    "</script><script>window.broken=1</script>",
+    "<img src=x onerror=window.broken=1>",
+    "--><svg/onload=window.broken=1>",
+    "\" onmouseover=\"window.broken=1' x='",
+    "`\\u2028]]>;alert(1)//${window.broken=1}",
+    "[x](javascript:window.broken=1)|a`b",
+    'quote" \\" end\\',
+    "\x1b[31mred\u202edesrever",
+)
+"""What a launch file may write in the place of a name."""
+
+
+def robot() -> dict[str, Any]:
+    """The camera, the planner and the base; the planner has a wildcard and a name from a remap rule."""
+    plan = document(ROBOT)
+    node = next(node for node in plan["nodes"] if node["fqn"] == "/planner")
+    node["interfaces"][2]["remapped_by"] = ["plan:=path at bringup.launch.xml:9"]
+    node["interfaces"].append({**interface("subscribe", "/map/*"), "note": "--accept-patterns"})
+    plan["enclaves"]["/planner"]["subscribe"].append("/map/*")
+    plan["enclaves"]["/logger"]["publish"].append("/of_policy")
+    plan["processes"] = [process("/camera/driver", "/camera", 3), process("/tool", None, 12)]
+    plan["enclaves"]["/camera"]["permissions_unknown"] = ["/camera/helper"]
+    return plan
+
+
+def process(fqn: str, enclave: str | None, line: int) -> dict[str, Any]:
+    return {
+        "fqn": fqn,
+        "executable": "e",
+        "enclave": enclave,
+        "environment": {},
+        "parameters": {},
+        "launch_file": "bringup.launch.xml",
+        "line": line,
+    }
+
+
+def hostile() -> dict[str, Any]:
+    """Every kind of name is each of ``HOSTILE``; each node is alone in its enclave."""
+    enclaves: dict[str, dict[str, Asked]] = {}
+    for number, name in enumerate(HOSTILE):
+        asked = {"publish": [name], "subscribe": [name], "call_services": [name], "serve_actions": [name]}
+        enclaves[f"/{number}{name}"] = {f"/node{name}": asked}
+    plan = document(enclaves)
+    for node in plan["nodes"]:
+        node["program"] = HOSTILE[0]
+        for item in node["interfaces"]:
+            item.update(place=HOSTILE[1], written=HOSTILE[2], note=HOSTILE[3], type=HOSTILE[0])
+    return plan
+
+
+def large(nodes: int = 500) -> dict[str, Any]:
+    """Nodes in chains, three to an enclave, with a service for every fifth."""
+    enclaves: dict[str, dict[str, Asked]] = {}
+    for number in range(nodes):
+        area = f"/area_{number // 50}"
+        asked: Asked = {
+            "publish": [f"{area}/out_{number}", f"{area}/state_{number}"],
+            "subscribe": [
+                f"{area}/out_{number - 1}",
+                f"{area}/state_{number - 7}",
+                f"/area_0/state_{number % 50}",
+            ],
+        }
+        if number % 5 == 0:
+            asked["serve_services"] = [f"{area}/reset_{number}"]
+        enclaves.setdefault(f"{area}/e{number // 3}", {})[f"{area}/node_{number}"] = asked
+    return document(enclaves)
+
+
+def contents(plan: dict[str, Any], title: str = "robot.launch.xml") -> ReportContents:
+    return report_contents(plan, [(told, None) for told in check_plan(plan)], title=title)
+
+
+@pytest.fixture(scope="session")
+def page() -> Iterator[Page]:
+    if chromium() is None and os.environ.get("CI") != "true":
+        pytest.skip("Chromium is not installed (apt install chromium)")
+    with browser() as opened:
+        yield opened
