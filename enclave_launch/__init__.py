@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Any
 
-__version__ = "0.1.0"
+from enclave_launch.boundary.version import VERSION as __version__  # noqa: F401
 
 
 def _homes() -> dict[str, str]:

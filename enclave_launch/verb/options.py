@@ -7,6 +7,7 @@ import os
 import re
 from pathlib import Path
 
+from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version
 from enclave_launch.ros_rules.distro import Distro
 
 DESCRIPTION = """\
@@ -28,9 +29,7 @@ exit status: 0 all ended well, 1 something failed (or a process could not be sec
 
 def build_parser() -> argparse.ArgumentParser:
     """All options, grouped by the question they answer."""
-    from enclave_launch import __version__
-
-    parser = argparse.ArgumentParser(
+    parser = CommandParser(
         prog="secure-launch",
         usage="secure-launch [options] PACKAGE LAUNCH_FILE [name:=value ...]\n"
         "       secure-launch [options] PATH/TO/FILE.launch.{xml,yaml,py} [name:=value ...]",
@@ -41,7 +40,8 @@ def build_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "words", nargs="*", metavar="PACKAGE LAUNCH_FILE | PATH [name:=value ...]", help=argparse.SUPPRESS
     )
-    parser.add_argument("--version", action="version", version=f"secure-launch {__version__}")
+    add_version(parser)
+    add_verbosity(parser)
     add_security_options(parser.add_argument_group("security"))
     add_policy_options(parser.add_argument_group("what each node may do"))
     _add_inspection(parser.add_argument_group("looking without starting"))

@@ -9,9 +9,9 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.command_line import complete, guarded
 from enclave_launch.boundary.terminal import message, printable, safe_output
-from enclave_launch.errors import ManifestError, UsageError
-from enclave_launch.verb.guard import guarded
+from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 from enclave_launch.verb.usage import CommandLine, check_options, read_command_line, unsecured_notice
 
@@ -39,11 +39,12 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _guarded_main(argv: Sequence[str] | None) -> int:
     parser = build_parser()
+    complete(parser)
     line = read_command_line(parser, argv)
     before = gc.get_threshold()
     gc.set_threshold(_ALLOCATIONS)
     try:
-        return guarded("secure-launch", lambda: _checked_main(line, parser))
+        return guarded("secure-launch", lambda: _checked_main(line, parser), EnclaveLaunchError)
     finally:
         gc.set_threshold(*before)
 

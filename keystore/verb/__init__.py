@@ -7,15 +7,12 @@ something ends soon and 4 something has ended (``status``); 75 the keystore is i
 from __future__ import annotations
 
 import argparse
-import os
-import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from enclave_launch.boundary.dependencies import missing_dependency
+from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
 from enclave_launch.boundary.terminal import safe_output
 from keystore.errors import KeystoreError
-from keystore.formats.policy import PolicyError
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
@@ -30,40 +27,26 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(argv: Sequence[str] | None) -> int:
-    arguments = _parser().parse_args(argv)
-    try:
-        status: int = arguments.run(arguments)
-        sys.stdout.flush()
-        return status
-    except (KeystoreError, PolicyError) as error:
-        print(f"secure-keystore: error: {error}", file=sys.stderr)
-        return error.exit_status if isinstance(error, KeystoreError) else 2
-    except ImportError as error:
-        text = missing_dependency(error)
-        if text is None:
-            raise
-        print(f"secure-keystore: error: {text}", file=sys.stderr)
-        return 1
-    except BrokenPipeError:
-        # The reader of our output left; without this the interpreter complains again at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 1
-    except KeyboardInterrupt:
-        print("secure-keystore: interrupted; run the same command again to complete it", file=sys.stderr)
-        return 130
+    parser = build_parser()
+    complete(parser)
+    arguments = parser.parse_args(argv)
+    return guarded("secure-keystore", lambda: int(arguments.run(arguments)), KeystoreError)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+def build_parser() -> argparse.ArgumentParser:
+    """One subparser for each verb, described by the head of its file."""
+    parser = CommandParser(
         prog="secure-keystore",
-        description="Create, check, renew and deploy SROS2 keystores.",
-        allow_abbrev=False,
+        description="Create, check, renew and deploy SROS2 keystores. What was interrupted is completed by the same "
+        "command.",
     )
+    add_version(parser)
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     for name in VERBS:
         module = import_module(f"keystore.verb.{name.replace('-', '_')}")
         summary = (module.__doc__ or "").strip()
-        verb = verbs.add_parser(name, help=summary.splitlines()[0], description=summary, allow_abbrev=False)
+        verb = verbs.add_parser(name, help=summary.splitlines()[0], description=summary)
         module.describe(verb)
         verb.set_defaults(run=module.run)
+    add_verbosity(parser)
     return parser

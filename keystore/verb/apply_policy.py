@@ -24,12 +24,13 @@ def run(arguments: argparse.Namespace) -> int:
     from keystore.steps.enclaves import apply_policy
 
     document = read_policy(arguments.policy)
-    common.warn(document.warnings)
-    common.warn(
-        f"enclave {enclave} is granted by wildcard: {', '.join(expressions)}"
-        for enclave, expressions in document.policy.wildcards().items()
+    common.warn(document.warnings, arguments)
+    wildcards = document.policy.wildcards()
+    granted = (
+        f"enclave {path} is granted by wildcard: {', '.join(names)}" for path, names in wildcards.items()
     )
+    common.warn(granted, arguments)
     options = common.provision_options(arguments, domains=common.domains(arguments))
     report = apply_policy(arguments.keystore, document.policy, options=options)
-    common.print_report(report)
+    common.print_report(report, arguments)
     return 0

@@ -154,7 +154,7 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
         access=access(arguments),
         lock_timeout=arguments.lock_timeout,
         revoke=not vars(arguments).get("no_revoke", False),
-        progress=ProgressBar() if sys.stderr.isatty() else None,
+        progress=ProgressBar() if sys.stderr.isatty() and not arguments.quiet else None,
         **more,
     )
 
@@ -183,17 +183,23 @@ def print_lines(lines: Iterable[str]) -> None:
         print(line)
 
 
-def print_report(report: ProvisionReport) -> None:
-    """What a provisioning run did, enclave by enclave; what it left alone as a count."""
+def print_report(report: ProvisionReport, arguments: argparse.Namespace) -> None:
+    """What a provisioning run did, enclave by enclave; what it left alone as a count (``-v``: by name)."""
+    warn(report.warnings, arguments)
+    if arguments.quiet:
+        return
     print_lines(report.created)
     changed = [enclave for enclave in report.enclaves if enclave.actions]
     for enclave in changed:
         print(f"{enclave.enclave}: {', '.join(enclave.actions)} ({'; '.join(enclave.reasons)})")
-    if unchanged := len(report.enclaves) - len(changed):
-        print(f"{unchanged} enclave{'s' if unchanged != 1 else ''} unchanged")
-    warn(report.warnings)
+    unchanged = [enclave.enclave for enclave in report.enclaves if not enclave.actions]
+    if arguments.verbose:
+        print_lines(f"{path}: unchanged" for path in unchanged)
+    elif unchanged:
+        print(f"{len(unchanged)} enclave{'s' if len(unchanged) != 1 else ''} unchanged")
 
 
-def warn(warnings: Iterable[str]) -> None:
-    for warning in warnings:
+def warn(warnings: Iterable[str], arguments: argparse.Namespace) -> None:
+    """Print them on stderr, unless ``-q`` was given."""
+    for warning in () if arguments.quiet else warnings:
         print(f"secure-keystore: warning: {warning}", file=sys.stderr)

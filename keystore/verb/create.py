@@ -69,6 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         now=now,
     )
     report = create_keystore(arguments.keystore, options)
-    common.print_lines(report.actions or ("the keystore is complete already, nothing was changed",))
-    common.warn(report.warnings)
+    if not arguments.quiet:
+        common.print_lines(report.actions or ("the keystore is complete already, nothing was changed",))
+    common.warn(report.warnings, arguments)
     return 0

@@ -29,5 +29,5 @@ def run(arguments: argparse.Namespace) -> int:
     report = create_enclaves(
         arguments.keystore, arguments.enclaves, allow_all=arguments.allow_all, options=options
     )
-    common.print_report(report)
+    common.print_report(report, arguments)
     return 0

@@ -103,10 +103,10 @@ def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
         common.warn([
             f"{arguments.hosts}: the nodes of {', '.join(by_node)} are not looked at here: a keystore knows enclaves. "
             "secure-plan hosts PLAN --hosts FILE --write-enclaves NEW.yaml names the enclaves"
-        ])  # fmt: skip
+        ], arguments)  # fmt: skip
     left = sorted(set(enclaves) - {one for listed in assigned.values() for one in listed})
     if left:
-        common.warn([f"on no host: {', '.join(left)}"])
+        common.warn([f"on no host: {', '.join(left)}"], arguments)
     chosen = {
         host: listed for host, listed in assigned.items() if not arguments.host or host in arguments.host
     }

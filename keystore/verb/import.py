@@ -52,5 +52,5 @@ def run(arguments: argparse.Namespace) -> int:
         common.print_lines(f"{one}: changed" for one in report.changed)
         common.print_lines(f"{one}: removed" for one in report.removed)
         print(f"to restart: {report.restart.value}")
-    common.warn(report.notes)
+    common.warn(report.notes, arguments)
     return 0

@@ -28,8 +28,9 @@ def run(arguments: argparse.Namespace) -> int:
         lock_timeout=arguments.lock_timeout,
     )
     report = remove(arguments.keystore, arguments.enclaves, options=options)
-    common.print_lines(f"removed {name}" for name in report.removed)
+    if not arguments.quiet:
+        common.print_lines(f"removed {name}" for name in report.removed)
     if report.revoked:
         print(f"{report.revoked} certificates are revoked; deploy the new crl.pem to all enclaves")
-    common.warn(report.warnings)
+    common.warn(report.warnings, arguments)
     return 0

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     creation = CreateOptions(ca_lifetime=parse_end(arguments.ca_valid_for, now) - now)
     options = common.provision_options(arguments, creation=creation)
     report = _roll_over(arguments, options) if arguments.ca else _renew(arguments, options)
-    common.print_report(report)
+    common.print_report(report, arguments)
     return 0
 
 

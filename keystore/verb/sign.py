@@ -34,5 +34,5 @@ def run(arguments: argparse.Namespace) -> int:
     options = SigningOptions(arguments.revoke_old, common.provision_options(arguments))
     report = sign_requests(arguments.keystore, requests, options=options)
     common.print_lines(f"{one.enclave}: key SHA-256 {one.key}" for one in requests)
-    common.print_report(report)
+    common.print_report(report, arguments)
     return 0

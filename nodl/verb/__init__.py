@@ -6,11 +6,10 @@ Exit status: 0 fine, 1 a document is wrong or nothing was found, 2 wrong usage.
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from enclave_launch.boundary.dependencies import missing_dependency
+from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
 from enclave_launch.boundary.terminal import safe_output
 
 VERBS = ("check_record", "convert", "infer", "library", "observe", "show", "validate")
@@ -25,30 +24,31 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _main(argv: Sequence[str] | None) -> int:
     from nodl.errors import NoDLError
 
-    arguments = build_parser().parse_args(argv)
-    try:
-        status: int = arguments.run(arguments)
-        return status
-    except NoDLError as error:
-        message = str(error)
-    except ImportError as error:
-        text = missing_dependency(error)
-        if text is None:
+    parser = build_parser()
+    complete(parser)
+    arguments = parser.parse_args(argv)
+
+    def work() -> int:
+        try:
+            return int(arguments.run(arguments))
+        except BrokenPipeError:
             raise
-        message = text
-    except OSError as error:
-        message = f"{error.filename}: {error.strerror}"
-    print(f"secure-nodl {arguments.verb}: {message}", file=sys.stderr)
-    return 1
+        except OSError as error:
+            raise NoDLError(f"{error.filename}: {error.strerror}") from error
+
+    return guarded(f"secure-nodl {arguments.verb}", work, NoDLError)
 
 
 def build_parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    """One subparser for each verb."""
+    parser = CommandParser(
         prog="secure-nodl",
         description="NoDL manifests: what a ROS 2 node publishes, subscribes, serves and calls.",
         epilog="exit status: 0 fine, 1 a document is wrong or nothing was found, 2 wrong usage",
     )
-    verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
+    add_version(parser)
+    verbs = parser.add_subparsers(dest="verb", title="verbs", required=True, metavar="VERB")
     for name in VERBS:
         import_module(f"nodl.verb.{name}").add_parser(verbs)
+    add_verbosity(parser)
     return parser

@@ -71,7 +71,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     nodes, complaints = _recorded(_files(arguments.records))
     if not nodes:
-        print("secure-nodl check-record: no node of a known program is in these records", file=sys.stderr)
+        print(
+            "secure-nodl check-record: error: no node of a known program is in these records", file=sys.stderr
+        )
         return 2
     for text in complaints:
         print(f"the record is not complete: {text}", file=sys.stderr)

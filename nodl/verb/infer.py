@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
     try:
         system = _infer(args.subjects, search_prefixes(args.prefix))
     except LookupError as error:
-        print(f"secure-nodl infer: {error.args[0]}", file=sys.stderr)
+        print(f"secure-nodl infer: error: {error.args[0]}", file=sys.stderr)
         return 2
     from nodl.infer.report.expanded import expand
 
@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     if not system.nodes:
         count = len(system.files)
         print(
-            f"secure-nodl infer: no node was found in {count} source file{'s' * (count != 1)}",
+            f"secure-nodl infer: error: no node was found in {count} source file{'s' * (count != 1)}",
             file=sys.stderr,
         )
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):

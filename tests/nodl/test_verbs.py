@@ -154,7 +154,11 @@ def test_conversions_that_fail_write_nothing(
     output = [] if label == "a folder is needed" else ["-o", "out"]
     assert main(["convert", "bad.nodl.xml", *output]) == 1
     captured = capsys.readouterr()
-    assert reason in captured.err and captured.err.startswith("secure-nodl convert: ") and captured.out == ""
+    assert (
+        reason in captured.err
+        and captured.err.startswith("secure-nodl convert: error: ")
+        and captured.out == ""
+    )
     assert not (folder / "out").exists()
 
 
@@ -167,7 +171,7 @@ def test_versions_are_not_mixed(folder: Path, capsys: pytest.CaptureFixture[str]
 def test_a_target_that_cannot_be_written(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "x.nodl.yaml").write_text("nodl_version: 2\nservice_clients: [{name: a, type: p/T}]")
     assert main(["convert", "x.nodl.yaml", "-o", "none/x.nodl.xml"]) == 1
-    assert "secure-nodl convert: none/x.nodl.xml: No such file" in capsys.readouterr().err
+    assert "secure-nodl convert: error: none/x.nodl.xml: No such file" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("arguments", [[], ["what"], ["convert"], ["show"]])

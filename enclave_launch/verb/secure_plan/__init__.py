@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from collections.abc import Sequence
 
+from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
 from enclave_launch.boundary.terminal import safe_output
-from enclave_launch.verb.guard import guarded
+from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.secure_plan import check, diff, flow, report, show, suggest
 
 VERBS = (show, check, diff, flow, suggest, report)
@@ -20,11 +20,9 @@ JSON that secure-launch --dry-run --format json printed (a file that ends in .js
 
 def build_parser() -> argparse.ArgumentParser:
     """One subparser for each verb, described by the head of its file."""
-    from enclave_launch import __version__
-
     raw = argparse.RawDescriptionHelpFormatter
-    parser = argparse.ArgumentParser(prog="secure-plan", description=DESCRIPTION, formatter_class=raw)
-    parser.add_argument("--version", action="version", version=f"secure-plan {__version__}")
+    parser = CommandParser(prog="secure-plan", description=DESCRIPTION, formatter_class=raw)
+    add_version(parser)
     verbs = parser.add_subparsers(metavar="VERB", required=True)
     for verb in VERBS:
         head = verb.__doc__ or ""
@@ -32,17 +30,14 @@ def build_parser() -> argparse.ArgumentParser:
         below = verbs.add_parser(name, help=head.partition("\n")[0], description=head, formatter_class=raw)
         verb.add_arguments(below)
         below.set_defaults(verb=verb.run)
+    add_verbosity(parser)
     return parser
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv``. Gives the exit status, never a traceback for what a user can cause."""
     with safe_output():
-        options = build_parser().parse_args(argv)
-        return guarded("secure-plan", lambda: _run(options))
-
-
-def _run(options: argparse.Namespace) -> int:
-    status: int = options.verb(options)
-    sys.stdout.flush()
-    return status
+        parser = build_parser()
+        complete(parser)
+        options = parser.parse_args(argv)
+        return guarded("secure-plan", lambda: int(options.verb(options)), EnclaveLaunchError)

@@ -24,7 +24,10 @@ def infer(*words: object) -> int:
 
 def test_what_does_not_exist_is_wrong_usage(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert infer(tmp_path / "missing.py") == 2
-    assert capsys.readouterr().err == f"secure-nodl infer: no such file or folder: {tmp_path}/missing.py\n"
+    assert (
+        capsys.readouterr().err
+        == f"secure-nodl infer: error: no such file or folder: {tmp_path}/missing.py\n"
+    )
     assert infer("no_such_package") == 2
     assert "neither a file or folder nor an installed package" in capsys.readouterr().err
 
@@ -33,7 +36,7 @@ def test_a_folder_without_nodes_says_so(tmp_path: Path, capsys: pytest.CaptureFi
     (tmp_path / "tool.py").write_text("print('no node here')\n")
     assert infer(tmp_path) == 1
     shown = capsys.readouterr()
-    assert (shown.out, shown.err) == ("", "secure-nodl infer: no node was found in 1 source file\n")
+    assert (shown.out, shown.err) == ("", "secure-nodl infer: error: no node was found in 1 source file\n")
     assert infer(tmp_path, "--format", "json") == 1
     assert json.loads(capsys.readouterr().out) == {"nodes": [], "unresolved": []}
 

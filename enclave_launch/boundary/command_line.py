@@ -1,0 +1,114 @@
+"""The manners that all commands share: how they read options, name their version, and answer a slip of the fingers."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Callable, Iterator
+from typing import Any, NoReturn
+
+from enclave_launch.boundary.dependencies import missing_dependency
+from enclave_launch.boundary.suggestion import did_you_mean
+
+_INVALID_CHOICE = re.compile(r"^(.*invalid choice: '([^']*)') \(choose from .*\)$", re.DOTALL)
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Options are written out, since an abbreviation can mean another option after an update; what is mistyped is
+    answered with what was probably meant."""
+
+    def __init__(self, **settings: Any):
+        settings.setdefault("allow_abbrev", False)
+        super().__init__(**settings)
+
+    def error(self, message: str) -> NoReturn:
+        """Usage, message and exit status 2, as argparse."""
+        super().error(message + self._suggestion(message))
+
+    def _suggestion(self, message: str) -> str:
+        if message.startswith("unrecognized arguments: "):
+            options = [word.partition("=")[0] for word in message.split()[2:] if word.startswith("-")]
+            known = [flag for parser in parsers(self) for flag in parser._option_string_actions]
+            return did_you_mean(options[0], known) if options else ""
+        if choice := _INVALID_CHOICE.match(message):
+            return did_you_mean(choice[2], [str(known) for known in self._choices()])
+        return ""
+
+    def _choices(self) -> Iterator[object]:
+        for action in self._actions:
+            yield from action.choices or ()
+
+
+def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """``parser`` and those of its verbs, of any depth, each once."""
+    yield parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in dict.fromkeys(action.choices.values()):
+                yield from parsers(below)
+
+
+def add_version(parser: argparse.ArgumentParser) -> None:
+    """``--version``, the same for all commands."""
+    from enclave_launch.boundary.version import VERSION
+
+    parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}")
+
+
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Answer a shell that asks for completions, and end; otherwise do nothing.
+
+    The shell asks through argcomplete (``register-python-argcomplete``, as for ``ros2``), an optional dependency:
+    without it the shell gets no answer.
+    """
+    if "_ARGCOMPLETE" not in os.environ:
+        return
+    try:
+        import argcomplete
+    except ImportError:
+        raise SystemExit(1) from None
+    argcomplete.autocomplete(parser, always_complete_options="long")
+
+
+def add_verbosity(parser: argparse.ArgumentParser) -> None:
+    """``-q`` and ``-v`` for a command, or for each of its verbs."""
+    verbs = [each for each in parsers(parser) if each is not parser]
+    for each in verbs or [parser]:
+        group = each.add_mutually_exclusive_group()
+        group.add_argument(
+            "-q",
+            "--quiet",
+            action="store_true",
+            help="no warnings and remarks; errors, and what was asked for",
+        )
+        group.add_argument("-v", "--verbose", action="store_true", help="everything, nothing summed up")
+
+
+def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -> int:
+    """The exit status of ``work``, or of the error that ended it: one line on stderr, no traceback for a mistake.
+
+    An error of ``mistakes`` tells its own ``exit_status``, else 1. 130: interrupted (Ctrl-C). 0: who read our output
+    has enough. What is nobody's mistake but ours is raised.
+    """
+    try:
+        status = work()
+        sys.stdout.flush()
+        return status
+    except mistakes as error:
+        print(f"{program}: error: {error}", file=sys.stderr)
+        return int(getattr(error, "exit_status", 1))
+    except ImportError as error:
+        text = missing_dependency(error)
+        if text is None:
+            raise
+        print(f"{program}: error: {text}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"{program}: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # Without this the interpreter complains once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0

@@ -1,0 +1,16 @@
+"""The known word that a mistyped one was probably meant to be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+_ALIKE = 0.6  # of difflib's ratio: what Python's own "Did you mean" and git take, too
+
+
+def did_you_mean(word: str, known: Iterable[str]) -> str:
+    """``"; did you mean 'talker'?"``, or nothing where no known word is much like ``word``."""
+    import difflib  # only a mistake needs it
+
+    by_letters = {each.lower(): each for each in known if each != word}
+    close = difflib.get_close_matches(word.lower(), by_letters, n=1, cutoff=_ALIKE)
+    return f"; did you mean {by_letters[close[0]]!r}?" if close else ""

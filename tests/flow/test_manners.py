@@ -1,0 +1,75 @@
+"""The manners that the four commands share: version, verbs, abbreviations, quiet and verbose."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from enclave_launch import __version__
+
+COMMANDS = {
+    "secure-launch": "enclave_launch",
+    "secure-plan": "enclave_launch.verb.secure_plan",
+    "secure-keystore": "keystore.verb",
+    "secure-nodl": "nodl.verb",
+}
+
+
+def run(command: str, *words: str) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-m", COMMANDS[command], *words], capture_output=True, text=True, check=False
+    )
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_each_names_itself_and_its_version(command: str) -> None:
+    told = run(command, "--version")
+    assert (told.returncode, told.stdout) == (0, f"{command} {__version__}\n")
+
+
+@pytest.mark.parametrize(
+    ("command", "words", "meant"),
+    [
+        ("secure-launch", ["--dryrun", "x.launch.xml"], "--dry-run"),
+        ("secure-launch", ["--dry", "x.launch.xml"], "--dry-run"),
+        ("secure-plan", ["chekc", "x.launch.xml"], "check"),
+        ("secure-plan", ["show", "--prefx", "p", "x.launch.xml"], "--prefix"),
+        ("secure-keystore", ["verfy", "ks"], "verify"),
+        ("secure-keystore", ["verify", "--form", "json", "ks"], "--format"),
+        ("secure-nodl", ["infr", "x"], "infer"),
+        ("secure-nodl", ["infer", "--buildin", "x"], "--builtin"),
+    ],
+)
+def test_a_slip_is_wrong_usage_and_answered(command: str, words: list[str], meant: str) -> None:
+    told = run(command, *words)
+    assert told.returncode == 2
+    assert f"did you mean '{meant}'?" in told.stderr
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [("secure-plan", ["show"]), ("secure-keystore", ["verify"]), ("secure-nodl", ["infer"])],
+)
+def test_each_verb_takes_quiet_or_verbose_but_not_both(command: str, words: list[str]) -> None:
+    assert "--quiet" in run(command, *words, "--help").stdout
+    assert run(command, *words, "-q", "-v", "x").returncode == 2
+
+
+def test_a_quiet_keystore_says_nothing_of_what_went_well(tmp_path: Path) -> None:
+    assert run("secure-keystore", "create", "-q", str(tmp_path / "ks")).stdout == ""
+    assert run("secure-keystore", "create-enclave", "-q", str(tmp_path / "ks"), "/a").stdout == ""
+    assert run("secure-keystore", "list", "-q", str(tmp_path / "ks")).stdout == "/a\n"  # asked for
+    refused = run("secure-keystore", "create-enclave", "-q", str(tmp_path / "ks"), "/a b")
+    assert refused.returncode == 2 and "secure-keystore: error:" in refused.stderr
+
+
+def test_a_verbose_keystore_names_what_it_left_alone(tmp_path: Path) -> None:
+    run("secure-keystore", "create", str(tmp_path / "ks"))
+    made = run("secure-keystore", "create-enclave", str(tmp_path / "ks"), "/a")
+    assert "/a: created" in made.stdout
+    again = ["create-enclave", str(tmp_path / "ks"), "/a"]
+    assert run("secure-keystore", *again).stdout == "1 enclave unchanged\n"
+    assert run("secure-keystore", *again[:1], "-v", *again[1:]).stdout == "/a: unchanged\n"
