@@ -9,12 +9,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
+from nodl.infer.models.ros_arguments import ros_arguments
 from nodl.infer.text import Hole, Input, NodePart, Piece, Text
 from nodl.infer.values import Sequence, Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
 from nodl.names import InvalidNameError, expand_name
-from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
-from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapKind, RemapRules, parse_rule
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
+from nodl.remap import InvalidRemapRuleError, RemapKind, RemapRules, parse_rule
 
 MAX_ALTERNATIVES = 16
 
@@ -84,9 +85,10 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) 
                 lifecycle=record.lifecycle and record.communication_interface,
                 parameters=tuple(sorted({*record.parameters, *record.assigned})),
                 gaps=tuple(dict.fromkeys(gaps)),
+                own_rules=rules,
                 global_arguments=_hears_launch(record, findings),
             )
-            interfaces.append(remapped(interface, rules) if rules.local or rules.process else interface)
+            interfaces.append(interface)
     return interfaces
 
 
@@ -227,14 +229,17 @@ def _default_items(atom: object, item: int | str) -> list[str | None]:
 # --- remapping in code --------------------------------------------------------------------------------------
 
 
-def _rules(record: NodeRecord, findings: Findings) -> tuple[RemapRules, list[Gap]]:
-    """Remap rules that the program itself gives to the node, or to all nodes with ``rclpy.init(args=...)``."""
+def _rules(record: NodeRecord, findings: Findings) -> tuple[tuple[str, ...], list[Gap]]:
+    """Remap rules that the program itself gives to the node, then those for all nodes with ``rclpy.init(args=...)``.
+
+    They come before what launch gives: the first rule that matches wins, and nothing is applied to its result
+    (ros2/rcl, ``remap.c``).
+    """
     gaps: list[Gap] = []
-    local = _parse_arguments(record.arguments, record, gaps)
-    everywhere: list[ParsedRule] = []
+    rules = _rules_in(record.arguments, record, gaps)
     if record.use_global_arguments != (False,):
-        everywhere = _parse_arguments(findings.global_arguments, record, gaps)
-    return RemapRules(tuple(local), tuple(everywhere)), gaps
+        rules += _rules_in(findings.global_arguments, record, gaps)
+    return tuple(rules), gaps
 
 
 def _hears_launch(record: NodeRecord, findings: Findings) -> bool | None:
@@ -245,18 +250,19 @@ def _hears_launch(record: NodeRecord, findings: Findings) -> bool | None:
     return True if record.use_global_arguments == (True,) else None
 
 
-def _parse_arguments(value: Value, record: NodeRecord, gaps: list[Gap]) -> list[ParsedRule]:
-    rules: list[ParsedRule] = []
+def _rules_in(value: Value, record: NodeRecord, gaps: list[Gap]) -> list[str]:
+    if len(value) > 1:
+        gaps.append(Gap(record.source, "remap rules given in code depend on what the program computes"))
+    rules: list[str] = []
     for atom in value:
         if not isinstance(atom, tuple):
             gaps.append(Gap(record.source, "remap rules given in code are not known"))
             continue
-        for index, word in enumerate(atom[:-1]):
-            if word in ("-r", "--remap"):
-                try:
-                    rules.append(parse_rule(str(atom[index + 1])))
-                except InvalidRemapRuleError as error:
-                    gaps.append(Gap(record.source, str(error)))
+        for text in ros_arguments(atom).rules:
+            try:
+                rules.append(parse_rule(text).text)
+            except InvalidRemapRuleError as error:
+                gaps.append(Gap(record.source, str(error)))
     return rules
 
 
@@ -277,7 +283,7 @@ def _remapped_later(endpoint: Endpoint, rules: RemapRules, name: str, namespace:
 
 
 def remapped(interface: NodeInterface, rules: RemapRules) -> NodeInterface:
-    """The interface under the rules that the program gives itself. Launch may still remap the result."""
+    """The interface under the rules that the program gives itself, as it is where launch gives none."""
     name, namespace = interface.name, interface.namespace
     if name is not None:
         name = rules.node_name(name).name
@@ -296,10 +302,12 @@ def _remapped_endpoint(
         return endpoint._replace(name=NameTemplate((UnknownPart(_REMAPPED),)), certainty=Certainty.UNKNOWN)
     if not endpoint.name.is_literal:
         return _remapped_later(endpoint, rules, name, namespace)
+    of_topics = endpoint.kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+    not_meant = RemapKind.SERVICE if of_topics else RemapKind.TOPIC
     try:
         full = expand_name(endpoint.name.text, namespace=namespace, node=name)
         for rule in rules.names:
-            if rule.kind in (RemapKind.NODE_NAME, RemapKind.NAMESPACE) or rule.node not in (None, name):
+            if rule.kind is not_meant or rule.node not in (None, name):
                 continue
             if expand_name(rule.match, namespace=namespace, node=name) == full:
                 return endpoint._replace(name=NameTemplate.literal(rule.replacement))

@@ -12,6 +12,7 @@ from nodl.infer.interpreter.operators import as_texts, text_value
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models.endpoints import endpoint_object
 from nodl.infer.models.library_nodes import library_node
+from nodl.infer.models.ros_arguments import ros_arguments
 from nodl.infer.models.signatures import (
     ENDPOINT_CALLS,
     HELPERS,
@@ -96,7 +97,7 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
     given = (
         record.arguments if use_global == (False,) else join(record.arguments, run.findings.global_arguments)
     )
-    override_parameters(run, record, given)
+    _override_parameters(run, record, given)
     if overrides:
         _assign_parameters(run, record, overrides, call)
     if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
@@ -106,22 +107,29 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
             )
 
 
-def override_parameters(run: Run, record: NodeRecord, arguments: Value) -> None:
-    """``-p name:=value`` among the command line arguments that the program gives itself."""
+def _override_parameters(run: Run, record: NodeRecord, arguments: Value) -> None:
+    """``-p name:=value`` among the arguments that the program gives itself: stronger than what launch sets."""
     for words in arguments:
-        for index, word in enumerate(words[:-1] if isinstance(words, tuple) else ()):
-            rule = words[index + 1] if isinstance(words, tuple) else ""
-            if word in ("-p", "--param") and ":=" in rule:
-                left, _, text = rule.partition(":=")
-                name = left.rpartition(":")[2]
-                run.state.write(record.cells, name, _yaml_value(text))
-            elif word == "--params-file":
-                record.gaps.setdefault((record.source, "a parameter file is named in code"))
+        if not isinstance(words, tuple):
+            continue
+        given = ros_arguments(words)
+        names = [rule.removeprefix("__node:=") for rule in given.rules if rule.startswith("__node:=")]
+        for parameter in given.parameters:
+            meant = parameter.node.rpartition("/")[2]
+            if parameter.node in ("", "/**"):
+                run.state.write(record.cells, parameter.name, _yaml_value(parameter.value))
+            elif not names or meant == names[0] or "*" in meant:  # launch decides on the namespace at least
+                why = f"the parameter {parameter.name} is given in code to a node called {parameter.node}"
+                record.gaps.setdefault((record.source, why))
+        if given.files:
+            record.gaps.setdefault((record.source, "a parameter file is named in code"))
 
 
 def _yaml_value(text: str) -> Value:
     import yaml
 
+    if text in ("y", "Y", "n", "N"):
+        return ANY  # rcl takes them for truth values, YAML 1.2 and PyYAML for texts
     try:
         value = yaml.safe_load(text)
     except yaml.YAMLError:

@@ -16,6 +16,8 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+import yaml
+
 from nodl.names import expand_name
 from nodl.remap import NodeNames, RemapRules, parse_rule
 
@@ -56,7 +58,7 @@ class Recorder:
         self.parameters = parameters
         self.facts: set[Fact] = set()
         self.callbacks: list[Callable[[], object]] = []
-        self.rules: list[str] = []
+        self.words: list[str] | None = None  # arguments in the code instead of the launch's
         self._random = random.Random(seed)
         self._tosses = 400
 
@@ -72,9 +74,30 @@ class Recorder:
                 callback()
 
 
+def _given(words: list[str] | None, *flags: str) -> list[str]:
+    """What follows the flags among ROS arguments."""
+    given, found, reading = words or [], [], False
+    for index, word in enumerate(given):
+        reading = word == "--ros-args" or (reading and word != "--")
+        if reading and word in flags:
+            found.append(given[index + 1])
+        elif not reading and ":=" in word and "-r" in flags:
+            found.append(word)  # deprecated, and obeyed
+    return found
+
+
 def _rules_in(words: list[str] | None) -> list[str]:
-    given = words or []
-    return [given[i + 1] for i, word in enumerate(given) if word in ("-r", "--remap")]
+    return _given(words, "-r", "--remap")
+
+
+def _parameters_in(words: list[str] | None, node: str) -> dict[str, object]:
+    found: dict[str, object] = {}
+    for text in _given(words, "-p", "--param"):
+        left, _, value = text.partition(":=")
+        meant, _, name = left.rpartition(":")
+        if meant in ("", "/**", node):
+            found[name] = yaml.safe_load(value)
+    return found
 
 
 class Parameter:
@@ -98,7 +121,7 @@ def _node_class(recorder: Recorder) -> type:
             allow_undeclared_parameters: bool = False, automatically_declare_parameters_from_overrides: bool = False,
             **_: object,
         ) -> None:  # fmt: skip
-            rules = [*_rules_in(cli_args), *(recorder.rules if use_global_arguments else ())]
+            rules = [*_rules_in(cli_args), *(_rules_in(recorder.words) if use_global_arguments else ())]
             remap = RemapRules(tuple(parse_rule(rule) for rule in rules))
             self._name = remap.node_name(node_name).name
             written = namespace or "/"
@@ -106,7 +129,12 @@ def _node_class(recorder: Recorder) -> type:
             self._namespace = remap.namespace(space, self._name).name
             self._resolver = NodeNames(self._name, self._namespace, remap)
             self._parameters: dict[str, Parameter] = {}
-            self._overrides = {p.name: p.value for p in parameter_overrides or ()} | recorder.parameters
+            everywhere = recorder.words if use_global_arguments else None
+            launched = recorder.parameters if use_global_arguments and recorder.words is None else {}
+            self._overrides = {
+                **launched, **_parameters_in(everywhere, self._name), **_parameters_in(cli_args, self._name),
+                **{p.name: p.value for p in parameter_overrides or ()},
+            }  # fmt: skip
             if automatically_declare_parameters_from_overrides:
                 for name, value in self._overrides.items():
                     self._parameters[name] = Parameter(name, None, value)
@@ -211,7 +239,7 @@ def stand_in(recorder: Recorder) -> dict[str, types.ModuleType]:
     node_class: Any = _node_class(recorder)
 
     def init(args: list[str] | None = None, **_: object) -> None:
-        recorder.rules = _rules_in(args)
+        recorder.words = args
 
     def create_node(node_name: str, **more: Any) -> Any:
         return node_class(node_name, **more)

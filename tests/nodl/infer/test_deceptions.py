@@ -10,14 +10,16 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import NamedTuple
 
 import pytest
 
 from nodl.infer import InferredSystem, infer_executable, infer_paths
-from nodl.names import InvalidNameError, expand_name
+from nodl.names import InvalidNameError
 from nodl.node_interface import Gap
+from nodl.remap import NodeNames, RemapRules, parse_rule
 from nodl.source_ref import SourceRef
 from tests.nodl.infer.recorder import Fact, record
 
@@ -70,21 +72,29 @@ def claim(system: InferredSystem, parameters: dict[str, object]) -> Claim:
     gaps = [gap.why for gap in system.gaps]
     for node in system.nodes:
         gaps.extend(gap.why for gap in node.gaps)
-        namespace, name = node.namespace or "/", node.name or "unknown"
-        facts.add(("node", expand_name("~", namespace=namespace, node=name)))
+        rules = RemapRules(tuple(map(parse_rule, node.own_rules)))
+        name = rules.node_name(node.name or "unknown").name
+        namespace = rules.namespace(node.namespace or "/", name).name
+        names = NodeNames(name, namespace, rules)
+        facts.add(("node", names.fqn))
+        heard = parameters if node.global_arguments is not False else {}
         for endpoint in node.endpoints:
-            for filled in endpoint.name.fill_each(parameters):
+            kind = endpoint.kind.value
+            for filled in endpoint.name.fill_each(heard):
                 if not filled.is_literal:
                     text = re.escape(filled.text).replace(r"\*", ".*")
                     start = "" if filled.text.startswith(("/", "*")) else "(/.*)?/"
-                    patterns.append((endpoint.kind.value, re.compile(start + text)))
+                    patterns.append((kind, re.compile(start + text)))
                     continue
-                try:
-                    full = expand_name(filled.text, namespace=namespace, node=name)
-                except InvalidNameError:
-                    continue  # rcl refuses it as well
-                facts.add((endpoint.kind.value, full))
+                with suppress(InvalidNameError):  # rcl refuses it as well
+                    facts.add((kind, _final(names, kind, filled.text)))
     return Claim(frozenset(facts), tuple(patterns), tuple(gaps))
+
+
+def _final(names: NodeNames, kind: str, written: str) -> str:
+    if kind.startswith("action"):
+        return names.expand(written)
+    return (names.service if kind.startswith("service") else names.topic)(written).name
 
 
 class Verdict(NamedTuple):

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from nodl.infer import InferredSystem
+from nodl.infer.report.expanded import expand
 from nodl.node_interface import NodeInterface
 
 Infer = Callable[..., InferredSystem]
@@ -197,8 +198,14 @@ def test_remap_rules_in_code(infer: Infer) -> None:
         """
     )
     (node,) = system.nodes
-    assert (node.namespace, node.name) == ("/m", "other")
-    assert [str(e.name) for e in node.endpoints] == ["/b", "c"]
+    assert node.own_rules == (
+        "__ns:=/m",
+        "__node:=other",
+        "a:=/b",
+    )  # rcl applies them, before those of a launch
+    (shown,) = expand(system).nodes
+    assert (shown.namespace, shown.name) == ("/m", "other")
+    assert [each.name for each in shown.interfaces[:2]] == ["/b", "/m/c"]
 
 
 def test_what_is_unknown_is_said(infer: Infer) -> None:

@@ -1,0 +1,75 @@
+"""ROS arguments that a program gives itself: ``rclpy.init(args=...)``, ``Node(cli_args=...)``.
+
+Words in, rules and parameters out; pure. As rcl reads them (ros2/rcl, ``arguments.c``): flags between ``--ros-args``
+and ``--`` or the end, and outside of it each word that is a rule (``a:=b``), which is deprecated and still obeyed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
+
+from nodl.remap import InvalidRemapRuleError, parse_rule
+
+_REMAP = ("-r", "--remap")
+_PARAMETER = ("-p", "--param")
+_FILE = "--params-file"
+_WITH_VALUE = frozenset(
+    {*_REMAP, *_PARAMETER, _FILE, "-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name"}
+)
+
+
+class GivenParameter(NamedTuple):
+    """``-p [NODE:]NAME:=VALUE``; ``node`` is empty where every node gets it."""
+
+    node: str
+    name: str
+    value: str
+
+
+class RosArguments(NamedTuple):
+    """``rules`` as written; ``files``: parameter files."""
+
+    rules: tuple[str, ...] = ()
+    parameters: tuple[GivenParameter, ...] = ()
+    files: tuple[str, ...] = ()
+
+
+def ros_arguments(words: Iterable[str]) -> RosArguments:
+    """What the flags among ``words`` say. What rcl would refuse is left out: the program ends there."""
+    pairs = list(_flags(words))
+    parameters = (_parameter(value) for flag, value in pairs if flag in _PARAMETER)
+    return RosArguments(
+        tuple(value for flag, value in pairs if flag in _REMAP),
+        tuple(parameter for parameter in parameters if parameter is not None),
+        tuple(value for flag, value in pairs if flag == _FILE),
+    )
+
+
+def _flags(words: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Each flag that takes a value, with it."""
+    reading = False
+    left = iter(words)
+    for word in left:
+        if word == "--ros-args":
+            reading = True
+        elif word == "--":
+            reading = False
+        elif reading and word in _WITH_VALUE:
+            yield word, next(left, "")
+        elif not reading and _is_rule(word):
+            yield _REMAP[0], word
+
+
+def _is_rule(word: str) -> bool:
+    try:
+        parse_rule(word)
+    except InvalidRemapRuleError:
+        return False
+    return True
+
+
+def _parameter(text: str) -> GivenParameter | None:
+    left, separator, value = text.partition(":=")
+    node, _, name = left.rpartition(":")
+    return GivenParameter(node, name, value) if separator and name else None
