@@ -20,14 +20,13 @@ from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.invocation import HOOKS
-from nodl.infer.cpp.running.machine import NEXT, BudgetExceeded, Frame, Machine, Settings
-from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Seq, Value, unknown
+from nodl.infer.cpp.running.machine import BudgetExceeded, Frame, Machine, Settings
+from nodl.infer.cpp.running.values import BOTTOM, Obj, Seq, Value, unknown
 from nodl.infer.cpp.syntax import line_of
 from nodl.source_ref import SourceRef
 
-MAX_ROUNDS = 4
 MAX_FILE_SIZE = 2_000_000
 _REGISTERED = re.compile(
     r"(?:RCLCPP_COMPONENTS_REGISTER_NODE|CLASS_LOADER_REGISTER_CLASS)\s*\(\s*([\w:<>, ]+?)\s*[,)]"
@@ -169,7 +168,7 @@ def run_program(
     run = Machine(names, settings)
     try:
         _start(run, entry)
-        _callbacks(run)
+        run_callbacks(run)
     except (BudgetExceeded, RecursionError):
         run.gaps.setdefault(
             (
@@ -261,67 +260,6 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
     elif one and "NodeOptions" not in one[0].parameters[0].type:
         arguments = []
     construct(run, Type(cls.qualified), arguments, cls.node, frame, heap=True)
-
-
-def _callbacks(run: Machine) -> None:
-    """What the outside may call, in any order and any number of times, until nothing changes.
-
-    A lifecycle node is configured, then activated, before anything else that its transitions have prepared.
-    """
-    _round(run)
-    for name in HOOKS[:2]:
-        _overrides(run)
-        for atom, frame in [c for (what, _), c in run.callbacks.items() if getattr(what, "name", "") == name]:
-            _call_back(run, atom, frame, certainly=True)
-    for _ in range(MAX_ROUNDS):
-        before = len(run.callbacks), run.version()
-        _overrides(run)
-        _round(run)
-        if (len(run.callbacks), run.version()) == before:
-            return
-
-
-def _round(run: Machine) -> None:
-    for atom, frame in list(run.callbacks.values()):
-        _call_back(run, atom, frame)
-
-
-def _call_back(run: Machine, atom: object, frame: Frame, certainly: bool = False) -> None:
-    from nodl.infer.cpp.running.invocation import call_lambda, invoke
-
-    if isinstance(atom, Lambda):
-        if run.subtree_matters(atom.node):
-            run.branches([lambda: _one(call_lambda(run, atom, [], atom.node, atom.frame)), lambda: 1])
-    elif isinstance(atom, Bound) and (certainly or run.makes_interfaces(atom.function)):
-        given = [unknown(f"the argument {p.name}") for p in atom.function.parameters]
-
-        def go() -> int:
-            invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())
-            return NEXT
-
-        run.branches([go] if certainly else [go, lambda: NEXT])
-    elif isinstance(atom, Bound):
-        run.called.add(atom.function)
-
-
-def _one(value: Value) -> int:
-    return 1
-
-
-def _overrides(run: Machine) -> None:
-    """Destructors, and what a base in a library calls: overrides of classes whose base is not in reach."""
-    for obj in run.made_objects():
-        if obj.cls is None:
-            continue
-        hosted = bool(obj.foreign_base or obj.is_node)
-        for cls in run.names.ancestry(obj.cls):
-            for name, methods in run.names.methods.get(cls, {}).items():
-                in_force = hosted and methods == run.names.find_methods(obj.cls, name)
-                for method in methods:
-                    hook = in_force and (method.virtual or name in HOOKS)
-                    if hook or name.startswith("~"):
-                        frame = Frame(method.file, method.scope, None, obj)
-                        run.callbacks.setdefault((method, obj), (Bound(method, obj), frame))
 
 
 def _findings(run: Machine, sources: Sources) -> Findings:

@@ -45,6 +45,9 @@ class Function:
     virtual: bool = False
     static: bool = False
     variadic: bool = False
+    written: frozenset[str] | None = (
+        None  # variables that it may change (``writes.written_words``), when asked
+    )
     _words: frozenset[str] | None = None
 
     @property

@@ -6,9 +6,25 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.contents import copied
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.values import BOTTOM, Map, Obj, Seq, Value, concatenated, join, plain, unknown
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Map,
+    Obj,
+    Param,
+    Seq,
+    Text,
+    Unknown,
+    Value,
+    as_one_map,
+    concatenated,
+    join,
+    open_sequence,
+    plain,
+    unknown,
+)
 from nodl.infer.cpp.running.variables import current_object, declared_type
 from nodl.infer.cpp.syntax import children, text, unwrapped
+from nodl.name_template import UnknownPart
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -118,12 +134,21 @@ def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> Non
 
 
 def with_entry(atom: Map, key: Value, value: Value) -> Map:
+    """``map[key] = value``: of a key that is certainly the same the entry is replaced."""
+    certain = len(key) == 1 and not isinstance(key[0], Unknown) and _is_one_text(key[0])
+    kept = tuple(entry for entry in atom.entries if not (certain and entry[0] == key))
     definite = len(key) == 1 and plain(key[0]) is not None
-    kept = tuple(entry for entry in atom.entries if not (definite and entry[0] == key))
-    return Map((*kept, (key, value)), atom.open or not definite)
+    return as_one_map((*kept, (key, value)), atom.open or not definite)
+
+
+def _is_one_text(atom: object) -> bool:
+    """Whether it has the same value wherever it stands: a literal, a parameter, a text of those."""
+    if isinstance(atom, Text):
+        return not any(isinstance(part, UnknownPart) for part in atom.parts)
+    return isinstance(atom, Param | bool | int | float)
 
 
 def _with_item(atom: Seq, key: Value, value: Value) -> Seq:
     if len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(atom.items) and not atom.open:
         return Seq((*atom.items[: key[0]], value, *atom.items[key[0] + 1 :]))
-    return Seq((*atom.items, value), open=True)
+    return open_sequence((*atom.items, value))

@@ -87,7 +87,8 @@ def construct_class(
     constructor = chosen(
         run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
     )
-    inner = class_frame(run, this, cls, frame)
+    path = (*frame.path[-24:], (frame.file.file, node.start_byte))
+    inner = run.frame((cls, this, path), class_frame(run, this, cls, frame))
     if constructor is not None:
         if run.active.count(constructor) > MAX_RECURSION or frame.depth > MAX_DEPTH:
             run.gap(node, frame, f"the constructor of {cls.name} calls itself")
@@ -96,7 +97,7 @@ def construct_class(
         run.called.add(constructor)
         run.active.append(constructor)
     inner.depth = frame.depth + 1
-    inner.path = (*frame.path[-24:], (frame.file.file, node.start_byte))
+    inner.path, inner.active = path, True
     inner.conditions = run.conditions(node, frame)
     inner.mark = run.store.mark()
     if constructor is not None:
@@ -113,7 +114,7 @@ def construct_class(
     if constructor is not None and constructor.body is not None:
         outcome = run.execute(constructor.body, inner)
         run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
-    inner.finished = not inner.captured
+    inner.active, inner.finished = False, not inner.captured
     if constructor is not None:
         run.active.pop()
     elif arguments and cls.name in cls.declared:

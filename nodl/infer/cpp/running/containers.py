@@ -23,6 +23,7 @@ from nodl.infer.cpp.running.values import (
     Value,
     concatenated,
     literal,
+    open_sequence,
     plain,
     unknown,
 )
@@ -123,9 +124,10 @@ def _added(
             handed_over(run, f"an element that {name}() makes", listed, node, frame)
     run.handle(node, frame)
     if receiver is not None and isinstance(atom, Seq):
-        assign(run, receiver, (Seq((*atom.items, value), atom.open),), frame)
+        longer = (*atom.items, value)
+        assign(run, receiver, (open_sequence(longer) if atom.open else Seq(longer),), frame)
     elif receiver is not None:
-        assign(run, receiver, (Seq((value, (atom,)), open=True),), frame)
+        assign(run, receiver, (open_sequence((value, (atom,))),), frame)
     return value
 
 
@@ -138,7 +140,8 @@ def _inserted(
     before = atom.items if isinstance(atom, Seq) else ((atom,),)
     exact = isinstance(atom, Seq) and all(items_of(run, each)[1] for each in source)
     if receiver is not None:
-        assign(run, receiver, (Seq((*before, *items), open=not exact),), frame)
+        longer = (*before, *items)
+        assign(run, receiver, (Seq(longer) if exact else open_sequence(longer),), frame)
     return BOTTOM
 
 
@@ -216,19 +219,8 @@ def _sequence_call(
         and receiver is not None
         and isinstance(atom, Seq)
     ):
-        assign(
-            run,
-            receiver,
-            (
-                Seq(
-                    (*atom.items, unknown("an element of a list"))
-                    if name in ("resize", "assign")
-                    else atom.items,
-                    open=True,
-                ),
-            ),
-            frame,
-        )
+        more = (unknown("an element of a list"),) if name in ("resize", "assign") else ()
+        assign(run, receiver, (open_sequence((*atom.items, *more)),), frame)
     return unknown(f"the result of {name}()")
 
 

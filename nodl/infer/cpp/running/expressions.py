@@ -184,8 +184,9 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
     """Captures by value keep what the variable holds now; the rest is looked up where the lambda was made."""
     inner = Frame(
         frame.file, frame.scope, frame.function, None, frame.bindings, frame, frame.path, run.conditions(node, frame),
-        depth=frame.depth,
+        depth=frame.depth, captured=True,
     )  # fmt: skip
+    inner = run.frame((node.id, frame, frame.path), inner)
     outer: Frame | None = frame
     while outer is not None:
         outer.captured, outer = True, outer.outer

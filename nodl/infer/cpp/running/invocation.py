@@ -77,7 +77,8 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
         (*frame.path[-24:], (outer.file.file, node.start_byte)), (*outer.conditions, *run.conditions(node, frame)),
         depth=frame.depth + 1,
     )  # fmt: skip
-    inner.mark = run.store.mark()
+    inner = run.frame((atom, inner.path), inner)
+    inner.active, inner.mark = True, run.store.mark()
     declarator = atom.node.child_by_field_name("declarator")
     for index, parameter in enumerate(parameters_of(declarator) if declarator is not None else ()):
         value = values[index] if index < len(values) else unknown(f"the argument {parameter.name}")
@@ -85,6 +86,7 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     body = atom.node.child_by_field_name("body")
     outcome = run.execute(body, inner) if body is not None else NEXT
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+    inner.active = False
     return inner.returned
 
 
@@ -149,11 +151,12 @@ def invoke(
         path=(*frame.path[-24:], (frame.file.file, node.start_byte)),
         conditions=run.conditions(node, frame), depth=frame.depth + 1,
     )  # fmt: skip
+    inner = run.frame((function, this_object, inner.path), inner)
     if this_object is not None:
         inner.bindings = {**_class_bindings(run, function, this_object), **(bindings or {})}
     deduced = {**_element_types(run, function, node, frame), **_deduced(run, function, values, types)}
     inner.bindings = {**inner.bindings, **deduced}
-    inner.mark = run.store.mark()
+    inner.active, inner.mark = True, run.store.mark()
     run.active.append(function)
     bind_parameters(run, function, values, inner)
     outcome = run.execute(function.body, inner) if function.body is not None else NEXT
@@ -162,7 +165,7 @@ def invoke(
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
     _write_back(run, function, inner, node, frame)
-    inner.finished = not inner.captured
+    inner.active, inner.finished = False, not inner.captured
     return inner.returned
 
 

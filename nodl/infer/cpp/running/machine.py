@@ -105,6 +105,7 @@ class Frame:
     depth: int = 0
     finished: bool = False  # nobody can see its variables any more
     captured: bool = False  # a lambda can
+    active: bool = False  # runs now
 
     def owner_of(self, name: str) -> Frame | None:
         """The frame whose variable ``name`` is."""
@@ -131,6 +132,7 @@ class Machine:
         self.nodes: dict[NodeRecord, None] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.objects: dict[object, Obj] = {}
+        self.frames: dict[object, Frame] = {}
         self.records: dict[object, NodeRecord] = {}
         self.callbacks: dict[tuple[object, object], tuple[Atom, Frame]] = {}
         self.ran: dict[str, set[int]] = {}  # file -> first bytes of what was run
@@ -214,6 +216,17 @@ class Machine:
             for name, value in values.items():
                 setattr(found, name, value)
         return found
+
+    def frame(self, key: object, fresh: Frame) -> Frame:
+        """``fresh``, or the frame that a lambda kept of the same call before: its closures are the same ones then."""
+        known = self.frames.get(key)
+        if known is None or known.active or not known.captured:
+            self.frames[key] = fresh
+            return fresh
+        known.bindings, known.conditions, known.depth = fresh.bindings, fresh.conditions, fresh.depth
+        known.returned, known.finished = BOTTOM, False
+        known.exits, known.exit_values, known.loops = [], [], []
+        return known
 
     # --- what is found ------------------------------------------------------------------------------------
 

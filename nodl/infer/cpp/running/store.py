@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from nodl.infer.cpp.running.values import BOTTOM, Value, join
 
@@ -15,9 +15,32 @@ class Store:
     def __init__(self) -> None:
         self._cells: dict[Cell, Value] = {}
         self._trail: list[tuple[Cell, Value]] = []
+        self._reads: set[Cell] | None = None
 
     def get(self, cell: Cell) -> Value | None:
+        if self._reads is not None:
+            self._reads.add(cell)
         return self._cells.get(cell)
+
+    def watched(self, action: Callable[[], None]) -> Changes:
+        """Run ``action``; the cells that it read, with the values that they had before."""
+        outer, self._reads = self._reads, set()
+        mark = len(self._trail)
+        try:
+            action()
+        finally:
+            reads, self._reads = self._reads, outer
+        before = {}
+        for cell, old in reversed(self._trail[mark:]):
+            before[cell] = old
+        cells = self._cells
+        found = {cell: before[cell] if cell in before else cells.get(cell, _ABSENT) for cell in reads}
+        return {cell: value for cell, value in found.items() if value is not _ABSENT or not _is_local(cell)}
+
+    def holds(self, values: Changes) -> bool:
+        """Whether all these cells have the same values as in ``values``."""
+        cells = self._cells
+        return all(_same(cells.get(cell, _ABSENT), value) for cell, value in values.items())
 
     def set(self, cell: Cell, value: Value) -> None:
         old = self._cells.get(cell, _ABSENT)
@@ -57,3 +80,12 @@ class Store:
         for cell in dict.fromkeys(cell for changes in alternatives for cell in changes):
             present = self._cells.get(cell, BOTTOM)
             self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
+
+
+def _same(first: Value, second: Value) -> bool:
+    return first is second or first == second or set(first) == set(second)
+
+
+def _is_local(cell: Cell) -> bool:
+    """Whether it is a variable of a call, which nobody sees before it is set."""
+    return hasattr(cell[0], "finished")

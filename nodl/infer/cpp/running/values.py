@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 MAX_ALTERNATIVES = 32
 MAX_SEQUENCES = 6
+MAX_ITEMS = 128
 Atom = Any  # one of the classes below, or bool, int, float
 Value = tuple[Atom, ...]
 BOTTOM: Value = ()
@@ -123,18 +124,56 @@ def join(*values: Value) -> Value:
     if all(value is first or value == first for value in values[1:]):
         return first
     found = _one_unknown(dict.fromkeys(atom for value in values for atom in value))
-    if len(found) > MAX_SEQUENCES and sum(isinstance(atom, Seq) for atom in found) > MAX_SEQUENCES:
-        found = _one_sequence(found)
+    if len(found) > MAX_SEQUENCES:
+        found = _one_container(found)
     if len(found) <= MAX_ALTERNATIVES:
         return found
     objects = tuple(atom for atom in found if isinstance(atom, Obj))[:MAX_ALTERNATIVES]
     return (*objects, Unknown("too many possible values"))
 
 
-def _one_sequence(atoms: Value) -> Value:
+def _one_container(atoms: Value) -> Value:
+    if sum(isinstance(atom, Seq) for atom in atoms) > MAX_SEQUENCES:
+        atoms = one_sequence(atoms)
+    if sum(isinstance(atom, Map) for atom in atoms) > MAX_SEQUENCES:
+        atoms = one_map(atoms)
+    return atoms
+
+
+def one_sequence(atoms: Value) -> Value:
     """Many possible lists become one whose items come any number of times."""
-    items = dict.fromkeys(item for atom in atoms if isinstance(atom, Seq) for item in atom.items)
-    return (*(atom for atom in atoms if not isinstance(atom, Seq)), Seq(tuple(items), open=True))
+    items = [item for atom in atoms if isinstance(atom, Seq) for item in atom.items]
+    return (*(atom for atom in atoms if not isinstance(atom, Seq)), open_sequence(items))
+
+
+def one_map(atoms: Value) -> Value:
+    """Many possible maps become one that may hold the entries of each."""
+    entries = [entry for atom in atoms if isinstance(atom, Map) for entry in atom.entries]
+    return (*(atom for atom in atoms if not isinstance(atom, Map)), as_one_map(entries, True))
+
+
+def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
+    """Entries of equal keys have one value; too many keys become one that is not known."""
+    found: dict[Value, Value] = {}
+    for key, value in entries:
+        found[key] = join(found[key], value) if key in found else value
+    if len(found) > MAX_ITEMS:
+        found = {unknown("one of many keys"): join(*found.values())}
+        is_open = True
+    return Map(tuple(found.items()), is_open)
+
+
+def open_sequence(items: Iterable[Value]) -> Seq:
+    """A list whose ``items`` come in any order, any number of times: equal ones and those that are not known once."""
+    found: dict[Value, None] = {}
+    unknown_one: Value | None = None
+    for item in items:
+        if len(item) == 1 and isinstance(item[0], Unknown):
+            unknown_one = unknown_one or item
+        else:
+            found.setdefault(item)
+    every = (*found, unknown_one) if unknown_one is not None else tuple(found)
+    return Seq(every if len(every) <= MAX_ITEMS else (join(*every),), open=True)
 
 
 def _one_unknown(atoms: Iterable[Atom]) -> Value:

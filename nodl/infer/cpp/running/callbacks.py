@@ -1,0 +1,165 @@
+"""What the outside may call: callbacks, overrides of libraries' classes, destructors, in any order, again and again.
+
+Run until nothing changes. A callback that makes no interface runs too when it may change what one of the others reads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.ledger import Reach
+from nodl.infer.cpp.reading.writes import written_words
+from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
+from nodl.infer.cpp.running.machine import NEXT, WORD, Frame, Machine
+from nodl.infer.cpp.running.store import Changes
+from nodl.infer.cpp.running.values import Bound, Lambda, Map, Seq, join, one_map, one_sequence, unknown
+from nodl.infer.cpp.syntax import text
+from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.infer.cpp.reading.declarations import Function
+
+PATIENCE = 3
+"""Rounds after which a variable that callbacks still change counts as not known."""
+MAX_ROUNDS = 12
+
+Key = tuple[object, object]
+
+
+@dataclass
+class _Ran:
+    """When a callback ran last: what it read, and how much was known of the program beside its variables."""
+
+    reads: Changes
+    facts: tuple[int, ...]
+
+
+@dataclass
+class _Rounds:
+    run: Machine
+    last: dict[Key, _Ran] = field(default_factory=dict)
+    read: set[str] = field(default_factory=set)  # names of variables that callbacks have read
+    writes: dict[object, frozenset[str]] = field(default_factory=dict)
+
+
+def run_callbacks(run: Machine) -> None:
+    """A lifecycle node is configured, then activated, before anything else that its transitions have prepared."""
+    rounds = _Rounds(run)
+    for name in HOOKS[:2]:
+        _find_overrides(run)
+        for key, (atom, frame) in list(run.callbacks.items()):
+            if getattr(key[0], "name", "") == name:
+                _call(rounds, key, atom, frame, certainly=True)
+    for number in range(MAX_ROUNDS):
+        _find_overrides(run)
+        mark = run.store.mark()
+        if not _round(rounds):
+            return
+        if number:
+            _widen(run, mark, number >= PATIENCE)
+    place = next(iter(run.callbacks.values()))[1].file.file
+    run.gaps.setdefault((SourceRef(place), "callbacks change variables for more rounds than are followed"))
+
+
+def _round(rounds: _Rounds) -> bool:
+    """Every callback once, without those that would do what they did before; whether any ran."""
+    ran = False
+    for key, (atom, frame) in list(rounds.run.callbacks.items()):
+        ran |= _call(rounds, key, atom, frame)
+    return ran
+
+
+def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool = False) -> bool:
+    run = rounds.run
+    if not certainly and not _matters(rounds, atom):
+        if isinstance(atom, Bound):
+            run.called.add(atom.function)
+        return False
+    last = rounds.last.get(key)
+    if not certainly and last is not None and last.facts == _facts(run) and run.store.holds(last.reads):
+        return False
+    reads = run.store.watched(lambda: _run(run, atom, frame, certainly))
+    rounds.last[key] = _Ran(reads, _facts(run))
+    rounds.read |= {name for _, name in reads}
+    return True
+
+
+def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
+    def go() -> int:
+        if isinstance(atom, Lambda):
+            call_lambda(run, atom, [], atom.node, atom.frame)
+        elif isinstance(atom, Bound):
+            given = [unknown(f"the argument {p.name}") for p in atom.function.parameters]
+            invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())
+        return NEXT
+
+    run.branches([go] if certainly else [go, lambda: NEXT])
+
+
+def _facts(run: Machine) -> tuple[int, ...]:
+    """What a callback may see beside variables; grows only."""
+    return (
+        len(run.objects),
+        sum(len(obj.data) for obj in run.objects.values()),
+        sum(len(record.parameters) for record in run.nodes),
+        len(run.nodes),
+    )
+
+
+def _matters(rounds: _Rounds, atom: object) -> bool:
+    """Whether it may make an interface, or change what a callback that runs has read."""
+    run = rounds.run
+    if isinstance(atom, Lambda):
+        return run.subtree_matters(atom.node) or not rounds.read.isdisjoint(_writes(rounds, atom))
+    if isinstance(atom, Bound):
+        return run.makes_interfaces(atom.function) or not rounds.read.isdisjoint(_writes(rounds, atom))
+    return False
+
+
+def _writes(rounds: _Rounds, atom: Lambda | Bound) -> frozenset[str]:
+    """Names of variables that it, or whatever it may call, may change."""
+    run = rounds.run
+    subject = atom.node.id if isinstance(atom, Lambda) else atom.function
+    key = (subject, len(run.used_classes()))
+    if key not in rounds.writes:
+        if isinstance(atom, Lambda):
+            own, words = written_words(atom.node), frozenset(WORD.findall(text(atom.node)))
+        else:
+            own, words = _written(atom.function), atom.function.words
+        reached = Reach(run).from_words(words).reached
+        rounds.writes[key] = own.union(*map(_written, reached))
+    return rounds.writes[key]
+
+
+def _written(function: Function) -> frozenset[str]:
+    if function.written is None:
+        function.written = written_words(function.node)
+    return function.written
+
+
+def _widen(run: Machine, mark: int, give_up: bool) -> None:
+    """Lists that grow lose their order and length; in the end what still changes is not known."""
+    for cell, value in run.store.changes(mark).items():
+        before = run.store.before(cell, mark)
+        if set(before) == set(value):
+            continue
+        wider = one_sequence(value) if any(isinstance(atom, Seq) for atom in value) else value
+        wider = one_map(wider) if any(isinstance(atom, Map) for atom in value) else wider
+        run.store.set(cell, join(wider, unknown("a value that callbacks change")) if give_up else wider)
+
+
+def _find_overrides(run: Machine) -> None:
+    """Destructors, and what a base in a library calls: overrides of classes whose base is not in reach."""
+    for obj in run.made_objects():
+        if obj.cls is None:
+            continue
+        hosted = bool(obj.foreign_base or obj.is_node)
+        for cls in run.names.ancestry(obj.cls):
+            for name, methods in run.names.methods.get(cls, {}).items():
+                in_force = hosted and methods == run.names.find_methods(obj.cls, name)
+                for method in methods:
+                    hook = in_force and (method.virtual or name in HOOKS)
+                    if hook or name.startswith("~"):
+                        frame = Frame(method.file, method.scope, None, obj)
+                        run.callbacks.setdefault((method, obj), (Bound(method, obj), frame))
