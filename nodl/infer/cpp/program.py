@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 
 import nodl.infer.cpp.models
 import nodl.infer.cpp.running.rules  # noqa: F401  (registers how statements and expressions run)
-from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.files import read_bytes
+from nodl.infer.cpp.cache.digests import digest_of, digest_of_content
+from nodl.infer.cpp.entry import Entry
 from nodl.infer.cpp.findings import NodeRecord
 from nodl.infer.cpp.ledger import CREATES, Answer, account
 from nodl.infer.cpp.reading.cmake import Target
@@ -55,6 +57,7 @@ class Sources:
         self._preprocessed: dict[tuple[str, str], Preprocessed | None] = {}
         self._indexed: dict[tuple[str, str], FileIndex] = {}
         self.unreadable: dict[str, str] = {}
+        self.digests: dict[str, str] = {}  # SHA-256 of what was read
 
     def preprocessed(self, file: str, symbols: Mapping[str, str], complete: bool) -> Preprocessed | None:
         key = (file, repr(sorted(symbols.items())) + str(complete))
@@ -84,10 +87,14 @@ class Sources:
     def _read(self, file: str) -> str | None:
         try:
             if os.path.getsize(file) > MAX_FILE_SIZE:
+                self.digests[file] = digest_of(file)
                 self.unreadable[file] = "this file is over 2 MB and was not read"
                 return None
-            return read_text(file, errors="replace")
+            content = read_bytes(file)
+            self.digests[file] = digest_of_content(content)
+            return content.decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
         except OSError as error:
+            self.digests[file] = digest_of(file)
             self.unreadable[file] = f"this file cannot be read: {error.strerror}"
             return None
 
@@ -134,18 +141,6 @@ def library_sources(package: SourcePackage) -> list[str]:
 
 
 # --- running ----------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Entry:
-    """Where a program starts: ``main`` of its files, or the constructor of a class."""
-
-    files: tuple[str, ...]
-    cls: str = ""
-    main: bool = True
-    symbols: tuple[tuple[str, str], ...] = ()
-    complete: bool = False
-    place: str = ""  # the package's folder, for what has no file
 
 
 def run_program(

@@ -13,11 +13,13 @@ from functools import cached_property
 from pathlib import Path
 
 from enclave_launch.boundary.files import read_text
-from nodl.infer.cpp.program import Entry, Findings, Sources, run_program
+from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
+from nodl.infer.cpp.entry import Entry, Key, Solved
+from nodl.infer.cpp.program import Sources
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages, read_source_package
-from nodl.infer.cpp.results import interfaces_of, program_gaps
-from nodl.infer.cpp.running.machine import Settings
-from nodl.infer.cpp.system import Key, package_programs
+from nodl.infer.cpp.solved import solve
+from nodl.infer.cpp.syntax import check_support
+from nodl.infer.cpp.system import package_programs
 from nodl.infer.start import Start
 from nodl.node_interface import NodeInterface
 
@@ -39,7 +41,7 @@ class SourcesInReach:
     def __init__(self, prefixes: Sequence[str], folders: Sequence[str] = ()):
         self._prefixes = tuple(os.path.abspath(prefix) for prefix in prefixes)
         self._folders = tuple(os.path.abspath(folder) for folder in folders)
-        self._programs: dict[str, list[tuple[Key, Entry]]] = {}
+        self._programs: dict[str, Sequence[tuple[Key, Entry]]] = {}
 
     def infer(
         self, package: str, executable: str | None, plugin: str | None, start: Start | None = None
@@ -50,14 +52,35 @@ class SourcesInReach:
             return Answer((), f"the sources of package '{package}' are not in reach ({self._searched()})")
         for key, entry in self._programs_of(found):
             if (executable is not None and key.executable == executable) or (plugin and key.plugin == plugin):
-                return _answer(run_program(self._sources, entry, Settings(start)), key, start)
+                return _answer(self._solved(key, entry, start))
         what = f"executable '{executable}'" if executable else f"component {plugin}"
         return Answer((), f"the CMakeLists.txt of {found.folder} builds no {what}")
 
-    def _programs_of(self, package: SourcePackage) -> list[tuple[Key, Entry]]:
+    def _solved(self, key: Key, entry: Entry, start: Start | None) -> Solved:
+        question = ("program", key, entry)
+        found = self._answers.find(question, start)
+        if found is None:
+            watched = WatchedStart(start) if start is not None else None
+            found = solve(self._sources, key, entry, watched)
+            self._answers.keep(question, found, watched)
+        solved: Solved = found.answer
+        return solved
+
+    def _programs_of(self, package: SourcePackage) -> Sequence[tuple[Key, Entry]]:
+        question = ("programs", package.name, package.folder)
         if package.name not in self._programs:
-            self._programs[package.name] = package_programs(package, self._sources.workspace, self._sources)
+            found = self._answers.find(question)
+            if found is None:
+                sources = Sources(self._sources.workspace)
+                found = Made(tuple(package_programs(package, sources.workspace, sources)), sources.digests)
+                self._answers.keep(question, found)
+            self._programs[package.name] = found.answer
         return self._programs[package.name]
+
+    @cached_property
+    def _answers(self) -> Answers:
+        check_support()
+        return Answers(self._sources.workspace)
 
     @cached_property
     def _sources(self) -> Sources:
@@ -101,10 +124,10 @@ def _built(folder: Path) -> Iterator[SourcePackage]:
             yield read_source_package(match[1])
 
 
-def _answer(findings: Findings, key: Key, start: Start | None) -> Answer:
-    interfaces = tuple(interfaces_of(findings, key.package, key.executable, key.plugin, start))
-    consulted = bool(findings.consulted)
-    if interfaces:
-        return Answer(interfaces, consulted=consulted)
-    reasons = "; ".join(f"{gap.source}: {gap.why}" for gap in program_gaps(findings))
-    return Answer((), f"no node was found in its sources{f' ({reasons})' if reasons else ''}", consulted)
+def _answer(solved: Solved) -> Answer:
+    if solved.nodes:
+        return Answer(solved.nodes, consulted=solved.consulted)
+    reasons = "; ".join(f"{gap.source}: {gap.why}" for gap in solved.gaps)
+    return Answer(
+        (), f"no node was found in its sources{f' ({reasons})' if reasons else ''}", solved.consulted
+    )

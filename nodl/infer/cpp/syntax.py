@@ -26,6 +26,11 @@ def _parser() -> Parser:
     return Parser(Language(tree_sitter_cpp.language()))
 
 
+def check_support() -> None:
+    """Raises ``CppSupportMissing`` where C++ cannot be read."""
+    _parser()
+
+
 def parse(source: bytes) -> Tree:
     """The tree of ``source``. Raises ``CppSupportMissing``."""
     return _parser().parse(source)

@@ -4,35 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from nodl.infer.cpp.program import (
-    Entry,
-    Findings,
-    Sources,
-    registered_components,
-    run_program,
-    target_entry,
-)
-from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages, sources_of
-from nodl.infer.cpp.results import interfaces_of, program_gaps
-from nodl.infer.cpp.running.machine import Settings
+from nodl.infer.cpp.cache.answers import Answers, Made
+from nodl.infer.cpp.cache.folder import CacheFolder
+from nodl.infer.cpp.entry import Entry, Key, Solved
+from nodl.infer.cpp.program import Sources, registered_components, target_entry
+from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
+from nodl.infer.cpp.solved import solve_all
+from nodl.infer.cpp.syntax import check_support
 from nodl.node_interface import Gap, NodeInterface
-from nodl.source_ref import SourceRef
 
 _SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _TESTS = frozenset({"test", "tests", "testing", "benchmark", "examples", "example", "mock"})
-
-
-@dataclass(frozen=True)
-class Key:
-    """Under which name launch starts a program."""
-
-    package: str | None
-    executable: str | None = None
-    plugin: str | None = None
 
 
 @dataclass
@@ -44,32 +30,62 @@ class Inferred:
 
 def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferred:
     """The nodes of ``files``. Raises ``CppSupportMissing``."""
+    check_support()
     workspace = workspace_of(files, prefixes)
-    sources = Sources(workspace)
-    given = set(files)
-    result = Inferred()
+    answers = Answers(workspace, None if _in_packages(workspace, files) else CacheFolder(""))
+    question = ("files", tuple(files), workspace.build_folders)
+    found = answers.find(question)
+    if found is None:
+        found = _infer(files, Sources(workspace), answers)
+        answers.keep(question, found)
+    solved: tuple[Solved, ...] = found.answer
+    return Inferred(
+        [node for each in solved for node in each.nodes],
+        [gap for each in solved if not each.nodes for gap in each.gaps],
+        [gap for each in solved for gap in each.dead],
+    )
+
+
+def _in_packages(workspace: Workspace, files: Sequence[str]) -> bool:
+    """What a loose file includes lies anywhere; its answers are not kept."""
+    return all(workspace.package_of(file) is not None for file in files)
+
+
+def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
+    """The programs of all files: those that are built, loose ones, then the nodes that nobody makes."""
+    workspace, read = sources.workspace, dict[str, str]()
+    found: list[Solved] = []
+
+    def solved(listed: Sequence[tuple[Key, Entry]]) -> list[Solved]:
+        made = solve_all(sources, answers, listed)
+        for each in made:
+            read.update(each.files)
+        return [each.answer for each in made]
+
+    def listed(
+        name: str, programs: Callable[[], Iterable[tuple[Key, Entry]]]
+    ) -> tuple[tuple[Key, Entry], ...]:
+        question = (name, tuple(files), tuple(sorted(made)))
+        kept = answers.find(question)
+        if kept is None:
+            answer = tuple(programs())
+            kept = Made(answer, dict(sources.digests))
+            answers.keep(question, kept)
+        read.update(kept.files)
+        programs_listed: tuple[tuple[Key, Entry], ...] = kept.answer
+        return programs_listed
+
     made: set[str] = set()
-    seen: set[str] = set()
-    for key, entry in programs(workspace, sources, given):
-        findings = run_program(sources, entry)
-        made |= findings.classes
-        seen |= set(findings.files)
-        _add(result, findings, key)
-    for key, entry in _left_over(workspace, sources, files, made):
-        findings = run_program(sources, entry)
-        if entry.main or not findings.classes <= made:
-            made |= findings.classes
-            _add(result, findings, key, None if entry.main else entry.cls)
-    return result
-
-
-def _add(result: Inferred, findings: Findings, key: Key, unmade: str | None = None) -> None:
-    nodes = interfaces_of(findings, key.package, key.executable, key.plugin)
-    result.nodes += nodes
-    if not nodes:
-        result.gaps += program_gaps(findings)
-    result.dead += [Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead]
-    del unmade
+    found += solved(listed("programs", lambda: programs(workspace, sources, set(files))))
+    made.update(name for each in found for name in each.classes)
+    found += solved(listed("loose", lambda: _left_over(workspace, sources, files)))
+    made.update(name for each in found for name in each.classes)
+    unmade = listed("unmade", lambda: _unmade(workspace, sources, files, made))
+    for (_, entry), each in zip(unmade, solved(unmade), strict=True):
+        if entry.cls not in made and not made.issuperset(each.classes):
+            made.update(each.classes)
+            found.append(each)
+    return Made(tuple(found), read)
 
 
 def workspace_of(files: Iterable[str], prefixes: Sequence[str] = ()) -> Workspace:
@@ -169,10 +185,8 @@ def _all_sources(package: SourcePackage) -> list[str]:
     return [str(path) for path in sorted(Path(package.folder).rglob("*")) if path.suffix in _SOURCES]
 
 
-def _left_over(
-    workspace: Workspace, sources: Sources, files: Sequence[str], made: set[str]
-) -> Iterable[tuple[Key, Entry]]:
-    """Files of no target: their mains and components; then node classes that no program makes."""
+def _left_over(workspace: Workspace, sources: Sources, files: Sequence[str]) -> Iterable[tuple[Key, Entry]]:
+    """Files of no target: their mains and components."""
     built = {f for p in workspace.packages.values() for t in p.build.targets.values() for f in t.sources}
     loose = [file for file in files if file not in built and not _is_test(file, workspace)]
     by_folder: dict[str, list[str]] = {}
@@ -192,7 +206,6 @@ def _left_over(
                     Key(package_name, None, cls),
                     Entry((file, *(f for f in listed if f != file)), cls=cls, main=False),
                 )
-    yield from _unmade(workspace, sources, files, made)
 
 
 def _unmade(
@@ -237,6 +250,3 @@ def _is_test(file: str, workspace: Workspace) -> bool:
     package = workspace.package_of(file)
     relative = os.path.relpath(file, package.folder) if package else os.path.basename(file)
     return any(part in _TESTS for part in Path(relative).parts[:-1])
-
-
-__all__ = ["Settings", "SourceRef", "sources_of"]

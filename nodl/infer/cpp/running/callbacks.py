@@ -13,14 +13,14 @@ from nodl.infer.cpp.reading.writes import written_words
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.machine import NEXT, WORD, Frame, Machine
 from nodl.infer.cpp.running.store import Changes
-from nodl.infer.cpp.running.values import Bound, Lambda, Map, Seq, join, one_map, one_sequence, unknown
+from nodl.infer.cpp.running.values import Bound, Lambda, Map, Seq, Text, join, one_map, one_sequence, unknown
 from nodl.infer.cpp.syntax import text
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reading.declarations import Function
 
-PATIENCE = 3
+PATIENCE = 5
 """Rounds after which a variable that callbacks still change counts as not known."""
 MAX_ROUNDS = 12
 
@@ -144,9 +144,14 @@ def _widen(run: Machine, mark: int, give_up: bool) -> None:
         before = run.store.before(cell, mark)
         if set(before) == set(value):
             continue
-        wider = one_sequence(value) if any(isinstance(atom, Seq) for atom in value) else value
-        wider = one_map(wider) if any(isinstance(atom, Map) for atom in value) else wider
-        run.store.set(cell, join(wider, unknown("a value that callbacks change")) if give_up else wider)
+        if any(isinstance(atom, Seq) for atom in value):
+            value = one_sequence(value)
+        if any(isinstance(atom, Map) for atom in value):
+            value = one_map(value)
+        if give_up and any(isinstance(atom, Text | int | float) for atom in value):
+            kept = tuple(a for a in value if a in before or not isinstance(a, Text | int | float))
+            value = join(kept, unknown("a value that callbacks change"))
+        run.store.set(cell, value)
 
 
 def _find_overrides(run: Machine) -> None:

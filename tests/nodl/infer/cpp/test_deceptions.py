@@ -188,3 +188,29 @@ def test_nothing_false_is_certain(source: str, tmp_path: Path) -> None:
     certain = {str(e.name) for n in system.nodes for e in n.endpoints if e.certainty.value == "exact"}
     assert certain == {"a"}
     assert gaps(system) == []
+
+
+LATE = "t_ = create_wall_timer(1s, [this]() { p_ = create_publisher<std_msgs::msg::String>(topic_, 1); });"
+
+
+def test_a_name_that_a_callback_writes_is_not_listed_as_certain(tmp_path: Path) -> None:
+    """The callback makes no interface itself; the timer's name is the message's then."""
+    heard = (
+        'create_subscription<std_msgs::msg::String>("in", 1, [this](M::SharedPtr m) { topic_ = m->data; });'
+    )
+    assert "?" in names(infer(tmp_path, in_class(heard + LATE, 'std::string topic_ = "a";')))
+
+
+def test_a_name_that_no_callback_writes_is(tmp_path: Path) -> None:
+    heard = (
+        'create_subscription<std_msgs::msg::String>("in", 1, [this](M::SharedPtr m) { other_ = m->data; });'
+    )
+    assert names(infer(tmp_path, in_class(heard + LATE, 'std::string topic_ = "a", other_;'))) == ["a", "in"]
+
+
+def test_what_callbacks_hand_on_from_one_to_the_next_arrives(tmp_path: Path) -> None:
+    """Each timer hands a name on, the first one last: as many rounds are needed as there are timers."""
+    hand_on = "".join(f"create_wall_timer(1s, [this]() {{ v{i} = v{i + 1}; }});" for i in range(4))
+    body = "create_wall_timer(1s, [this]() { create_publisher<std_msgs::msg::String>(v0, 1); });" + hand_on
+    members = "".join(f'std::string v{i} = "a{i}";' for i in range(5))
+    assert names(infer(tmp_path, in_class(body, members))) == ["a0", "a1", "a2", "a3", "a4"]

@@ -1,0 +1,106 @@
+"""Answers kept and found again: the same question over the same sources was answered before. Reads and writes files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+from nodl.infer.cpp.cache.codec import decoded, encoded
+from nodl.infer.cpp.cache.digests import digest, digest_of
+from nodl.infer.cpp.cache.fingerprint import analyser, surroundings
+from nodl.infer.cpp.cache.folder import CacheFolder
+from nodl.infer.cpp.reading.project import Workspace
+from nodl.infer.start import Start
+
+VARIANTS = 8
+"""Answers to one question, under different launches or after different edits, of which the newest are kept."""
+
+Asked = tuple[str, str, str]  # what, of which node, and what the launch said
+
+
+class WatchedStart:
+    """A start that remembers what was asked of it, and what it said."""
+
+    def __init__(self, start: Start) -> None:
+        self._start = start
+        self.asked: dict[Asked, None] = {}
+
+    def parameters(self, node: str | None) -> Mapping[str, object]:
+        self.asked.setdefault(_parameters(self._start, node))
+        return self._start.parameters(node)
+
+    def final_name(self, node: str | None) -> tuple[str | None, str | None]:
+        self.asked.setdefault(_final_name(self._start, node))
+        return self._start.final_name(node)
+
+
+def _parameters(start: Start, node: str | None) -> Asked:
+    return (
+        "parameters",
+        json.dumps(node),
+        repr(sorted(start.parameters(node).items(), key=lambda item: item[0])),
+    )
+
+
+def _final_name(start: Start, node: str | None) -> Asked:
+    return "name", json.dumps(node), repr(start.final_name(node))
+
+
+def _says_the_same(start: Start | None, asked: Iterable[Asked]) -> bool:
+    for what, written, said in asked:
+        node = json.loads(written)
+        if start is None or (_parameters if what == "parameters" else _final_name)(start, node)[2] != said:
+            return False
+    return True
+
+
+class Made(NamedTuple):
+    """An answer, with the digest of each file that it was made from."""
+
+    answer: Any
+    files: Mapping[str, str]
+
+
+class Answers:
+    """Of one workspace, for one run: a file that was looked at once is not looked at again.
+
+    A question says by its ``repr`` what is asked.
+    """
+
+    def __init__(self, workspace: Workspace, folder: CacheFolder | None = None) -> None:
+        self._workspace = workspace
+        self._folder = folder or CacheFolder()
+        self._base = ""
+        self._content = lru_cache(maxsize=None)(digest_of)
+
+    def find(self, question: object, start: Start | None = None) -> Made | None:
+        """The answer of a run in which all files that it was made from, and the launch, were as they are now."""
+        for asked, files, answer in self._variants(self._key(question, start)):
+            if _says_the_same(start, asked) and all(self._content(name) == was for name, was in files):
+                return Made(answer, dict(files))
+        return None
+
+    def keep(self, question: object, made: Made, start: WatchedStart | None = None) -> None:
+        """Kept for the next run, with what was asked of the launch."""
+        key = self._key(question, start)
+        asked = tuple(start.asked) if start is not None else ()
+        variant = (asked, tuple(sorted(made.files.items())), made.answer)
+        try:
+            content = encoded([variant, *self._variants(key)][:VARIANTS])
+            self._folder.write(key, json.dumps(content).encode())
+        except (TypeError, ValueError, RecursionError):
+            return  # what cannot be written is not kept
+
+    def _key(self, question: object, start: object) -> str:
+        if not self._base:
+            self._base = digest(analyser(), surroundings(self._workspace))
+        return digest(self._base, question, start is None)
+
+    def _variants(self, key: str) -> list[tuple[tuple[Asked, ...], tuple[tuple[str, str], ...], Any]]:
+        content = self._folder.read(key)
+        try:
+            return list(decoded(json.loads(content))) if content is not None else []
+        except (ValueError, RecursionError):
+            return []

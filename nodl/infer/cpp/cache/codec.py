@@ -1,0 +1,58 @@
+"""Answers as JSON and back: named tuples, frozen dataclasses and enumerations of a fixed list, nothing else. Pure.
+
+Not ``pickle``: what is read must never be able to run code.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from enum import Enum
+from typing import Any
+
+from nodl.infer.cpp.entry import Entry, Key, Solved
+from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
+from nodl.source_ref import SourceRef
+
+_RECORDS: dict[str, Callable[..., Any]] = {
+    each.__name__: each
+    for each in (Endpoint, Entry, Gap, Key, NameTemplate, NodeInterface, ParameterPart, Solved, SourceRef, UnknownPart)
+}  # fmt: skip
+_ENUMERATIONS: dict[str, type[Enum]] = {
+    each.__name__: each for each in (Certainty, ClientLibrary, EndpointKind)
+}
+
+
+def encoded(value: object) -> object:
+    """``value`` as what JSON has. Raises ``TypeError`` for what is not on the list."""
+    if isinstance(value, Enum):
+        return {"enum": type(value).__name__, "value": value.value}
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    name = type(value).__name__
+    if name in _RECORDS:
+        return {"record": name, "fields": [encoded(each) for each in _fields(value)]}
+    if isinstance(value, tuple | list):
+        return [encoded(each) for each in value]
+    raise TypeError(f"{name} is not kept")
+
+
+def _fields(value: Any) -> Sequence[object]:
+    if dataclasses.is_dataclass(value):
+        return [getattr(value, each.name) for each in dataclasses.fields(value)]
+    return tuple(value)
+
+
+def decoded(value: object) -> Any:
+    """What ``encoded`` made; lists come back as tuples. Raises ``ValueError`` for anything else."""
+    if isinstance(value, list):
+        return tuple(decoded(each) for each in value)
+    if not isinstance(value, dict):
+        return value
+    try:
+        if "enum" in value:
+            return _ENUMERATIONS[value["enum"]](value["value"])
+        return _RECORDS[value["record"]](*(decoded(each) for each in value["fields"]))
+    except (KeyError, TypeError) as error:
+        raise ValueError(f"not an answer of ours: {error}") from error

@@ -1,0 +1,40 @@
+"""Programs as plain values: where one starts, under which name launch knows it, what it makes. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nodl.node_interface import Gap, NodeInterface
+
+
+@dataclass(frozen=True)
+class Key:
+    """Under which name launch starts a program."""
+
+    package: str | None
+    executable: str | None = None
+    plugin: str | None = None
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Where a program starts: ``main`` of its files, or the constructor of a class."""
+
+    files: tuple[str, ...]
+    cls: str = ""
+    main: bool = True
+    symbols: tuple[tuple[str, str], ...] = ()
+    complete: bool = False
+    place: str = ""  # the package's folder, for what has no file
+
+
+@dataclass(frozen=True)
+class Solved:
+    """``gaps``: of the program, which its first node also has; ``dead``: places that make nothing, and why;
+    ``classes``: of which it makes objects; ``consulted``: parameters of the launch decided what it makes."""
+
+    nodes: tuple[NodeInterface, ...] = ()
+    gaps: tuple[Gap, ...] = ()
+    dead: tuple[Gap, ...] = ()
+    classes: tuple[str, ...] = ()
+    consulted: bool = False
