@@ -4,6 +4,7 @@
                private/{identity,permissions}_ca.key.pem      CA keys, mode 0600 in a 0700 directory
                enclaves/governance.{xml,p7s}                  one for all
                enclaves/<path>/...                            one directory per enclave; / is enclaves/ itself
+               zenoh/router.{json5,cert.pem,key.pem}          of the Zenoh router, where enclaves are on Zenoh
 
 All paths here are POSIX text relative to the keystore, so that they read the same in reports and tests.
 """
@@ -31,6 +32,9 @@ SUPERSEDED = "private/superseded.json"
 """Of earlier versions; taken over into the register."""
 REGISTER = "private/register.json"
 SHARES = "private/shares"
+ZENOH = "zenoh"
+ZENOH_ROUTER = "zenoh/router.json5"
+ZENOH_ROUTER_CERT, ZENOH_ROUTER_KEY = "zenoh/router.cert.pem", "zenoh/router.key.pem"
 BUNDLE = "bundle.p7s"
 """The signed manifest: first in a bundle, and beside ``public/`` where one was imported."""
 REQUESTS = "private/requests"
@@ -48,6 +52,8 @@ REQUEST = "request.csr"
 PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"
 ENCLAVE_GOVERNANCE = "governance.p7s"
 ENCLAVE_CRL = "crl.pem"
+ENCLAVE_ZENOH = "zenoh.json5"
+"""There for the enclaves that are on Zenoh: what ``ZENOH_SESSION_CONFIG_URI`` names."""
 ENCLAVE_FILES = frozenset({
     KEY, CERT, PERMISSIONS_XML, PERMISSIONS, ENCLAVE_GOVERNANCE, ENCLAVE_CRL,
     "identity_ca.cert.pem", "permissions_ca.cert.pem",

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from keystore.signing.ca_access import CaAccess
 
 _OWN_ENTRIES = frozenset({
-    layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS,
+    layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS, layout.ZENOH,
     layout.BUNDLE,
 })  # fmt: skip
 

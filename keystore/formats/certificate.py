@@ -17,6 +17,7 @@ _COMMON_NAME = der.object_identifier("2.5.4.3")
 _SUBJECT_KEY_ID = der.object_identifier("2.5.29.14")
 _AUTHORITY_KEY_ID = der.object_identifier("2.5.29.35")
 _EXTENDED_KEY_USAGE = der.object_identifier("2.5.29.37")
+_SUBJECT_ALT_NAME = der.object_identifier("2.5.29.17")
 _KEY_USAGE = der.object_identifier("2.5.29.15")
 _EMAIL_PROTECTION = der.object_identifier("1.3.6.1.5.5.7.3.4")
 _ANY_USAGE = der.object_identifier("2.5.29.37.0")
@@ -60,6 +61,14 @@ class CertificateFacts(NamedTuple):
         """Whether OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
         try:
             return _can_sign_mail(_by_oid(self.extensions))
+        except der.DerError:
+            return True
+
+    @property
+    def names_hosts(self) -> bool:
+        """Whether it has alternative names: a TLS client accepts its holder as a server of these hosts."""
+        try:
+            return _SUBJECT_ALT_NAME in _by_oid(self.extensions)
         except der.DerError:
             return True
 

@@ -22,11 +22,13 @@ _VERSION = 1
 
 
 class Share(NamedTuple):
-    """What ``owner`` asks for one enclave, and in which domains."""
+    """What ``owner`` asks for one enclave, and in which domains. ``types``: as ``zenoh.types`` keeps them; only of
+    enclaves that are on Zenoh."""
 
     owner: str
     domains: Domains
     profiles: tuple[Profile, ...]
+    types: tuple[tuple[str, tuple[str, ...]], ...] = ()
 
 
 def united(enclave: str, shares: Iterable[Share]) -> EnclavePolicy:
@@ -91,6 +93,7 @@ def shares_json(shares: Iterable[Share]) -> bytes:
                     {"ns": ns, "node": node, "rules": [" ".join(rule) for rule in rules]}
                     for ns, node, rules in share.profiles
                 ],
+                **({"types": dict(share.types)} if share.types else {}),
             }
             for share in sorted(shares)
         ],
@@ -109,6 +112,7 @@ def parse_shares(text: bytes, place: str) -> tuple[Share, ...]:
                 str(share["owner"]),
                 Domains.parse(share["domains"]),
                 tuple(map(_profile, share["profiles"])),
+                tuple((str(what), tuple(map(str, found))) for what, found in share.get("types", {}).items()),
             )
             for share in content["shares"]
         )

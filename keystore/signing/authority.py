@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import binascii
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from enum import Enum
@@ -150,6 +151,7 @@ class IdentityIssuer:
         self._extended = x509.ExtendedKeyUsage(
             [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
         )
+        self._server = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH])
         self._authority_key = _authority_key_id(ca)
 
     @property
@@ -157,18 +159,21 @@ class IdentityIssuer:
         """Of the CA: no certificate outlives it."""
         return self._authority.validity
 
-    def issue(self, common_name: str, key: PublicKey, validity: Validity) -> bytes:
-        """DER certificate for an already valid common name."""
+    def issue(self, common_name: str, key: PublicKey, validity: Validity, hosts: Sequence[str] = ()) -> bytes:
+        """DER certificate for an already valid common name. With ``hosts`` (names and addresses): of a server that is
+        found there, and of nothing else."""
         x509 = self._x509
         name = x509.Name([x509.NameAttribute(self._common_name, common_name)])
         builder = (
             _builder(name, self._issuer, validity.within(self._authority.validity), key)
             .add_extension(self._constraints, critical=True)
             .add_extension(self._usage, critical=True)
-            .add_extension(self._extended, critical=False)
+            .add_extension(self._server if hosts else self._extended, critical=False)
             .add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
             .add_extension(self._authority_key, critical=False)
         )
+        if hosts:
+            builder = builder.add_extension(_alternative_names(hosts), critical=False)
         return _sign(builder, self._authority.signer)
 
     def revocation_list(
@@ -191,6 +196,20 @@ class IdentityIssuer:
             builder = builder.add_revoked_certificate(entry)
         crl = builder.sign(signing_key(self._authority.signer), hashes.SHA256())
         return crl.public_bytes(serialization.Encoding.PEM)
+
+
+def _alternative_names(hosts: Sequence[str]) -> x509.SubjectAlternativeName:
+    import ipaddress
+
+    from cryptography import x509
+
+    names: list[x509.GeneralName] = []
+    for host in hosts:
+        try:
+            names.append(x509.IPAddress(ipaddress.ip_address(host)))
+        except ValueError:
+            names.append(x509.DNSName(host))
+    return x509.SubjectAlternativeName(names)
 
 
 def _leaf_key_usage() -> x509.KeyUsage:

@@ -148,7 +148,7 @@ def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions)
     if options.launch is None:
         return WantedEnclave(permissions_source(policy, options), ends_by=ends_by)
     owner, domains = options.launch.owner, domains_of(policy.path, options)
-    mine = Share(owner, domains, policy.profiles)
+    mine = Share(owner, domains, policy.profiles, options.types.get(policy.path, ()))
     share = EnclaveShare(root, policy.path, owner, mine, options.rmw, options.launch)
     return WantedEnclave(share.document, share=share, ends_by=ends_by)
 

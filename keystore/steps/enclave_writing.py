@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
+from keystore.disk.zenoh_files import has_router
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import read_certificate
 from keystore.formats.guid_prefix import half_of
@@ -223,6 +224,7 @@ class EnclaveWriter:
         }
         latest = self._register.permissions(enclave)
         present = latest.subject if latest is not None else records[-1].subject if records else ""
+        new_generation = new_generation or self._is_revoked_on_zenoh(enclave, present)
         if present and not new_generation and scheme_of(present) is self._scheme:
             return present
         wanted = self._options.guid_halves.get(enclave) if self._scheme is SubjectScheme.EXACT else None
@@ -232,6 +234,13 @@ class EnclaveWriter:
             if not taken and (wanted is None or half_of(name) is wanted):
                 break
         return name
+
+    def _is_revoked_on_zenoh(self, enclave: str, name: str) -> bool:
+        """A Zenoh router knows no CRL and goes by names: the name of a revoked certificate is given to nobody again."""
+        return has_router(self._view) and any(
+            one.subject == name and (one.revoked is not None or one.serial in self._revoked)
+            for one in self._register.of_enclave(enclave)
+        )
 
     def _revoke_longer(self, state: EnclaveState, validity: Validity) -> None:
         """A shorter life that was asked for is one only when the longer certificate cannot be used any more."""

@@ -49,6 +49,8 @@ class ProvisionOptions(NamedTuple):
     together. None: the enclaves get exactly what is given, and no launch has a share."""
     revoke: bool = True
     """Revoke certificates whose rights shrink or whose key is not safe; without it they are usable until they end."""
+    types: Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]] = MappingProxyType({})
+    """By enclave, of those on Zenoh: the types of what the launch asks for (``zenoh.types.types_text``)."""
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})
     guid_halves: Mapping[str, Half] = MappingProxyType({})
     """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""

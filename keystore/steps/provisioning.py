@@ -8,6 +8,7 @@ Idempotent: what is as wanted is not touched, keys are never replaced unless ask
 by the next one, because the comparison finds every missing step again.
 """
 
+import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
@@ -72,6 +73,15 @@ def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:
     return policies
 
 
+def _zenoh(root: Path, options: ProvisionOptions) -> list[str]:
+    """The router's rules follow from what was just changed."""
+    if not os.path.lexists(f"{root}/{layout.ZENOH_ROUTER}"):
+        return []
+    from keystore.steps.zenoh_configuration import follow, options_of
+
+    return follow(root, options_of(options))
+
+
 def bring_about(
     root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions
 ) -> ProvisionReport:
@@ -81,4 +91,5 @@ def bring_about(
         from keystore.steps.reconciliation import reconcile  # brings cryptography: not on the warm path
 
         report = reconcile(root, wanted, options, now)
+        report = report._replace(warnings=(*report.warnings, *_zenoh(root, options)))
     return report._replace(warnings=(*report.warnings, *exposures(KeystoreView(root))))

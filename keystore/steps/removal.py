@@ -29,10 +29,12 @@ from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
 from keystore.steps.crl import publish_crl, refuse_without_crl_sign, restore_crl, revocable, revoke
 from keystore.steps.opening import opened_for_change
+from keystore.steps.zenoh_configuration import ZenohOptions, follow
 
 # The key first, so that nothing usable remains; the certificate last, so that a repeated run can revoke it.
 _DELETE_ORDER = (
-    layout.KEY, layout.PERMISSIONS, layout.PERMISSIONS_XML, layout.ENCLAVE_GOVERNANCE, layout.ENCLAVE_CRL,
+    layout.KEY, layout.ENCLAVE_ZENOH, layout.PERMISSIONS, layout.PERMISSIONS_XML, layout.ENCLAVE_GOVERNANCE,
+    layout.ENCLAVE_CRL,
     "identity_ca.cert.pem", "permissions_ca.cert.pem", layout.CERT,
 )  # fmt: skip
 
@@ -85,7 +87,11 @@ def remove(
             if opened.is_directory(layout.enclave_directory(name)):
                 _delete(opened, name)
         issuer = fingerprint(KeystoreView(root).ca(Role.IDENTITY).der)
-        return RemoveReport(tuple(wanted), len(opened.register.revoked(issuer)), tuple(warnings))
+        revoked = len(opened.register.revoked(issuer))
+    zenoh = ZenohOptions(
+        access=chosen.access, lock_timeout=chosen.lock_timeout, durable=chosen.durable, now=chosen.now
+    )
+    return RemoveReport(tuple(wanted), revoked, (*warnings, *follow(root, zenoh)))
 
 
 def _strike(opened: Store, names: list[str], options: RemoveOptions, now: datetime) -> list[str]:

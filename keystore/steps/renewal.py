@@ -19,9 +19,11 @@ from pathlib import Path
 from keystore.disk import layout, safe_files
 from keystore.disk.authorities import describe, foreign_authorities
 from keystore.disk.copies import refresh_copies
+from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
+from keystore.disk.zenoh_files import has_router, zenoh_enclaves
 from keystore.errors import InvalidInputError, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
@@ -89,7 +91,28 @@ def renew(
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
             count = revoke_replaced(opened, changed, provisioning.access, now)
         repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
+        report = _with_names_of_their_own(root, report, due)
     return report._replace(created=(*repaired, *report.created))
+
+
+def _with_names_of_their_own(
+    root: Path, report: ProvisionReport, options: ProvisionOptions
+) -> ProvisionReport:
+    """On Zenoh, where a router goes by names: what has the name of a revoked certificate gets another one."""
+    view = KeystoreView(root)
+    register = read_register(root)
+    if register is None or not has_router(view):
+        return report
+    revoked = {
+        (one.enclave, one.subject) for one in register.certificates.values() if one.revoked is not None
+    }
+    wanted = {
+        name: WantedEnclave(keep, Reissue.CERTIFICATE)
+        for name in zenoh_enclaves(view)
+        if (name, view.common_name(name)) in revoked
+    }
+    again = bring_about(root, wanted, with_domains(root, options)) if wanted else None
+    return report if again is None else again._replace(enclaves=(*report.enclaves, *again.enclaves))
 
 
 def _opened(root: Path, options: ProvisionOptions, now: datetime) -> AbstractContextManager[Store]:

@@ -44,6 +44,7 @@ from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import bring_about
 from keystore.steps.report import ProvisionReport
+from keystore.steps.zenoh_configuration import follow, options_of
 
 
 class Step(str, Enum):
@@ -78,7 +79,8 @@ def roll_over(
         done = [_STEPS[step](opened, role, chosen, now, encrypt) for role in roles]
         refresh_copies(opened)
     if step is not Step.SWITCH:
-        return ProvisionReport(root, tuple(text for text in done if text), ())
+        warnings = tuple(follow(root, options_of(chosen)))
+        return ProvisionReport(root, tuple(text for text in done if text), (), warnings)
     wanted = {name: WantedEnclave(keep) for name in KeystoreView(root).enclaves()}
     report = bring_about(root, wanted, with_domains(root, chosen))
     return report._replace(created=(*(text for text in done if text), *report.created))

@@ -65,10 +65,11 @@ class EnclaveShare:
         if self.mine is None:
             return others
         before = next((share for share in self.present if share.owner == self.owner), None)
-        mine = Share(self.owner, self.mine.domains, merged_profiles(self.mine.profiles))
+        mine = Share(self.owner, self.mine.domains, merged_profiles(self.mine.profiles), self.mine.types)
         if before is not None and _loses(before, mine) and self._is_in_use(others):
             profiles = merged_profiles((*before.profiles, *mine.profiles))
-            mine = Share(self.owner, united_domains((before, mine)), profiles)
+            types = tuple(sorted({**dict(before.types), **dict(mine.types)}.items()))
+            mine = Share(self.owner, united_domains((before, mine)), profiles, types)
         return tuple(sorted((*others, mine)))
 
     def _is_in_use(self, others: Iterable[Share]) -> bool:

@@ -16,7 +16,7 @@ from keystore.errors import KeystoreError
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
-    "import", "request", "sign", "fleet", "governance", "shares",
+    "import", "request", "sign", "fleet", "governance", "shares", "zenoh",
 )  # fmt: skip
 
 

@@ -26,6 +26,7 @@ from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
 from keystore.verification.issued import check_anchors, check_published, load_register
 from keystore.verification.surroundings import check_parents
+from keystore.verification.zenoh import check_zenoh
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +91,7 @@ def _findings(
     except KeystoreError:
         revoked = frozenset()  # the CRL itself was reported above
     yield from check_enclaves(view, register, revoked, now)
+    yield from check_zenoh(view, now)
 
 
 def _check_settings(view: KeystoreView) -> Iterator[Finding]:

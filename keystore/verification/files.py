@@ -17,10 +17,11 @@ from keystore.verification.contents import check_content, holds_private_key
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.surroundings import check_hard_links, check_owner
 
-_TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES})
+_TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.ZENOH})
 _KNOWN = frozenset({
     layout.LOCK, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
     layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER, layout.CRL_UNLINKED,
+    layout.ZENOH_ROUTER, layout.ZENOH_ROUTER_CERT, layout.ZENOH_ROUTER_KEY,
     layout.BUNDLE,
     *(layout.ca_cert(role) for role in Role),
     *(layout.ca_key(role) for role in Role), *(layout.ca_key_uri(role) for role in Role),
@@ -129,7 +130,7 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
         yield _not_a_file(root, relative, "rm") or _stray(root, relative, "neither file, directory nor link")
         return
     directory, _, name = relative.rpartition("/")
-    secret = directory == layout.PRIVATE or name == layout.KEY
+    secret = directory == layout.PRIVATE or name == layout.KEY or relative == layout.ZENOH_ROUTER_KEY
     yield from _check_owner(root, relative, info, private=secret)
     if secret:
         yield from check_hard_links(root, relative, info)
@@ -145,7 +146,7 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
         return
     if relative in _NEXT_CAS:
         return
-    if directory.split("/")[0] == layout.ENCLAVES and name in layout.ENCLAVE_FILES:
+    if directory.split("/")[0] == layout.ENCLAVES and name in {*layout.ENCLAVE_FILES, layout.ENCLAVE_ZENOH}:
         return
     if name == layout.KEY_URI and not os.path.lexists(root / directory / layout.KEY):
         return  # the enclave's key is in a token

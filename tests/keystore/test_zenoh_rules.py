@@ -13,8 +13,6 @@ from keystore.formats.zenoh.grants import (
     Types,
     Use,
     grants_of_policy,
-    types_of_interface,
-    united_types,
 )
 from keystore.formats.zenoh.key_expressions import (
     NotExpressible,
@@ -28,6 +26,7 @@ from keystore.formats.zenoh.key_expressions import (
 from keystore.formats.zenoh.router import Subject, router_configuration
 from keystore.formats.zenoh.rules import AccessRule, access_rules
 from keystore.formats.zenoh.session import TlsFiles, session_configuration
+from keystore.formats.zenoh.types import types_of_interface, united_types
 
 STRING = "std_msgs::msg::dds_::String_"
 FILES = TlsFiles("/ks/public/identity_ca.cert.pem", "/ks/x/cert.pem", "/ks/x/key.pem")

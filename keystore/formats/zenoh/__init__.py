@@ -2,8 +2,10 @@
 
     grants           what an enclave may do, as topics and services     <- DDS topics of its permissions
     key_expressions  ROS names and types -> key expressions             (rmw_zenoh docs/design.md)
+    types            which types its launches know
     rules            grants -> the access-control rules of one enclave
     router           all enclaves -> the file of ``rmw_zenohd``: it enforces
+    address          where the router is
     session          the file of one enclave's processes: clients of that router
 
 Where DDS-Security signs a document for each participant and every participant checks its peers, Zenoh has one

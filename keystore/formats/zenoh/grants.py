@@ -14,8 +14,8 @@ from typing import NamedTuple
 from keystore.formats.permissions import TopicSets, dds_rules
 from keystore.formats.permissions_names import DISCOVERY_TOPIC
 from keystore.formats.permissions_patterns import can_meet
-from keystore.formats.policy import EnclavePolicy, Operation
-from keystore.formats.zenoh.key_expressions import NotExpressible, name_expressions, type_chunk
+from keystore.formats.policy import EnclavePolicy
+from keystore.formats.zenoh.key_expressions import NotExpressible, name_expressions
 
 
 class Use(str, Enum):
@@ -100,42 +100,3 @@ def _uses(publish: set[str], subscribe: set[str]) -> Iterator[tuple[Use, str, tu
 def _without_ros_name(topics: Iterable[str]) -> Iterator[str]:
     known = ("rt/", "rq/", "rr/")
     return (topic for topic in topics if not topic.startswith(known) and topic != DISCOVERY_TOPIC)
-
-
-def types_of_interface(
-    operation: Operation, name: str, ros_type: str
-) -> Iterator[tuple[Use, str, str | None]]:
-    """What an interface of this type means for each of its topics and services: use, name, type chunk.
-
-    Source for actions: rosidl (``Fibonacci_SendGoal``, ``Fibonacci_FeedbackMessage``), rcl_action's names.
-    """
-    if operation not in (Operation.CALL, Operation.EXECUTE):
-        yield _PLAIN[operation], name, type_chunk(ros_type)
-        return
-    service, topic = (Use.CALL, Use.SUBSCRIBE) if operation is Operation.CALL else (Use.SERVE, Use.PUBLISH)
-    own = type_chunk(ros_type)
-    for part, suffix in (("send_goal", "_SendGoal_"), ("get_result", "_GetResult_")):
-        yield service, f"{name}/_action/{part}", own and own[:-1] + suffix
-    yield service, f"{name}/_action/cancel_goal", type_chunk("action_msgs/srv/CancelGoal")
-    yield topic, f"{name}/_action/feedback", own and own[:-1] + "_FeedbackMessage_"
-    yield topic, f"{name}/_action/status", type_chunk("action_msgs/msg/GoalStatusArray")
-
-
-_PLAIN = {
-    Operation.PUBLISH: Use.PUBLISH,
-    Operation.SUBSCRIBE: Use.SUBSCRIBE,
-    Operation.REQUEST: Use.CALL,
-    Operation.REPLY: Use.SERVE,
-}
-
-
-def united_types(known: Iterable[tuple[Use, str, str | None]]) -> Types:
-    """By use and name; a name is left out as soon as one of its types is not known, or it holds a wildcard."""
-    found: dict[tuple[Use, str], set[str | None]] = {}
-    for use, name, chunk in known:
-        found.setdefault((use, name), set()).add(chunk)
-    return {
-        key: tuple(sorted(one for one in chunks if one is not None))
-        for key, chunks in sorted(found.items())
-        if None not in chunks and not any(character in key[1] for character in "*?[")
-    }

@@ -12,6 +12,10 @@ from typing import Any, NamedTuple
 from keystore.formats.zenoh.rules import AccessRule
 from keystore.formats.zenoh.session import NO_SCOUTING, TIMESTAMPING, TlsFiles, json_bytes, transport
 
+ROUTER_NAME = "zenoh-router"
+"""Common name of the router's certificate. No enclave has such a name (``subject.common_name``), and no rule is for it:
+as a client it may do nothing."""
+
 
 class Subject(NamedTuple):
     """An enclave with rules; ``common_name`` of the certificate that is in force."""

@@ -1,0 +1,211 @@
+"""The configuration of enclaves on Zenoh: a session file for each, and the router's files, which enforce.
+
+    write_zenoh     these enclaves are on Zenoh     ``secure-keystore zenoh``, a secured launch
+    follow          whoever changed the keystore    the same files for what it is now
+
+The router has an identity of its own: a certificate for its host's name, which no enclave's has, and for nothing but
+serving. It is issued anew whenever its configuration changes. So whoever connects sees whether the router that runs
+knows the present rules, and one that does not is restarted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from datetime import datetime, timedelta
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import NamedTuple
+
+from keystore.disk import layout, safe_files
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.store import PRIVATE_MODE, PUBLIC_MODE, Store
+from keystore.disk.view import KeystoreView
+from keystore.disk.zenoh_files import (
+    RouterFile,
+    has_router,
+    identity_problem,
+    present_address,
+    router_file,
+    router_key,
+    session_content,
+    session_file,
+    zenoh_enclaves,
+)
+from keystore.errors import InvalidInputError, KeystoreError, printable
+from keystore.formats.certificate import read_der
+from keystore.formats.register import UNKNOWN, IssuedCertificate
+from keystore.formats.role import Role
+from keystore.formats.validity import DEFAULT_BACKDATE, Validity, later, utc_now
+from keystore.formats.zenoh.address import RouterAddress
+from keystore.formats.zenoh.router import ROUTER_NAME
+from keystore.signing.authority import IdentityIssuer, key_pem, new_key, pem_certificate
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.identity import public_half
+from keystore.signing.records import certificate_record
+from keystore.steps.opening import opened_for_change
+from keystore.steps.options import DEFAULT_LOCK_TIMEOUT, ProvisionOptions
+
+
+class ZenohOptions(NamedTuple):
+    """``router``: where it is (``HOST:PORT``); None: as before, ``localhost:7447`` for the first time."""
+
+    router: str | None = None
+    access: CaAccess = CaAccess()
+    lock_timeout: float = DEFAULT_LOCK_TIMEOUT
+    durable: bool = True
+    renew_within: timedelta = timedelta(0)
+    now: datetime | None = None
+
+
+class ZenohReport(NamedTuple):
+    """``written``: files that were not as they are now. ``gaps``: what Zenoh cannot grant, and who is shut out.
+    ``restart``: a router that runs has to be started anew to know of it."""
+
+    keystore: Path
+    router: RouterAddress
+    written: tuple[str, ...]
+    enclaves: tuple[str, ...]
+    gaps: tuple[str, ...]
+    restart: bool
+
+
+def write_zenoh(
+    keystore: Path | str, enclaves: Iterable[str], *, options: ZenohOptions | None = None
+) -> ZenohReport:
+    """Session files for ``enclaves``; the router serves them and those that had one before. Idempotent.
+
+    On a host without ``private/`` only session files are written: the router's are where certificates are issued.
+    Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA key.
+    """
+    chosen = options or ZenohOptions()
+    root = resolve_root(keystore)
+    view = KeystoreView(root)
+    view.require_complete()
+    asked = set(enclaves)
+    unknown = sorted(asked - set(view.enclaves()))
+    if unknown:
+        raise InvalidInputError(
+            f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
+        )
+    names = sorted({*asked, *zenoh_enclaves(view)})
+    address = _address(view, chosen)
+    if (found := _as_wanted(view, names, address, chosen)) is not None:
+        return ZenohReport(root, address, (), found.served, found.gaps, restart=False)
+    now = chosen.now or utc_now()
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        return _write(opened, names, address, chosen, now)
+
+
+def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> list[str]:
+    """Those that match one of ``patterns`` (``/robot1/*``); without patterns all, but none more where some are on Zenoh
+    already. Raises InvalidInputError for a pattern that none matches."""
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    names = view.enclaves()
+    if patterns is None:
+        return [] if has_router(view) else names
+    for pattern in patterns:
+        if not any(fnmatchcase(name, pattern) for name in names):
+            raise InvalidInputError(
+                f"no enclave matches {printable(pattern)}; secure-keystore list shows all"
+            )
+    return [name for name in names if any(fnmatchcase(name, one) for one in patterns)]
+
+
+def options_of(options: ProvisionOptions) -> ZenohOptions:
+    return ZenohOptions(
+        access=options.access, lock_timeout=options.lock_timeout, durable=options.durable,
+        renew_within=options.renew_within, now=options.now,
+    )  # fmt: skip
+
+
+def follow(root: Path, options: ZenohOptions) -> list[str]:
+    """After a change of the keystore: what was done for Zenoh, in words; nothing without a router's file."""
+    view = KeystoreView(root)
+    if not has_router(view):
+        return []
+    try:
+        report = write_zenoh(root, (), options=options)
+    except KeystoreError as error:
+        return [
+            f"{layout.ZENOH_ROUTER} is not up to date ({error}); the Zenoh router enforces what it was before"
+        ]
+    said = [f"the Zenoh router's configuration follows: {RESTART}"] if report.restart else []
+    return [*said, *report.gaps]
+
+
+RESTART = (
+    "a router that runs has to be restarted to enforce it (one that secure-launch started restarts by itself)"
+)
+
+
+def _address(view: KeystoreView, options: ZenohOptions) -> RouterAddress:
+    if options.router is not None:
+        return RouterAddress.parse(options.router)
+    return present_address(view) or RouterAddress()
+
+
+def _as_wanted(
+    view: KeystoreView, names: list[str], address: RouterAddress, options: ZenohOptions
+) -> RouterFile | None:
+    """What the router serves, when nothing is to be written. Asked before each secured launch."""
+    if _stale_sessions(view, names, address):
+        return None
+    if _serves_no_router(view):
+        return RouterFile(b"", (), ())
+    now = options.now or utc_now()
+    wanted = router_file(view, names, address)
+    if safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != wanted.content:
+        return None
+    return wanted if identity_problem(view, later(now, options.renew_within)) is None else None
+
+
+def _stale_sessions(view: KeystoreView, names: list[str], address: RouterAddress) -> dict[str, bytes]:
+    wanted = {session_file(name): session_content(view, name, address) for name in names}
+    return {
+        file: content
+        for file, content in wanted.items()
+        if safe_files.read_if_there(view.root, file) != content
+    }
+
+
+def _serves_no_router(view: KeystoreView) -> bool:
+    return not (view.root / layout.PRIVATE).is_dir()
+
+
+def _write(
+    opened: Store, names: list[str], address: RouterAddress, options: ZenohOptions, now: datetime
+) -> ZenohReport:
+    view = KeystoreView(opened.root)
+    files = _stale_sessions(view, names, address)
+    wanted, restart = RouterFile(b"", (), ()), False
+    with opened.batch() as batch:
+        if not _serves_no_router(view):
+            wanted = router_file(view, names, address)
+            changed = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != wanted.content
+            if changed or identity_problem(view, later(now, options.renew_within)) is not None:
+                restart = has_router(view)
+                issued = _issue(view, address, options.access, now)
+                batch.record(opened.register.with_certificates([issued.record]))
+                files |= {**issued.files, layout.ZENOH_ROUTER: wanted.content}
+        for file, content in files.items():
+            batch.file(file, content, PRIVATE_MODE if file == layout.ZENOH_ROUTER_KEY else PUBLIC_MODE)
+    return ZenohReport(view.root, address, tuple(files), wanted.served, wanted.gaps, restart)
+
+
+class _Issued(NamedTuple):
+    record: IssuedCertificate
+    files: dict[str, bytes]
+
+
+def _issue(view: KeystoreView, address: RouterAddress, access: CaAccess, now: datetime) -> _Issued:
+    """A certificate for the router's host; its key stays unless it is missing or others could read it."""
+    authority = view.authority(Role.IDENTITY, access)
+    key = router_key(view)
+    fresh = None if key is not None else new_key(view.settings.curve)
+    public = fresh.public_key() if fresh is not None else public_half(key or b"", layout.ZENOH_ROUTER_KEY)
+    validity = Validity.starting(now, view.settings.lifetime, backdate=DEFAULT_BACKDATE)
+    der = IdentityIssuer(authority).issue(ROUTER_NAME, public, validity, address.hosts)
+    record = certificate_record(UNKNOWN, read_der(der), authority.facts)._replace(replaced=True)
+    files = {layout.ZENOH_ROUTER_KEY: key_pem(fresh)} if fresh is not None else {}
+    return _Issued(record, {**files, layout.ZENOH_ROUTER_CERT: pem_certificate(der)})

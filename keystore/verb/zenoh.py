@@ -1,0 +1,51 @@
+"""Write Zenoh's configuration: the router's, which enforces the permissions, and one for each enclave's processes.
+
+For rmw_zenoh_cpp. The router starts with ZENOH_ROUTER_CONFIG_URI=KEYSTORE/zenoh/router.json5, a process with
+ZENOH_SESSION_CONFIG_URI=KEYSTORE/enclaves/PATH/zenoh.json5 and --enclave PATH. On a host without CA keys (a bundle)
+only the processes' files are written. From then on each change of the keystore is written there too.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shlex
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument(
+        "--enclave", metavar="PATTERN", action="append",
+        help="which enclaves are on Zenoh: name or fnmatch pattern such as '/robot1/*'; repeatable (default: those "
+        "that are already, all of them for the first time)",
+    )  # fmt: skip
+    parser.add_argument(
+        "--router", metavar="HOST[:PORT]",
+        help="where processes find the router (as before; localhost:7447 for the first time). For another host than "
+        "localhost it listens on all addresses",
+    )  # fmt: skip
+    common.add_signing(parser)
+    common.add_lock(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.disk import layout
+    from keystore.steps.zenoh_configuration import RESTART, ZenohOptions, matching_enclaves, write_zenoh
+
+    names = matching_enclaves(arguments.keystore, arguments.enclave)
+    options = ZenohOptions(
+        arguments.router, access=common.access(arguments), lock_timeout=arguments.lock_timeout
+    )
+    report = write_zenoh(arguments.keystore, names, options=options)
+    common.print_lines(f"{name} written" for name in report.written)
+    if not report.written:
+        print("everything is as it should be")
+    common.warn(report.gaps)
+    if report.enclaves:
+        router = shlex.quote(str(report.keystore / layout.ZENOH_ROUTER))
+        print(f"router of {len(report.enclaves)} enclaves at {report.router.endpoint}:")
+        print(f"  ZENOH_ROUTER_CONFIG_URI={router} ros2 run rmw_zenoh_cpp rmw_zenohd")
+    if report.restart:
+        common.warn([RESTART])
+    return 0
