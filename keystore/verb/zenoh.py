@@ -41,11 +41,11 @@ def run(arguments: argparse.Namespace) -> int:
     common.print_lines(f"{name} written" for name in report.written)
     if not report.written:
         print("everything is as it should be")
-    common.warn(report.gaps)
+    common.warn(report.gaps, arguments)
     if report.enclaves:
         router = shlex.quote(str(report.keystore / layout.ZENOH_ROUTER))
         print(f"router of {len(report.enclaves)} enclaves at {report.router.endpoint}:")
         print(f"  ZENOH_ROUTER_CONFIG_URI={router} ros2 run rmw_zenoh_cpp rmw_zenohd")
     if report.restart:
-        common.warn([RESTART])
+        common.warn([RESTART], arguments)
     return 0
