@@ -14,7 +14,8 @@ from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedProcess
 from nodl.record.asked import all_asked
 from nodl.record.assembly import read_record
-from nodl.record.origins import MARKER, arguments_as_inputs, candidates
+from nodl.record.learning import observation_of
+from nodl.record.origins import MARKER, possible_sources
 
 
 class Questions(NamedTuple):
@@ -47,8 +48,8 @@ def questions(folder: Path) -> Questions:
         for node in all_asked(read_record(path.read_bytes()).attributed()):
             if not node.executable:
                 continue
-            inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
-            sources = {source for asked in node.endpoints for source in candidates(asked.written, inputs)}
+            seen = observation_of(node)
+            sources = {source for name in seen.names for source in possible_sources(name, seen)}
             found.setdefault((node.package, node.executable), set()).update(s.parameter for s in sources)
     return Questions({program: frozenset(names) for program, names in found.items()})
 

@@ -7,9 +7,10 @@
           - {in: subscriptions, name: front, parameter: scan_topic, default: scan, proof: one run, runs: [a]}
 
 ``name`` is that of the standard entry, the name that was seen. ``parameter`` gives the node's parameter (or ``<1>``,
-a word of its command line) whose value the name is, ``each`` says that it is a list, ``default`` the name where
-nothing is set. ``written`` is the source's name where NoDL v2 cannot hold it, ``introspection`` says that the calls of
-a service are published. ``proof``, ``undecided`` and ``runs`` are for the reader.
+a word of its command line) whose value the name is, ``each`` says that it is a list, ``suffix`` what the program
+appends to the value, ``default`` the name where nothing is set. ``written`` is the source's name where NoDL v2 cannot
+hold it, ``introspection`` says that the calls of a service are published. ``proof``, ``undecided`` and ``runs`` are
+for the reader.
 """
 
 from __future__ import annotations
@@ -66,7 +67,8 @@ def _template(fields: dict[str, str | int | float | bool | None], row: YamlMap) 
     if parameter:
         item = "each" if fields.get("each") is True else None
         given = str(default) if default is not None else None
-        return NameTemplate((ParameterPart(str(parameter), given, item),))
+        part, suffix = ParameterPart(str(parameter), given, item), str(fields.get("suffix") or "")
+        return NameTemplate((part, suffix) if suffix else (part,))
     name = str(fields.get("written") or fields["name"])
     try:
         validate_name(name)

@@ -99,6 +99,7 @@ _LEARNT_ENDPOINT = map_of(
         "written": text_of(),
         "parameter": text_of(),
         "each": boolean,
+        "suffix": text_of(),
         "default": text_of(),
         "proof": text_of(),
         "undecided": _TEXTS,

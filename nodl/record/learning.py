@@ -196,7 +196,7 @@ def _notes(entries: Iterable[Entry], seen: Sequence[_Seen]) -> Iterable[str]:
 
 
 def _entries(seen: Sequence[_Seen]) -> Iterable[Entry]:
-    observations = [_observation(each) for each in seen]
+    observations = [observation_of(each.node, each.run.id) for each in seen]
     origins = origins_of(observations)
     done: set[object] = set()
     for name, origin in origins.items():
@@ -230,11 +230,11 @@ def _entry(name: Name, origin: Origin, names: set[Name], seen: Sequence[_Seen]) 
     )
 
 
-def _observation(seen: _Seen) -> Observation:
-    node = seen.node
+def observation_of(node: AskedNode, run: str = "") -> Observation:
+    """What ``node`` was given, and the names that it asked for."""
     names = frozenset(_name(asked) for asked in node.endpoints if asked.rc in (0, 1))
     inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
-    return Observation(inputs, names, seen.run.id)
+    return Observation(inputs, names, run)
 
 
 def _name(asked: Asked) -> Name:

@@ -125,6 +125,7 @@ def _about(entry: Entry) -> dict[str, Any]:
     if origin.source:
         fields["parameter"] = origin.source.parameter
         fields["each"] = origin.source.each
+        fields["suffix"] = origin.source.suffix or None
         fields["default"] = origin.default
         fields["proof"] = "another value was followed" if origin.proven else "one run"
     if origin.undecided or entry.spellings:

@@ -1,8 +1,9 @@
 """Which parameter or argument a recorded name came from, over all observations of one node. Pure.
 
 Measured on nine stacks with ordinary and with hostile values: a name that comes from a parameter is its value
-verbatim, or one entry of it where it is a list; a value as a part of a name was a coincidence each time. Parameters
-whose name ends in ``frame``, ``frame_id`` or ``type`` were never the source of a name.
+verbatim, or one entry of it where it is a list; a value as a part of a name was a coincidence each time, but for lists
+of which every entry has the same names below it (``node_names`` of nav2's lifecycle_manager). Parameters whose name
+ends in ``frame``, ``frame_id`` or ``type`` were never the source of a name.
 
 One observation gives candidates. A second one with another value decides: the name followed the value (proven), or
 it did not (fixed). Several candidates that no observation tells apart stay undecided, and then no more than the name
@@ -44,13 +45,16 @@ class Observation(NamedTuple):
 
 
 class Source(NamedTuple):
-    """A parameter, or with ``each`` any entry of a list. ``*`` in ``parameter`` stands for one part of its name."""
+    """A parameter, or with ``each`` any entry of a list, and what the program appends to it. ``*`` in ``parameter``
+    stands for one part of its name."""
 
     parameter: str
     each: bool = False
+    suffix: str = ""
 
     def __str__(self) -> str:
-        return f"each of {self.parameter}" if self.each else self.parameter
+        value = f"each of {self.parameter}" if self.each else self.parameter
+        return f"{value} and {self.suffix}" if self.suffix else value
 
 
 class Origin(NamedTuple):
@@ -99,6 +103,11 @@ def candidates(name: str, inputs: Inputs) -> tuple[Source, ...]:
     return tuple([each for each in found if _PREFERRED.search(each.parameter)] or found)
 
 
+def possible_sources(name: Name, seen: Observation) -> tuple[Source, ...]:
+    """``candidates``, and lists whose entries the program appends something to."""
+    return (*candidates(name.name, seen.inputs), *_names_below(name, seen))
+
+
 def _source(parameter: str, value: object, name: str) -> Source | None:
     if isinstance(value, str) and value == name:
         return Source(parameter)
@@ -109,34 +118,55 @@ def _source(parameter: str, value: object, name: str) -> Source | None:
 
 def _origin(name: Name, observations: Sequence[Observation]) -> Origin:
     seen_in = [each for each in observations if name in each.names]
-    per_observation = [set(_all_sources(name.name, each.inputs)) for each in seen_in]
+    per_observation = [set(_all_sources(name, each)) for each in seen_in]
     if not all(per_observation):
         return FIXED  # it was there once without any input of that value
     left = [
         source
-        for source in candidates(name.name, seen_in[0].inputs)
+        for source in possible_sources(name, seen_in[0])
         if all(source in sources for sources in per_observation)
         and not any(_contradicts(name, source, each) for each in observations)
     ]
     followed = [source for source in left if any(_follows(name, source, each) for each in observations)]
     if len(followed) == 1:
         return Origin(followed[0], proven=True)
-    if len(left) == 1:
+    if len(left) == 1 and any(_is_telling(left[0], each) for each in seen_in):
         return Origin(left[0])
     return Origin(candidates=tuple(left)) if left else FIXED
 
 
-def _all_sources(name: str, inputs: Inputs) -> Iterable[Source]:
-    for parameter, value in inputs.items():
-        source = _source(parameter, value, name)
+def _all_sources(name: Name, seen: Observation) -> Iterable[Source]:
+    for parameter, value in seen.inputs.items():
+        source = _source(parameter, value, name.name)
         if source is not None:
             yield source
+    yield from _names_below(name, seen)
+
+
+def _names_below(name: Name, seen: Observation) -> Iterable[Source]:
+    """Lists of which every entry has a name like this one below it."""
+    for parameter, value in sorted(seen.inputs.items()):
+        entries = _entries(value)
+        for entry in entries if not _NEVER.search(parameter) else ():
+            suffix = name.name.removeprefix(entry)
+            below = suffix != name.name and suffix.startswith("/")
+            if below and all(name._replace(name=each + suffix) in seen.names for each in entries):
+                yield Source(parameter, each=True, suffix=suffix)
+
+
+def _is_telling(source: Source, seen: Observation) -> bool:
+    """Enough for one run to tell: what begins with the one entry of a list may do so by chance."""
+    return not source.suffix or len(_entries(seen.inputs.get(source.parameter))) > 1
+
+
+def _entries(value: object) -> frozenset[str]:
+    return frozenset(map(str, value)) - {""} if isinstance(value, list | tuple) else frozenset()
 
 
 def _values(source: Source, inputs: Inputs) -> frozenset[str]:
     value = inputs.get(source.parameter)
     if source.each:
-        return frozenset(map(str, value)) if isinstance(value, list | tuple) else frozenset()
+        return frozenset(entry + source.suffix for entry in _entries(value))
     return frozenset((value,)) if isinstance(value, str) else frozenset()
 
 
@@ -162,11 +192,12 @@ def _generalised(found: Mapping[Name, Origin]) -> dict[Name, Origin]:
     for name, origin in found.items():
         if origin.source:
             for family in _families(origin.source.parameter):
-                families.setdefault((name.kind, name.type, family), set()).add(origin.source.parameter)
+                alike = (name.kind, name.type, origin.source.suffix, family)
+                families.setdefault(alike, set()).add(origin.source.parameter)
     result = dict(found)
     for name, origin in found.items():
         for family in _families(origin.source.parameter) if origin.source else ():
-            if len(families[name.kind, name.type, family]) > 1 and origin.source:
+            if origin.source and len(families[name.kind, name.type, origin.source.suffix, family]) > 1:
                 result[name] = origin._replace(source=origin.source._replace(parameter=family))
                 break
     return result

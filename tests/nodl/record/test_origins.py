@@ -158,3 +158,27 @@ def test_every_name_that_was_seen_is_granted_for_what_it_was_seen_with(seen_all:
                 part = ParameterPart(found.source.parameter, found.default, item)
                 granted.update(part.texts(observation.inputs))
         assert {each.name for each in observation.names} <= granted
+
+
+MANAGED = ("map_server/get_state", "amcl/get_state")
+
+
+def test_names_below_every_entry_of_a_list_follow_the_list() -> None:
+    """nav2's lifecycle_manager has a client below the name of each node in ``node_names``."""
+    run = seen({"node_names": ("map_server", "amcl")}, *MANAGED, "bond")
+    assert origin("amcl/get_state", run) == Origin(Source("node_names", each=True, suffix="/get_state"))
+    assert origin("bond", run) == FIXED
+
+
+def test_a_name_below_one_entry_only_is_a_coincidence() -> None:
+    assert origin("scan/front", seen({"sources": ("scan", "points")}, "scan/front")) == FIXED
+
+
+def test_a_list_of_one_entry_leaves_open_what_a_second_run_decides() -> None:
+    source = Source("node_names", each=True, suffix="/get_state")
+    one = seen({"node_names": ("amcl",)}, "amcl/get_state")
+    assert origin("amcl/get_state", one) == Origin(candidates=(source,))
+    other = seen({"node_names": ("planner",)}, "planner/get_state")
+    assert origin("amcl/get_state", one, other) == Origin(source, proven=True)
+    fixed = seen({"node_names": ("planner",)}, "amcl/get_state")
+    assert origin("amcl/get_state", one, fixed) == FIXED
