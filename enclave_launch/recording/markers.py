@@ -66,9 +66,10 @@ class MarkerRun:
         wanted = self._asked.inputs.get(
             (process.package or "", process.executable.rpartition("/")[2]), frozenset()
         )
-        parameters = {
-            name: self._marker(value) for name, value in sorted(process.parameters.items()) if name in wanted
+        given = {
+            name: process.parameters.get(name, "") for name in sorted(wanted) if not name.startswith("<")
         }
+        parameters = {name: self._marker(value) for name, value in given.items()}
         words = own_words(process)
         arguments = [self._next() if f"<{place}>" in wanted else word for place, word in enumerate(words, 1)]
         marked = _with_words(cmd, dict(zip(words, arguments, strict=True)))

@@ -403,6 +403,114 @@ static void add_quality(struct line * line, const void * options)
   add_raw(line, text);
 }
 
+/* ---- parameters -------------------------------------------------------------------------------- */
+
+/* A node says on /parameter_events which parameters it declares, with their values: the only place where rcl sees
+ * defaults. What was published is serialised once more and noted as it is (CDR, in hexadecimal). */
+static struct {
+  _Atomic(const void *) publisher;
+  _Atomic(const void *) support;
+  atomic_int node;
+} events[NODES];
+static atomic_int events_used;
+static atomic_int parameter_lines;
+enum { MOST_PARAMETER_LINES = 8192, LONGEST_EVENT = 2048 };
+
+/* Handles come back: one that is no publisher of parameter events any more is forgotten. */
+static void remember_parameter_events(const void * publisher, const void * node, const void * support, bool is_one)
+{
+  int used = atomic_load(&events_used);
+  for (int i = 0; i < used; i++)
+    if (atomic_load(&events[i].publisher) == publisher)
+      atomic_store(&events[i].publisher, NULL);
+  for (int i = 0; is_one && i < NODES; i++) {
+    const void * free_slot = NULL;
+    if (atomic_compare_exchange_strong(&events[i].publisher, &free_slot, publisher)) {
+      atomic_store(&events[i].support, support);
+      atomic_store(&events[i].node, number_of(node));
+      while (used <= i && !atomic_compare_exchange_weak(&events_used, &used, i + 1)) {}
+      break;
+    }
+  }
+}
+
+struct serialized { uint8_t * buffer; size_t length; size_t capacity; struct allocator allocator; };
+
+static bool serialize(const void * message, const void * support, struct serialized * into)
+{
+  typedef struct allocator (*get_allocator)(void);
+  typedef int (*function)(const void *, const void *, struct serialized *);
+  typedef void (*reset)(void);
+  static _Atomic(void *) known_allocator, known_serialize, known_reset;
+  get_allocator get =
+    (get_allocator)real(&known_allocator, "librcutils.so", "rcutils_get_default_allocator", NULL);
+  function write = (function)real(&known_serialize, "librcl.so", "rmw_serialize", NULL);
+  reset forget = (reset)real(&known_reset, "librcutils.so", "rcutils_reset_error", NULL);
+  if (get == NULL || write == NULL)
+    return false;
+  into->allocator = get();
+  if (write(message, support, into) == OK)
+    return true;
+  if (forget != NULL)
+    forget(); /* nothing of ours is left for the program to find */
+  return false;
+}
+
+static uint32_t number_at(const uint8_t * data, size_t place, bool little)
+{
+  const uint8_t * at = data + place;
+  return little ? at[0] | at[1] << 8 | at[2] << 16 | (uint32_t)at[3] << 24
+                : at[3] | at[2] << 8 | at[1] << 16 | (uint32_t)at[0] << 24;
+}
+
+/* How many parameters rcl_interfaces/msg/ParameterEvent declares: behind the time and the node's name. */
+static uint32_t parameters_declared(const uint8_t * data, size_t length)
+{
+  if (length < 20 || data[0] != 0 || data[1] > 1)
+    return 0;
+  bool little = data[1] == 1;
+  size_t name = number_at(data, 12, little);
+  size_t place = name > length ? length : 4 + ((12 + name + 3) & ~(size_t)3);
+  return place + 4 <= length ? number_at(data, place, little) : 0;
+}
+
+static void note_event(int node, const uint8_t * data, size_t length, uint32_t declared)
+{
+  static const char digits[] = "0123456789abcdef";
+  char text[2 * LONGEST_EVENT + 1];
+  struct line line;
+  size_t kept = length < LONGEST_EVENT ? length : LONGEST_EVENT;
+  for (size_t i = 0; i < kept; i++) {
+    text[2 * i] = digits[data[i] >> 4];
+    text[2 * i + 1] = digits[data[i] & 15];
+  }
+  text[2 * kept] = '\0';
+  begin(&line, "parameters");
+  add_number(&line, "node", node);
+  add_text(&line, "cdr", text, sizeof text);
+  line.cut = line.cut || (kept < length && declared > 1); /* a value that long is no name */
+  finish(&line);
+}
+
+static void note_parameters(const void * publisher, const void * message)
+{
+  int kept = errno;
+  struct serialized event = {0};
+  for (int i = 0; i < atomic_load(&events_used); i++) {
+    if (atomic_load(&events[i].publisher) != publisher || !recording())
+      continue;
+    if (serialize(message, atomic_load(&events[i].support), &event)) {
+      uint32_t declared = parameters_declared(event.buffer, event.length);
+      if (declared > 0 && atomic_fetch_add(&parameter_lines, 1) < MOST_PARAMETER_LINES)
+        note_event(atomic_load(&events[i].node), event.buffer, event.length, declared);
+    }
+    if (event.buffer != NULL)
+      event.allocator.deallocate(event.buffer, event.allocator.state);
+    break;
+  }
+  errno = kept;
+}
+
 /* ---- endpoints --------------------------------------------------------------------------------- */
 
 struct endpoint {
@@ -446,7 +554,18 @@ EXPORT rcl_ret_t rcl_publisher_init(
   int first_text = enter();
   rcl_ret_t result = real_function(publisher, node, support, topic, options);
   struct endpoint endpoint = {"publisher", node, topic, support, MESSAGE, false, options};
+  remember_parameter_events(publisher, node, support, result == OK && topic != NULL && !strcmp(topic, "/parameter_events"));
   note_endpoint(&endpoint, result, first_text, CALLER);
+  return result;
+}
+
+EXPORT rcl_ret_t rcl_publish(const void * publisher, const void * message, void * allocation)
+{
+  typedef rcl_ret_t (*function)(const void *, const void *, void *);
+  REAL(rcl_publish, "librcl.so", function);
+  rcl_ret_t result = real_function(publisher, message, allocation);
+  if (result == OK && atomic_load_explicit(&events_used, memory_order_relaxed) > 0)
+    note_parameters(publisher, message);
   return result;
 }
 
@@ -530,7 +649,7 @@ EXPORT rcl_ret_t rcl_action_client_init(
 static const char * middleware(void)
 {
   typedef const char * (*function)(void);
-  REAL(rmw_get_implementation_identifier, "librmw_implementation.so", function);
+  REAL(rmw_get_implementation_identifier, "librcl.so", function);
   return real_function == NULL ? NULL : real_function();
 }
 

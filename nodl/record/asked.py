@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from enum import Enum
+from types import MappingProxyType
 from typing import NamedTuple
 
 from nodl.node_interface import ClientLibrary, EndpointKind
@@ -83,7 +84,8 @@ class AskedNode(NamedTuple):
     """What one node asked for. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
 
     ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
-    the supervisor tells them at all; ``started_as``: what the launch calls it (``node``, ``component`` ...).
+    the supervisor tells them at all; ``declared``: texts of parameters that the node declared; ``started_as``: what
+    the launch calls it (``node``, ``component`` ...).
     """
 
     package: str
@@ -106,6 +108,7 @@ class AskedNode(NamedTuple):
     location: str = ""
     distro: str = ""
     started_as: str = ""
+    declared: Mapping[str, object] = MappingProxyType({})
 
     @property
     def program(self) -> str:
@@ -172,6 +175,7 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
         process=started.process if started else str(process.pid),
         location=origin.location if origin else "",
         started_as="component" if component else (started.kind if started else ""),
+        declared=node.declared,
     )
 
 

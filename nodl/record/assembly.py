@@ -23,6 +23,7 @@ from nodl.record.lines import (
     LoadedComponent,
     NodeEnded,
     NodeMade,
+    ParametersDeclared,
     Run,
     StartedProcess,
     StateEntered,
@@ -38,6 +39,7 @@ class RecordedNode:
     made: NodeMade | None = None
     endpoints: list[EndpointMade] = field(default_factory=list)
     states: list[str] = field(default_factory=list)
+    declared: dict[str, object] = field(default_factory=dict)
     ended: bool = False
     component: LoadedComponent | None = None
 
@@ -136,7 +138,8 @@ class Record:
         return process
 
     def _add_to_process(
-        self, line: Initialised | NodeMade | NodeEnded | StateEntered | EndpointMade | Ended
+        self,
+        line: Initialised | NodeMade | NodeEnded | StateEntered | ParametersDeclared | EndpointMade | Ended,
     ) -> None:
         process = self._current.get(line.pid) or self._begin(line.pid, None)
         if isinstance(line, Initialised):
@@ -149,6 +152,8 @@ class Record:
             process.node(line.node).ended = True
         elif isinstance(line, StateEntered):
             process.node(line.node).states.append(line.state)
+        elif isinstance(line, ParametersDeclared):
+            process.node(line.node).declared.update(line.texts)
         else:
             process.node(line.node).endpoints.append(line)
 

@@ -63,6 +63,10 @@ class _Described(NamedTuple):
     shown: str
     endpoint: Endpoint
 
+    @property
+    def is_pattern(self) -> bool:
+        return "*" in self.shown
+
 
 def compare(node: AskedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
     """Hold the one of ``interfaces`` that describes ``node`` against its record."""
@@ -141,7 +145,9 @@ def _difference(verdict: Verdict, node: AskedNode, asked: Asked) -> Difference:
 def _types(node: AskedNode, asked: Iterable[Asked], described: Sequence[_Described]) -> Iterable[Difference]:
     for each in asked:
         found = _find(each, described)
-        if found and found.endpoint.type and each.type and found.endpoint.type != each.type:
+        if found is None or found.is_pattern:
+            continue  # what only fits a pattern may be another endpoint than the one described
+        if found.endpoint.type and each.type and found.endpoint.type != each.type:
             detail = f"type {found.endpoint.type}, recorded {each.type}; {found.endpoint.source}"
             yield Difference(Verdict.WRONG, node.fqn, each.kind, each.final, detail)
 
@@ -155,8 +161,9 @@ def _never_seen(
 
 
 def _find(asked: Asked, described: Iterable[_Described]) -> _Described | None:
-    fitting = (e for e in described if e.kind is asked.kind and e.pattern.fullmatch(asked.final))
-    return next(fitting, None)
+    """The one that is named so, rather than one whose pattern fits."""
+    fitting = [e for e in described if e.kind is asked.kind and e.pattern.fullmatch(asked.final)]
+    return min(fitting, key=lambda each: each.is_pattern, default=None)
 
 
 def _described(node: AskedNode, endpoint: Endpoint) -> Iterable[_Described]:

@@ -234,7 +234,8 @@ def observation_of(node: AskedNode, run: str = "") -> Observation:
     """What ``node`` was given, and the names that it asked for."""
     names = frozenset(_name(asked) for asked in node.endpoints if asked.rc in (0, 1))
     inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
-    return Observation(inputs, names, run)
+    defaults = {n: text for n, text in node.declared.items() if n not in inputs and isinstance(text, str)}
+    return Observation(inputs, names, run, defaults)
 
 
 def _name(asked: Asked) -> Name:

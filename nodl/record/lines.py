@@ -1,9 +1,10 @@
 """The lines of a record: JSON objects, one a line, told apart by ``what``. Pure.
 
-``loaded``, ``init``, ``node``, ``node_end``, ``state``, ``ended`` and the six kinds of endpoints come from the
-recorder in a process (``enclave_launch/recording/recorder.c``); they carry ``pid``, ``thread``, ``at`` (monotonic,
-nanoseconds) and ``n``, which counts the lines of a process from 1. ``run``, ``process`` and ``component`` come from
-the supervisor and say what it started. Unknown kinds and fields are passed over: newer recorders may say more.
+``loaded``, ``init``, ``node``, ``node_end``, ``state``, ``parameters``, ``ended`` and the six kinds of endpoints come
+from the recorder in a process (``enclave_launch/recording/recorder.c``); they carry ``pid``, ``thread``, ``at``
+(monotonic, nanoseconds) and ``n``, which counts the lines of a process from 1. ``run``, ``process`` and ``component``
+come from the supervisor and say what it started. Unknown kinds and fields are passed over: newer recorders may say
+more.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nodl.node_interface import EndpointKind
+from nodl.record.parameter_event import declared_texts
 
 
 class Loaded(NamedTuple):
@@ -67,6 +69,15 @@ class StateEntered(NamedTuple):
     at: int
     node: int
     state: str
+
+
+class ParametersDeclared(NamedTuple):
+    """The node says that it declared parameters; ``texts``: those that hold a text or a list of texts."""
+
+    pid: int
+    at: int
+    node: int
+    texts: Mapping[str, object]
 
 
 class EndpointMade(NamedTuple):
@@ -144,6 +155,7 @@ Line = (
     | NodeMade
     | NodeEnded
     | StateEntered
+    | ParametersDeclared
     | EndpointMade
     | Ended
     | Run
@@ -343,12 +355,18 @@ def _component(f: Mapping[str, Any]) -> LoadedComponent:
     )
 
 
+def _declared(f: Mapping[str, Any]) -> ParametersDeclared:
+    texts = declared_texts(bytes.fromhex(_str(f, "cdr")))
+    return ParametersDeclared(_int(f, "pid"), _int(f, "at"), _int(f, "node"), texts)
+
+
 _READERS: dict[str, Callable[[Mapping[str, Any]], Line]] = {
     "loaded": _loaded,
     "init": _initialised,
     "node": _node,
     "node_end": lambda f: NodeEnded(_int(f, "pid"), _int(f, "at"), _int(f, "node")),
     "state": lambda f: StateEntered(_int(f, "pid"), _int(f, "at"), _int(f, "node"), _str(f, "state")),
+    "parameters": _declared,
     "ended": lambda f: Ended(_int(f, "pid"), _int(f, "at")),
     "run": _run,
     "process": _process,

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 from nodl.node_interface import EndpointKind
@@ -37,11 +38,18 @@ class Name(NamedTuple):
 
 
 class Observation(NamedTuple):
-    """One node in one run: what it was given, the names it had, and a label of the run."""
+    """One node in one run: what it was given, the names it had, a label of the run, and the parameters that it declared
+    and was not given."""
 
     inputs: Inputs
     names: frozenset[Name]
     run: str = ""
+    defaults: Inputs = MappingProxyType({})
+
+    @property
+    def values(self) -> Inputs:
+        """Everything that the node could read."""
+        return {**self.defaults, **self.inputs}
 
 
 class Source(NamedTuple):
@@ -87,7 +95,7 @@ def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
 def origins_of(observations: Sequence[Observation]) -> dict[Name, Origin]:
     """The origin of each name that was seen in any of ``observations`` (all of one node of one program)."""
     found = {
-        name: _origin(name, observations)
+        name: _with_default(_origin(name, observations), observations)
         for name in sorted({name for each in observations for name in each.names})
     }
     return _without_defaults(_generalised(found), observations)
@@ -104,8 +112,13 @@ def candidates(name: str, inputs: Inputs) -> tuple[Source, ...]:
 
 
 def possible_sources(name: Name, seen: Observation) -> tuple[Source, ...]:
-    """``candidates``, and lists whose entries the program appends something to."""
-    return (*candidates(name.name, seen.inputs), *_names_below(name, seen))
+    """What the launch gave and what the program declared, and lists whose entries the program appends something to.
+
+    A program that declares what stands on its command line copied it from there (topic_tools).
+    """
+    copied = any(value == name.name for key, value in seen.inputs.items() if key.startswith("<"))
+    found = candidates(name.name, seen.inputs if copied else seen.values)
+    return (*found, *_names_below(name, seen))
 
 
 def _source(parameter: str, value: object, name: str) -> Source | None:
@@ -136,7 +149,7 @@ def _origin(name: Name, observations: Sequence[Observation]) -> Origin:
 
 
 def _all_sources(name: Name, seen: Observation) -> Iterable[Source]:
-    for parameter, value in seen.inputs.items():
+    for parameter, value in seen.values.items():
         source = _source(parameter, value, name.name)
         if source is not None:
             yield source
@@ -163,8 +176,8 @@ def _entries(value: object) -> frozenset[str]:
     return frozenset(map(str, value)) - {""} if isinstance(value, list | tuple) else frozenset()
 
 
-def _values(source: Source, inputs: Inputs) -> frozenset[str]:
-    value = inputs.get(source.parameter)
+def _values(source: Source, seen: Observation) -> frozenset[str]:
+    value = seen.values.get(source.parameter)
     if source.each:
         return frozenset(entry + source.suffix for entry in _entries(value))
     return frozenset((value,)) if isinstance(value, str) else frozenset()
@@ -172,7 +185,7 @@ def _values(source: Source, inputs: Inputs) -> frozenset[str]:
 
 def _contradicts(name: Name, source: Source, other: Observation) -> bool:
     """Other values were given, and the old name is there all the same while none of the new ones is."""
-    values = _values(source, other.inputs)
+    values = _values(source, other)
     if not values or name.name in values:
         return False
     return name in other.names and not any(name._replace(name=value) in other.names for value in values)
@@ -180,23 +193,32 @@ def _contradicts(name: Name, source: Source, other: Observation) -> bool:
 
 def _follows(name: Name, source: Source, other: Observation) -> bool:
     """Other values were given, all their names are there, and the old one is not."""
-    values = _values(source, other.inputs)
+    values = _values(source, other)
     if not values or name.name in values or name in other.names:
         return False
     return all(name._replace(name=value) in other.names for value in values)
 
 
+def _with_default(origin: Origin, observations: Sequence[Observation]) -> Origin:
+    """With what the program declares where the launch gives nothing."""
+    if origin.source is None or origin.source.each:
+        return origin
+    declared = {each.defaults.get(origin.source.parameter) for each in observations} - {None}
+    return origin._replace(default=str(declared.pop())) if len(declared) == 1 else origin
+
+
 def _generalised(found: Mapping[Name, Origin]) -> dict[Name, Origin]:
-    """``topics.a.topic`` and ``topics.b.topic`` → ``topics.*.topic``: keys that are data, where two were seen."""
+    """``topics.a.topic`` and ``topics.b.topic`` → ``topics.*.topic``: keys that are data, where two were seen. A
+    parameter with a default is one that the program knows by name."""
     families: dict[tuple[object, ...], set[str]] = {}
     for name, origin in found.items():
-        if origin.source:
+        if origin.source and origin.default is None:
             for family in _families(origin.source.parameter):
                 alike = (name.kind, name.type, origin.source.suffix, family)
                 families.setdefault(alike, set()).add(origin.source.parameter)
     result = dict(found)
     for name, origin in found.items():
-        for family in _families(origin.source.parameter) if origin.source else ():
+        for family in _families(origin.source.parameter) if origin.source and origin.default is None else ():
             if origin.source and len(families[name.kind, name.type, origin.source.suffix, family]) > 1:
                 result[name] = origin._replace(source=origin.source._replace(parameter=family))
                 break
@@ -215,7 +237,7 @@ def _without_defaults(
     """A fixed name that is there only where the parameter is not set is the parameter's default."""
     result = dict(found)
     for name, origin in found.items():
-        if origin.source is None:
+        if origin.source is None or origin.default is not None:
             continue
         unset = [each for each in observations if not _given(origin.source, each.inputs)]
         names_when_set = {

@@ -110,7 +110,28 @@ def test_names_from_parameters_and_arguments_say_so(learnt: Learnt) -> None:
         ParameterPart("source_list", None, "each"),
     )
     assert template(learnt, "rclpy_nodes__mux.nodl.yaml", 1).parts == (ParameterPart("inputs.*.topic"),)
-    assert template(learnt, "rclpy_nodes__relay.nodl.yaml").parts == (ParameterPart("<2>"),)
+    relay = [template(learnt, "rclpy_nodes__relay.nodl.yaml", place).parts for place in range(3)]
+    assert relay == [(ParameterPart("<2>"),), (ParameterPart("echo_topic", "echo"),), (ParameterPart("<1>"),)]
+
+
+def test_a_parameter_that_only_the_program_knows_is_known_with_its_default(learnt: Learnt) -> None:
+    (node,) = read_document(learnt.folder / "rclpy_nodes__talker.nodl.yaml")
+    names = [endpoint.name.parts for endpoint in node.interface.endpoints]
+    assert (ParameterPart("mood_topic", "mood"),) in names and ("chatter",) in names
+
+
+def test_a_second_run_proves_a_parameter_that_only_the_program_knows(tmp_path: Path) -> None:
+    file = tmp_path / "one.launch.xml"
+    file.write_text('<launch><node pkg="rclpy_nodes" exec="listener"/></launch>')
+    ran = secure_launch(
+        *("--learn", str(tmp_path / "learnt"), "--learn-for", "2s", "--learn-isolation", "local"),
+        *("--learn-parameters", str(file)),
+        variables=environment("jazzy", tmp_path),
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "marker values for listener: input_topic\n" in ran.stderr
+    text = (tmp_path / "learnt" / "rclpy_nodes__listener.nodl.yaml").read_text()
+    assert "parameter: input_topic\n      default: chatter\n      proof: another value was followed" in text
 
 
 def test_a_lifecycle_node_that_was_active_is_complete(learnt: Learnt) -> None:

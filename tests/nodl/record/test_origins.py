@@ -182,3 +182,39 @@ def test_a_list_of_one_entry_leaves_open_what_a_second_run_decides() -> None:
     assert origin("amcl/get_state", one, other) == Origin(source, proven=True)
     fixed = seen({"node_names": ("planner",)}, "amcl/get_state")
     assert origin("amcl/get_state", one, fixed) == FIXED
+
+
+def declared(defaults: Mapping[str, object], *names: str, **given_too: object) -> Observation:
+    return seen(given_too, *names)._replace(defaults=defaults)
+
+
+def test_a_parameter_that_the_program_declares_and_nobody_sets_is_a_source_with_its_default() -> None:
+    run = declared({"map_topic": "map", "frame_id": "map"}, "map")
+    assert origin("map", run) == Origin(Source("map_topic"), default="map")
+
+
+def test_a_declared_value_that_is_another_one_explains_nothing() -> None:
+    assert origin("map", declared({"map_topic": "floor"}, "map")) == FIXED
+
+
+def test_a_run_that_sets_what_another_one_left_proves_it_and_keeps_the_default() -> None:
+    left, given_ = declared({"map_topic": "map"}, "map"), seen({"map_topic": "floor"}, "floor")
+    expected = Origin(Source("map_topic"), proven=True, default="map")
+    assert origin("map", left, given_) == expected == origin("floor", left, given_)
+
+
+def test_what_the_program_declares_from_its_command_line_comes_from_there() -> None:
+    assert origin("scan", declared({"input_topic": "scan"}, "scan", **{"<1>": "scan"})) == Origin(
+        Source("<1>")
+    )
+
+
+def test_declared_and_given_parameters_of_one_value_are_undecided() -> None:
+    run = declared({"goal_topic": "goal"}, "goal", start_topic="goal")
+    assert origin("goal", run) == Origin(candidates=(Source("goal_topic"), Source("start_topic")))
+
+
+def test_parameters_with_defaults_are_not_made_a_pattern() -> None:
+    """The program knows them by name: without the defaults a launch that sets none of them would have no names."""
+    run = declared({"front.topic": "a", "rear.topic": "b"}, "a", "b")
+    assert origin("a", run) == Origin(Source("front.topic"), default="a")
