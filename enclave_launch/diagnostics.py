@@ -65,6 +65,7 @@ class Code(str, Enum):
     ENCLAVE_SHARED_WITH_LAUNCHER = "enclave-shared-with-launcher", "A process has the launcher's enclave"
     ENCLAVE_TOO_DEEP = "enclave-too-deep", "No certificate can be made for an enclave"
     ENCLAVE_UNGRANTED = "enclave-ungranted", "An enclave of an executable may do nothing"
+    MACHINE_ELSEWHERE = "machine-elsewhere", "The launch file means a process for another host"
     EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
     # of what could take an enclave away
     CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, on which nothing here was tried"
@@ -308,6 +309,17 @@ def executable_without_enclave(process: str, place: SourceLocation) -> Diagnosti
         "a ROS program in it could not start"
     )
     return Diagnostic(Code.EXECUTABLE_WITHOUT_ENCLAVE, process, text, place)
+
+
+def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diagnostic:
+    text = f"{process} is meant for machine {machine!r}, but a launch starts everything on this host"
+    return Diagnostic(
+        Code.MACHINE_ELSEWHERE,
+        process,
+        text,
+        place,
+        "secure-plan hosts and secure-plan export place it there",
+    )
 
 
 # -- of what could take an enclave away -------------------------------------------------------------------------------

@@ -30,6 +30,7 @@ from enclave_launch.diagnostics import (
     executable_without_enclave,
     handshake_fails,
     library_version,
+    machine_elsewhere,
     no_manifest,
     node_name_unknown,
     not_foreseeable,
@@ -446,6 +447,8 @@ def _notes(
     for item in processes:
         if item.enclave is None and item.process.kind == "executable":
             yield executable_without_enclave(item.process.process_name, item.process.location)
+        if item.process.machine:
+            yield machine_elsewhere(item.process.process_name, item.process.machine, item.process.location)
     for component in components:
         if component.container is None:
             target, place = component.component.container, component.component.location

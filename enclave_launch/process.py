@@ -41,6 +41,13 @@ class RemapRule(NamedTuple):
     location: SourceLocation | None = None
 
 
+class Respawn(NamedTuple):
+    """A process is started again whenever it ends. ``retries``: how often at most, -1 without a limit."""
+
+    delay: float = 0.0  # seconds
+    retries: int = -1
+
+
 class ResolvedProcess(NamedTuple):
     """One process. ``cmd`` is what would be executed, prefix included, without ``--enclave``."""
 
@@ -65,6 +72,8 @@ class ResolvedProcess(NamedTuple):
     unread_parameter_files: tuple[tuple[str, str], ...] = ()  # path, and why it could not be read
     prefix: tuple[str, ...] = ()  # words of cmd before the program: launch-prefix
     final_environment: Mapping[str, str] = MappingProxyType({})  # all of it, inherited variables included
+    machine: str | None = None  # of the launch file: the host it is meant for
+    respawn: Respawn | None = None
 
 
 class ResolvedComponent(NamedTuple):
@@ -102,6 +111,17 @@ class Unforeseeable(NamedTuple):
     location: SourceLocation
 
 
+class Reaction(NamedTuple):
+    """What the launch itself does when something happens, whatever that starts: an event handler or a timer.
+
+    ``ends_with``: the process at whose end it ends the launch, where that is all it does (``on_exit="shutdown"``).
+    """
+
+    what: str
+    location: SourceLocation
+    ends_with: str | None = None
+
+
 class Evaluation(NamedTuple):
     """Everything a launch file starts, in launch order: first what the visit starts, then what events start."""
 
@@ -111,3 +131,4 @@ class Evaluation(NamedTuple):
     unforeseeable: tuple[Unforeseeable, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
     distro: str = "rolling"  # whose rules were followed
+    reactions: tuple[Reaction, ...] = ()

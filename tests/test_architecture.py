@@ -33,6 +33,7 @@ FLOORS = (
     {"options", "prefixes", "security_environment", "served_domains"},
     {"interfaces"},
     {"review"},
+    {"deployment"},
     {"report", "runtime"},
     {"recording", "secured"},
     {"expiry_watch"},
@@ -53,6 +54,7 @@ UPWARD = {
 PURE = {
     "enclave_launch/enclave": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/policy": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
+    "enclave_launch/deployment": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/report": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
 }
 

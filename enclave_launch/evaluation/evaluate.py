@@ -175,6 +175,7 @@ def _evaluation(host: PlanHost) -> Evaluation:
         tuple(host.unforeseen),
         tuple(host.warnings),
         host.release.distro.value,
+        tuple(host.reactions),
     )
 
 

@@ -14,7 +14,7 @@ from enclave_launch.description.events.dispatch import chain, run_handler
 from enclave_launch.description.events.event import Shutdown, TimerEvent
 from enclave_launch.description.events.process import ProcessStarted, process_event_arguments
 from enclave_launch.description.location import location_of, place_of
-from enclave_launch.process import Unforeseeable
+from enclave_launch.process import Reaction, Unforeseeable
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError
 
 if TYPE_CHECKING:
@@ -35,6 +35,7 @@ class Explorer:
         self._depth = 0
         self._made_up: set[int] = set()  # events that we only suppose
         self._kept: list[object] = []  # keeps ids unique
+        self._noted: set[int] = set()  # handlers and timers that are in the host's reactions
 
     def run(self) -> None:
         self._settle_now()
@@ -89,6 +90,7 @@ class Explorer:
 
     def _run(self, handler: BaseEventHandler, event: Event, mark: str | None) -> None:
         self._remember(handler)
+        self._note(handler, event)
         mark = chain(mark, _label(handler, event))
         if id(event) in self._made_up and handler.computes() and not _is_ours(handler):
             self._host.unforeseeable(
@@ -100,6 +102,27 @@ class Explorer:
     def _remember(self, handler: BaseEventHandler) -> None:
         self._fired.add(id(handler))
         self._kept.append(handler)
+
+    def _note(self, handler: BaseEventHandler, event: Event | None) -> None:
+        """For those who carry the plan out without launch: an engine knows nothing of the file's reactions."""
+        is_timer = isinstance(event, TimerEvent)
+        if handler.internal and not is_timer:
+            return
+        subject = event if is_timer else handler
+        if id(subject) in self._noted:
+            return
+        self._noted.add(id(subject))
+        self._kept.append(subject)
+        name = type(handler).__name__
+        what = (_label(handler, event) if event is not None else None) or name
+        if handler.computes():
+            what += ", a Python function"
+        if isinstance(event, TimerEvent):
+            written: Any = event.timer_action
+        else:  # on_exit of a process registers a handler that stands nowhere itself
+            written = handler if handler.source_location or handler.target is None else handler.target
+        place = location_of(written, self._context)
+        self._host.reactions.append(Reaction(what, place, _ends_with(handler)))
 
     # What may happen
 
@@ -114,6 +137,7 @@ class Explorer:
                 continue
             started = self._host.started[new_from:] if id(handler) in known else self._host.started
             event = handler.foresee(started)
+            self._note(handler, event)
             if event is not None:
                 self._try(event)
 
@@ -168,6 +192,22 @@ def _label(handler: BaseEventHandler, event: Event) -> str | None:
     kind = type(handler).__name__
     name = kind if kind.startswith("On") else event.name
     return f"{name} {event.subject()}".rstrip()
+
+
+def _ends_with(handler: BaseEventHandler) -> str | None:
+    """The process at whose end the handler ends the launch, and does nothing else."""
+    from enclave_launch.description.actions.events import EmitEvent
+    from enclave_launch.description.events.process_handlers import OnProcessExit
+
+    details = getattr(handler.target, "process_details", None)
+    if type(handler) is not OnProcessExit or handler.computes() or not details:
+        return None
+    entities = handler.describe()[1]
+    ends = [
+        isinstance(entity, EmitEvent) and isinstance(entity.event, Shutdown) and entity.condition is None
+        for entity in entities
+    ]
+    return str(details["name"]) if ends and all(ends) else None
 
 
 def _is_ours(handler: BaseEventHandler) -> bool:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from enclave_launch.host.protocol import Completion
     from enclave_launch.process import (
         LauncherCall,
+        Reaction,
         ResolvedComponent,
         ResolvedProcess,
         Unforeseeable,
@@ -36,6 +37,7 @@ class PlanHost(BaseHost):
         self.components: list[ResolvedComponent] = []
         self.calls: list[LauncherCall] = []
         self.unforeseen: list[Unforeseeable] = []
+        self.reactions: list[Reaction] = []
         self.parameter_files: dict[str, str] = {}
         self._loop = VirtualLoop()
 

@@ -23,6 +23,32 @@ class _Strict(BaseModel, extra="forbid", frozen=True):
     """The base of all entries: an unknown key is an error."""
 
 
+class Respawn(_Strict, frozen=True):
+    """When a process that ended is started again."""
+
+    delay: float = Field(description="seconds")
+    retries: int = Field(description="how often at most, -1 without a limit")
+
+
+class Reaction(_Strict, frozen=True):
+    """An event handler or timer of the launch, whatever it starts."""
+
+    what: str
+    launch_file: str
+    line: int
+    ends_with: Optional[str] = Field(
+        ..., description="the process at whose end it ends the launch, where that is all it does"
+    )
+
+
+class LauncherCall(_Strict, frozen=True):
+    """A service that the launcher's own node calls: to load a component, to change a state."""
+
+    service: str
+    launch_file: str
+    line: int
+
+
 class Process(_Strict, frozen=True):
     """One process, in launch order."""
 
@@ -55,6 +81,15 @@ class Process(_Strict, frozen=True):
     line: int = Field(..., description="line of the element, 0 when not known")
     on_event: Optional[str] = Field(
         ..., description="the event that would start it; null when the launch itself does"
+    )
+    process: Optional[str] = Field(default=None, description="the process name, NAME-N")
+    kind: Optional[Literal["node", "lifecycle_node", "container", "executable"]] = Field(default=None)
+    machine: Optional[str] = Field(default=None, description="the host that the launch file means it for")
+    cwd: Optional[str] = Field(default=None)
+    shell: bool = Field(default=False, description="cmd is one text for a shell")
+    respawn: Optional[Respawn] = Field(default=None, description="null: not started again when it ends")
+    parameter_files: dict[str, str] = Field(
+        default_factory=dict, description="YAML that launch would write, by its placeholder in cmd"
     )
 
 
@@ -141,5 +176,7 @@ class DryRun(_Strict, frozen=True):
     components: list[Component]
     enclaves: dict[str, Enclave]
     nodes: list[Node]
+    reactions: list[Reaction] = Field(default_factory=list)
+    launcher_calls: list[LauncherCall] = Field(default_factory=list)
     warnings: list[str] = Field(description="every diagnostic as one message for a person, errors first")
     diagnostics: list[Diagnostic]

@@ -9,7 +9,7 @@ from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.node_permissions import Reason
-from enclave_launch.process import RemapRule
+from enclave_launch.process import LauncherCall, Reaction, RemapRule
 from enclave_launch.report.unknown import label, unknown_by_enclave
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
@@ -26,6 +26,8 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
         "components": [_component(item) for item in plan.components],
         "enclaves": _enclaves(plan),
         "nodes": _nodes(plan),
+        "reactions": [_reaction(item) for item in plan.evaluation.reactions],
+        "launcher_calls": [_launcher_call(item) for item in plan.evaluation.launcher_calls],
         "warnings": [str(told) for told in (*plan.problems, *plan.warnings)],
         "diagnostics": [
             *(_diagnostic(problem, "error") for problem in plan.problems),
@@ -43,6 +45,7 @@ def _process(item: PlannedProcess, security: SecuritySettings | None) -> dict[st
     return {
         "package": process.package,
         "executable": process.executable,
+        "process": process.process_name,
         "namespace": process.namespace,
         "name": item.name,
         "fqn": item.fqn,
@@ -58,6 +61,14 @@ def _process(item: PlannedProcess, security: SecuritySettings | None) -> dict[st
         "launch_file": process.location.file,
         "line": process.location.line,
         "on_event": process.on_event,
+        "kind": process.kind,
+        "machine": process.machine,
+        "cwd": process.cwd,
+        "shell": process.shell,
+        "respawn": process.respawn._asdict() if process.respawn else None,
+        "parameter_files": {
+            name: text for name, text in process.parameter_files.items() if name in process.cmd
+        },
     }
 
 
@@ -76,6 +87,15 @@ def _component(item: PlannedComponent) -> dict[str, object]:
         "line": component.location.line,
         "on_event": component.on_event,
     }
+
+
+def _reaction(item: Reaction) -> dict[str, object]:
+    place = item.location
+    return {"what": item.what, "launch_file": place.file, "line": place.line, "ends_with": item.ends_with}
+
+
+def _launcher_call(item: LauncherCall) -> dict[str, object]:
+    return {"service": item.service, "launch_file": item.location.file, "line": item.location.line}
 
 
 def _diagnostic(told: Diagnostic, severity: str) -> dict[str, object]:

@@ -1,6 +1,7 @@
 """Teach real launch the enclave vocabulary of the ROS 2 Security Enclaves design: in XML, YAML and Python.
 
 * ``enclave=`` on ``node``, ``node_container``, lifecycle nodes and ``executable``;
+* ``machine=`` on them, which says something to ``secure-plan hosts`` only: ``ros2 launch`` starts all on this host;
 * ``enclave=`` on ``push_ros_namespace`` and the action ``push_ros_enclave`` for the enclave scope.
 
 Upstream offers no hook for attributes of its own actions, so four methods are wrapped, once, and each does
@@ -86,7 +87,7 @@ def install() -> None:
 
 def _accepting_enclave(init: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(init)
-    def wrapped(self: Any, *args: Any, enclave: Any = None, **kwargs: Any) -> None:
+    def wrapped(self: Any, *args: Any, enclave: Any = None, machine: Any = None, **kwargs: Any) -> None:
         if enclave is not None:
             setattr(self, ATTRIBUTE, normalize_to_list_of_substitutions(enclave))
         init(self, *args, **kwargs)
@@ -122,6 +123,7 @@ def _reading_enclave(parse: Parse) -> Parse:
     @functools.wraps(parse)
     def wrapped(entity: Any, parser: Any, *args: Any, **kwargs: Any) -> tuple[type, dict[str, Any]]:
         enclave = entity.get_attr("enclave", optional=True)
+        entity.get_attr("machine", optional=True)
         cls, options = parse(entity, parser, *args, **kwargs)
         if enclave is not None:
             options["enclave"] = parser.parse_substitution(enclave)

@@ -24,7 +24,7 @@ import re
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, Optional
 
 from pydantic import Field, StrictBool, StrictInt, StrictStr
 
@@ -45,12 +45,12 @@ class Host(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What a process needs of its host beyond the network. ``memory``: its limit, such as ``256Mi``."""
+    """What a process needs of its host beyond the network. ``memory``: its limit, such as ``256Mi``, if it has one."""
 
     devices: tuple[str, ...] = ()
     realtime: bool = False
     writable_code: bool = False
-    memory: str = "256Mi"
+    memory: str | None = None
 
 
 class NodeNeeds(NamedTuple):
@@ -89,7 +89,7 @@ class Hosts(NamedTuple):
             tuple(sorted({device for one in found for device in one.devices})),
             any(one.realtime for one in found),
             any(one.writable_code for one in found),
-            found[-1].memory if found else Needs().memory,
+            next((one.memory for one in reversed(found) if one.memory is not None), None),
         )
 
     def _of(self, what: str, name: str, patterns: dict[str, tuple[str, ...]]) -> str | None:
@@ -116,7 +116,7 @@ class _Needs(Strict):
     devices: list[StrictStr] = Field(default_factory=list)
     realtime: StrictBool = False
     writable_code: StrictBool = False
-    memory: StrictStr = Needs().memory
+    memory: Optional[StrictStr] = None
 
 
 class _Document(Strict):
@@ -151,7 +151,7 @@ def refuse_host_name(name: str, where: str) -> None:
 
 
 def _needs(one: _Needs, where: str) -> NodeNeeds:
-    if not _MEMORY.match(one.memory):
+    if one.memory is not None and not _MEMORY.match(one.memory):
         raise InvalidInputError(f"{where}: memory: {printable(one.memory)} is not a size such as 256Mi")
     for device in one.devices:
         if not _DEVICE.match(device) or ".." in device:

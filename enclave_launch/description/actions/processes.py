@@ -26,7 +26,7 @@ from enclave_launch.description.substitution import (
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
 from enclave_launch.host.current import current_release
 from enclave_launch.host.environment import changed
-from enclave_launch.process import EnclaveRequest, ResolvedProcess
+from enclave_launch.process import EnclaveRequest, ResolvedProcess, Respawn
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import enclave_scope
 from enclave_launch.ros_rules.output import Routes, output_routes
@@ -53,6 +53,7 @@ class ExecuteLocal(Action):
     """Starts ``process_description`` when executed; may be executed once.
 
     ``enclave`` (ours) names the DDS-Security enclave of the process: absolute, or below the scope in force.
+    ``machine`` (ours) names the host that the process is meant for; launch starts it on this one all the same.
     """
 
     def __init__(
@@ -72,6 +73,7 @@ class ExecuteLocal(Action):
         respawn_delay: float | None = None,
         respawn_max_retries: int = -1,
         enclave: SomeSubstitutionsType | None = None,
+        machine: SomeSubstitutionsType | None = None,
         **kwargs: Any,
     ) -> None:
         super().__init__(**kwargs)
@@ -89,6 +91,7 @@ class ExecuteLocal(Action):
         self.__respawn_delay = respawn_delay
         self.__respawn_max_retries = respawn_max_retries
         self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
+        self.__machine = None if machine is None else normalize_to_list_of_substitutions(machine)
         self.__executed = False
         self.final_routes: Routes = {}
         self.__event_args: dict[str, Any] | None = None
@@ -242,6 +245,10 @@ class ExecuteLocal(Action):
             shell=self.__shell is True,  # other true values do not make one, as upstream
             prefix=description.final_prefix,
             final_environment=description.final_env or {},
+            machine=None if self.__machine is None else perform_substitutions(context, self.__machine),
+            respawn=Respawn(self.__respawn_delay or 0.0, self.__respawn_max_retries)
+            if self.__respawn
+            else None,
         )
 
     def ros_arguments(self) -> RosArguments:
@@ -414,6 +421,7 @@ _ATTRIBUTES: tuple[_Attribute, ...] = (
     ("output", "output", _text),
     ("respawn", "respawn", _text),
     ("enclave", "enclave", _text),
+    ("machine", "machine", _text),
     ("respawn_delay", "respawn_delay", _seconds),
     ("shell", "shell", _flag),
 )

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
-from enclave_launch.verb.secure_plan import check, diff, flow, report, show, suggest
+from enclave_launch.verb.secure_plan import check, diff, export, flow, hosts, report, show, suggest
 
-VERBS = (show, check, diff, flow, suggest, report)
+VERBS = (show, check, diff, flow, hosts, export, suggest, report)
 DESCRIPTION = """\
 Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
-revisions, ask which enclave can influence which. A plan is a launch file, given as to secure-launch, or the
-JSON that secure-launch --dry-run --format json printed (a file that ends in .json).
+revisions, ask which enclave can influence which, place it on hosts, export it to systemd, Compose or Kubernetes.
+A plan is a launch file, given as to secure-launch, or the JSON that secure-launch --dry-run --format json printed
+(a file that ends in .json).
 """
 
 

@@ -1,0 +1,82 @@
+"""The files of enclaves as a keystore or an imported bundle has them, and when the first of them ends. Reads only."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from datetime import datetime
+from typing import NamedTuple
+
+from enclave_launch.errors import ProvisionError
+from keystore.disk import layout, safe_files
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
+from keystore.errors import KeystoreError
+from keystore.steps.expiry import status
+
+PUBLIC_FILES = tuple(name for name in layout.RUNTIME_FILES if name != layout.KEY)
+
+
+class EnclaveMaterial(NamedTuple):
+    """``public``: file name -> content, the CRL among them where there is one. ``key`` is None where it is only on
+    its host."""
+
+    enclave: str
+    public: Mapping[str, bytes]
+    key: bytes | None
+
+    def __repr__(self) -> str:
+        return f"EnclaveMaterial({self.enclave!r})"
+
+    @property
+    def version(self) -> str:
+        """Other with every change: a new key comes with a new certificate. Says nothing about the key."""
+        digest = hashlib.sha256()
+        for name, content in sorted(self.public.items()):
+            digest.update(f"{name}\0{len(content)}\0".encode() + content)
+        return digest.hexdigest()[:10]
+
+
+class Material(NamedTuple):
+    """``ends``: when the first thing that these enclaves use ends, and ``what`` that is."""
+
+    enclaves: Mapping[str, EnclaveMaterial]
+    ends: datetime
+    what: str
+    has_crl: bool
+
+
+def read_material(keystore: str, enclaves: Iterable[str]) -> Material:
+    """Raises ``ProvisionError`` for an enclave that is not there, is not complete, or has ended."""
+    wanted = sorted(set(enclaves))
+    root = resolve_root(keystore)
+    view = KeystoreView(root)
+    try:
+        view.require_complete()
+        found = {name: _enclave(view, name) for name in wanted}
+        report = status(root)
+    except KeystoreError as error:
+        raise ProvisionError(str(error)) from error
+    first = next(one for one in report.expiries if one.enclave is None or one.enclave in found)
+    if not first.is_valid(report.now):
+        raise ProvisionError(
+            f"{first.subject} in {keystore} is not valid now; renew it first: secure-keystore renew {keystore}"
+        )
+    return Material(found, first.not_after, first.subject, view.has_crl)
+
+
+def _enclave(view: KeystoreView, enclave: str) -> EnclaveMaterial:
+    directory = layout.enclave_directory(enclave)
+    names = (*PUBLIC_FILES, *([layout.ENCLAVE_CRL] if view.has_crl else []))
+    public = {}
+    for name in names:
+        content = safe_files.read_if_there(view.root, f"{directory}/{name}")
+        if content is None:
+            raise ProvisionError(
+                f"enclave {enclave} is not complete in {view.root} ({name} is missing); provision it first: "
+                "secure-launch --secure, or secure-keystore apply-policy"
+            )
+        public[name] = content
+    has_key = safe_files.read_if_there(view.root, f"{directory}/{layout.KEY}") is not None
+    key = safe_files.read_private(view.root, f"{directory}/{layout.KEY}") if has_key else None
+    return EnclaveMaterial(enclave, public, key)

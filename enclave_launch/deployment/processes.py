@@ -1,0 +1,165 @@
+"""The processes of a plan as an engine runs them. Pure.
+
+Takes the dry run's JSON document, so that a saved plan and a launch file are the same thing. What is left to the writer
+of an engine is how to say it, and where the enclave's files are.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, Respawn
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, words_after_program
+from enclave_launch.security_environment import ENABLE, KEYSTORE, NO_KEYSTORE, OVERRIDE, STRATEGY
+from keystore.formats.hosts import Needs
+
+LONGEST_NAME = 40
+"""With a suffix it stays a DNS label (63 characters, RFC 1123), which Kubernetes asks for."""
+_SECURITY = (ENABLE, KEYSTORE, OVERRIDE, STRATEGY)
+
+
+class DeployedProcess(NamedTuple):
+    """``name``: unique in the launch, a DNS label. ``command`` holds ``--enclave`` where rcl reads it from there;
+    ``parameter_files``: placeholder in the command -> YAML. ``place``: file:line of its element."""
+
+    name: str
+    process: str
+    fqn: str | None
+    command: tuple[str, ...]
+    shell: bool
+    cwd: str | None
+    environment: Mapping[str, str]
+    enclave: str | None
+    domain: int
+    middleware: str
+    machine: str | None
+    respawn: Respawn | None
+    parameter_files: Mapping[str, str]
+    place: str
+    nodes: tuple[str, ...] = ()
+    needs: Needs = Needs()
+
+    def security(self, keystore: str) -> Mapping[str, str]:
+        """The variables that rcl reads; Enforce, whatever the plan was saved with."""
+        if self.enclave is None:
+            return {ENABLE: "true", STRATEGY: "Enforce", KEYSTORE: NO_KEYSTORE}
+        override = {OVERRIDE: self.enclave} if self.fqn is None else {}
+        return {ENABLE: "true", STRATEGY: "Enforce", KEYSTORE: keystore, **override}
+
+    def variables(self, keystore: str) -> dict[str, str]:
+        """All that the process needs in its environment apart from what the installation sets up, sorted."""
+        found = {
+            "ROS_DOMAIN_ID": str(self.domain),
+            "RMW_IMPLEMENTATION": self.middleware,
+            **self.environment,
+            **self.security(keystore),
+        }
+        if self.middleware.startswith("rmw_fastrtps"):
+            # Each process has its own user or container: shared memory between them loses data without a word.
+            found.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
+        return dict(sorted(found.items()))
+
+    def words(self, folder: str) -> tuple[str, ...]:
+        """The command with its generated parameter files below ``folder``; launch gives a shell the words joined."""
+        names = dict(zip(self.parameter_files, self.parameter_names(), strict=True))
+        words = tuple(f"{folder}/{names[word]}" if word in names else word for word in self.command)
+        return ("/bin/sh", "-c", " ".join(words)) if self.shell else words
+
+    def parameter_names(self) -> tuple[str, ...]:
+        """File names of ``parameter_files``, in their order."""
+        return tuple(f"{self.name}-{number}.yaml" for number in range(1, len(self.parameter_files) + 1))
+
+
+def deployed_processes(document: Mapping[str, Any]) -> tuple[DeployedProcess, ...]:
+    """What the launch itself starts; what only events or timers start is told by ``semantics``."""
+    listed = [entry for entry in document["processes"] if entry["on_event"] is None]
+    names = engine_names([_final_name(entry) or _stem(entry) for entry in listed])
+    nodes = _nodes_of(document)
+    return tuple(_process(entry, name, nodes) for entry, name in zip(listed, names, strict=True))
+
+
+def _nodes_of(document: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]]:
+    """Container -> names of its components."""
+    found: dict[str, tuple[str, ...]] = {}
+    for entry in document["components"]:
+        container = "/" + entry["container"].lstrip("/")
+        found[container] = (*found.get(container, ()), entry["fqn"])
+    return found
+
+
+def _process(entry: Mapping[str, Any], name: str, nodes: Mapping[str, tuple[str, ...]]) -> DeployedProcess:
+    fqn = _final_name(entry)
+    environment = {key: text for key, text in entry["environment"].items() if key not in _SECURITY}
+    return DeployedProcess(
+        name=name,
+        process=entry.get("process") or name,
+        fqn=fqn,
+        command=_secured(entry),
+        shell=entry.get("shell", False),
+        cwd=entry.get("cwd"),
+        environment=MappingProxyType(environment),
+        enclave=entry["enclave"],
+        domain=entry["domain_id"],
+        middleware=entry["middleware"],
+        machine=entry.get("machine"),
+        respawn=Respawn(**entry["respawn"]) if entry.get("respawn") else None,
+        parameter_files=MappingProxyType(entry.get("parameter_files", {})),
+        place=f"{entry['launch_file']}:{entry['line']}",
+        nodes=(*([fqn] if fqn else ()), *nodes.get(fqn or "", ())),
+    )
+
+
+def _final_name(entry: Mapping[str, Any]) -> str | None:
+    """As rcl resolves it: without a namespace in the root, without a name by the program's own, which is taken to be
+    that of the executable. None for executables."""
+    fqn: str | None = entry["fqn"]
+    if fqn is None:
+        return None
+    named = fqn.replace(UNSPECIFIED_NODE_NAMESPACE, "").replace(UNSPECIFIED_NODE_NAME, entry["executable"])
+    return "/" + named.lstrip("/")
+
+
+def _secured(entry: Mapping[str, Any]) -> tuple[str, ...]:
+    """Node commands end inside their ``--ros-args``, so the enclave simply follows, unless it is there."""
+    command = tuple(entry["cmd"])
+    if entry["fqn"] is None or entry["enclave"] is None:
+        return command
+    words = words_after_program(command, len(entry["prefix"]), shell=entry.get("shell", False))
+    if parse_ros_arguments(words).enclave is not None:
+        return command
+    return (*command, "--enclave", entry["enclave"])
+
+
+def _stem(entry: Mapping[str, Any]) -> str:
+    """``rviz2`` of ``rviz2-3``."""
+    return str(entry.get("process") or entry["executable"]).rpartition("/")[2].rpartition("-")[0] or "process"
+
+
+def engine_names(subjects: Iterable[str]) -> list[str]:
+    """A DNS label for each, the same whenever the same subject comes: one more process renames no other.
+
+    Where the label does not say all (capitals, ``_``, length) a hash of the subject follows; equal subjects are
+    numbered in their order.
+    """
+    listed = [label(subject) for subject in subjects]
+    seen: Counter[str] = Counter()
+    names = []
+    for name in listed:
+        seen[name] += 1
+        names.append(name if seen[name] == 1 else f"{name}-{seen[name]}")
+    return names
+
+
+def label(subject: str) -> str:
+    """``/front/speaker`` as ``front-speaker``, ``/front_left`` as ``front-left-3f2a90``."""
+    plain = subject.strip("/").replace("/", "-")
+    name = re.sub(r"[^a-z0-9]+", "-", plain.lower()).strip("-")[:LONGEST_NAME].strip("-")
+    if name == plain and name:
+        return name
+    digest = hashlib.sha256(subject.encode()).hexdigest()[:6]
+    return f"{name}-{digest}" if name else f"root-{digest}"

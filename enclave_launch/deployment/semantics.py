@@ -1,0 +1,105 @@
+"""What of a launch file an engine cannot express: named, so that nobody finds out on the robot. Pure.
+
+An engine starts processes, restarts them and ends them. What launch itself does meanwhile (handlers, timers, loading
+components, changing states) has nobody to do it there.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from enum import Enum
+from typing import Any, NamedTuple
+
+from enclave_launch.diagnostics import Code
+
+
+class Engine(str, Enum):
+    """What runs the processes."""
+
+    SYSTEMD = "systemd"
+    COMPOSE = "compose"
+    KUBERNETES = "kubernetes"
+
+
+class Unexpressed(NamedTuple):
+    """``place`` is file:line of the launch file."""
+
+    what: str
+    place: str
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.what}"
+
+
+def unexpressed(document: Mapping[str, Any], engine: Engine) -> tuple[Unexpressed, ...]:
+    """Everything that would be lost, in the order of the launch file's processes, components and reactions."""
+    found = (
+        *_late_processes(document),
+        *_components(document),
+        *_calls(document),
+        *_reactions(document, engine),
+        *_unforeseen(document),
+    )
+    return tuple(dict.fromkeys(found))
+
+
+def ends_launch(document: Mapping[str, Any]) -> frozenset[str]:
+    """Processes at whose end the whole launch ends."""
+    return frozenset(one["ends_with"] for one in document.get("reactions", ()) if one["ends_with"])
+
+
+def differences(document: Mapping[str, Any], engine: Engine) -> tuple[str, ...]:
+    """What works, but otherwise than launch does it: for a person to know, nothing to refuse."""
+    started = [one for one in document["processes"] if one["on_event"] is None]
+    respawned = [one for one in started if one.get("respawn")]
+    told = []
+    if engine is Engine.KUBERNETES and len(respawned) < len(started):
+        told.append("Kubernetes starts every process again when it ends, also those without respawn")
+    if engine is Engine.COMPOSE and any(one["respawn"]["delay"] for one in respawned):
+        told.append("Docker waits longer before each new start; respawn_delay is not followed")
+    if engine is not Engine.SYSTEMD and any(one["respawn"]["retries"] >= 0 for one in respawned):
+        told.append("respawn_max_retries is not followed: restarts are not limited")
+    return tuple(told)
+
+
+def _late_processes(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
+    for one in document["processes"]:
+        if one["on_event"] is not None:
+            what = one.get("process") or one["executable"]
+            yield Unexpressed(f"{what} is started by an event ({one['on_event']})", _place(one))
+
+
+def _components(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
+    for one in document["components"]:
+        what = f"component {one['fqn']} is loaded into {one['container']} by the launcher"
+        yield Unexpressed(what, _place(one))
+
+
+def _calls(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
+    for one in document.get("launcher_calls", ()):
+        if not one["service"].endswith("/_container/load_node"):
+            yield Unexpressed(f"the launcher calls {one['service']}", _place(one))
+
+
+def _reactions(document: Mapping[str, Any], engine: Engine) -> Iterator[Unexpressed]:
+    """The end of a process that ends the launch: systemd can say it, unless it is started again."""
+    respawned = {one.get("process") for one in document["processes"] if one.get("respawn")}
+    for one in document.get("reactions", ()):
+        if one["ends_with"] and engine is Engine.SYSTEMD and one["ends_with"] not in respawned:
+            continue
+        what = (
+            f"{one['what']}: the end of {one['ends_with']} ends the launch"
+            if one["ends_with"]
+            else one["what"]
+        )
+        yield Unexpressed(what, _place(one))
+
+
+def _unforeseen(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
+    for one in document.get("diagnostics", ()):
+        if one["code"] == Code.NOT_FORESEEABLE.value:
+            yield Unexpressed(one["text"], f"{one['file']}:{one['line']}")
+
+
+def _place(one: Mapping[str, Any]) -> str:
+    return f"{one['launch_file']}:{one['line']}"

@@ -1,0 +1,202 @@
+"""Write what runs the plan without launch: systemd units, a Compose file, or Kubernetes objects.
+
+  secure-plan export --format systemd --keystore ks -o deploy/ PACKAGE LAUNCH_FILE
+
+Every process gets its enclave and nothing else; what the engine cannot express (event handlers, timers, components
+that the launcher loads) is named and refused, unless --accept-unexpressed leaves it out. With several hosts there is a
+folder for each. Generating again replaces only what was generated (docs/deployment.md).
+
+exit status: 0 written, 1 the plan cannot be expressed or is not provisioned, 2 wrong usage
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.boundary.terminal import message, printable
+from enclave_launch.errors import ManifestError, UsageError
+from enclave_launch.verb.secure_plan.hosts import hosts_of
+from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+
+if TYPE_CHECKING:
+    from enclave_launch.deployment.deployment import Deployment, File
+    from enclave_launch.deployment.placement import Placement
+    from enclave_launch.deployment.semantics import Engine, Unexpressed
+
+ENGINES = ("systemd", "compose", "kubernetes")
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_plan_arguments(parser)
+    parser.add_argument("--format", choices=ENGINES, required=True)
+    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
+    parser.add_argument(
+        "--keystore",
+        required=True,
+        metavar="DIR",
+        help="where the plan is provisioned: what its enclaves hold",
+    )
+    parser.add_argument(
+        "--hosts", type=Path, metavar="FILE", help="which nodes or enclaves belong to which host"
+    )
+    parser.add_argument(
+        "--name", help="of target, project or namespace (default: ros- and the launch file's name)"
+    )
+    parser.add_argument(
+        "--accept-unexpressed", action="store_true", help="leave out what the engine cannot express"
+    )
+    parser.add_argument(
+        "--host-keystore",
+        default="/etc/ros/keystore",
+        metavar="PATH",
+        help="where bundles are imported on the hosts (/etc/ros/keystore)",
+    )
+    systemd = parser.add_argument_group("systemd")
+    systemd.add_argument(
+        "--setup", action="append", default=[], metavar="FILE",
+        help="sourced before each process, such as /opt/ros/jazzy/setup.sh; repeatable",
+    )  # fmt: skip
+    containers = parser.add_argument_group("compose and kubernetes")
+    containers.add_argument("--image", help="of every process; its entrypoint sets up ROS")
+    containers.add_argument(
+        "--user", default="10001:10001", help="uid:gid in Compose's containers (10001:10001)"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    from enclave_launch.deployment.folder import write_folder
+    from enclave_launch.deployment.placement import ONLY_HOST, place
+    from enclave_launch.deployment.processes import deployed_processes
+    from enclave_launch.deployment.semantics import Engine, unexpressed
+
+    _check(options)
+    document = read_plan(options.words, options)
+    engine = Engine(options.format)
+    _refuse_problems(document)
+    lost = unexpressed(document, engine)
+    _refuse_lost(lost, engine, options.accept_unexpressed)
+    placement = place(deployed_processes(document), hosts_of(options.hosts))
+    _refuse_nowhere(placement)
+    several = list(placement.hosts) != [ONLY_HOST]
+    changed: list[str] = []
+    made = {
+        host: _files(
+            engine, _deployment(document, placement, host if several else None, host, lost, options), options
+        )
+        for host in placement.hosts
+        if placement.hosts[host]
+    }
+    for host, files in made.items():
+        folder = options.output / host if several else options.output
+        names = write_folder(folder, files)
+        changed += [str(folder / name) for name in names]
+    sys.stdout.write("".join(f"{printable(name)}\n" for name in changed) or "nothing changed\n")
+    return 0
+
+
+def _check(options: argparse.Namespace) -> None:
+    """Raises ``UsageError`` for what no engine could take."""
+    if options.format != "systemd" and not options.image:
+        raise UsageError(f"--format {options.format} needs --image")
+    paths = [("--host-keystore", options.host_keystore), *(("--setup", file) for file in options.setup)]
+    for name, path in paths:
+        if not path.startswith("/") or not path.isprintable() or " " in path or ":" in path:
+            raise UsageError(
+                f"{name} {path!r}: an absolute path on the host without blanks and colons is needed"
+            )
+
+
+def _refuse_problems(document: Mapping[str, Any]) -> None:
+    problems = [one["text"] for one in document.get("diagnostics", ()) if one["severity"] == "error"]
+    if problems:
+        raise ManifestError("\n".join((*problems, "the plan is not complete, so nothing was written")))
+
+
+def _refuse_lost(lost: tuple[Unexpressed, ...], engine: Engine, accepted: bool) -> None:
+    for one in lost if accepted else ():
+        print(f"secure-plan: warning: left out: {message(one)}", file=sys.stderr)
+    if lost and not accepted:
+        listed = "\n".join(f"  {one}" for one in lost)
+        raise ManifestError(
+            f"{engine.value} cannot express this part of the launch:\n{listed}\n"
+            "nothing was written; change the launch file, or leave it out with --accept-unexpressed"
+        )
+
+
+def _refuse_nowhere(placement: Placement) -> None:
+    if placement.nowhere:
+        listed = ", ".join(one.fqn or one.process for one in placement.nowhere)
+        raise UsageError(f"on no host: {listed}; name them in the hosts file")
+    for enclave, hosts in placement.shared.items():
+        print(
+            f"secure-plan: warning: enclave {enclave} lives on {', '.join(hosts)}: one private key on several hosts",
+            file=sys.stderr,
+        )
+
+
+def _deployment(
+    document: Mapping[str, Any],
+    placement: Placement,
+    host: str | None,
+    key: str,
+    lost: tuple[Unexpressed, ...],
+    options: argparse.Namespace,
+) -> Deployment:
+    from enclave_launch.deployment.deployment import Deployment
+    from enclave_launch.deployment.material import read_material
+    from enclave_launch.deployment.placement import in_restart_order
+    from enclave_launch.deployment.processes import label
+    from enclave_launch.deployment.semantics import Engine, differences, ends_launch
+    from enclave_launch.review.document import plan_from_document
+    from enclave_launch.review.information_flow import flow_graph
+
+    hosts = hosts_of(options.hosts)
+    processes = tuple(one._replace(needs=hosts.needs_of(one.nodes)) for one in placement.hosts[key])
+    graph = flow_graph(plan_from_document(document))
+    notes = differences(document, Engine(options.format))
+    for note in notes:
+        print(f"secure-plan: warning: {note}", file=sys.stderr)
+    return Deployment(
+        name=label(options.name or f"ros-{_stem(options.words)}"),
+        source=" ".join(options.words),
+        host=host,
+        processes=processes,
+        order=tuple(one.name for one in in_restart_order(processes, graph)),
+        material=read_material(
+            options.keystore, [one.enclave for one in processes if one.enclave is not None]
+        ),
+        ends_launch=ends_launch(document),
+        lost=lost,
+        notes=notes,
+    )
+
+
+def _stem(words: list[str]) -> str:
+    """``talker_listener`` of ``demo_nodes talker_listener.launch.xml name:=value``."""
+    files = [word for word in words if ":=" not in word]
+    return Path(files[-1]).name.partition(".")[0]
+
+
+def _files(engine: Engine, deployment: Deployment, options: argparse.Namespace) -> dict[str, File]:
+    from enclave_launch.deployment.semantics import Engine
+
+    if engine is Engine.SYSTEMD:
+        from enclave_launch.deployment.systemd import systemd_files
+
+        parameters = f"/etc/ros/{deployment.name}/parameters"
+        return systemd_files(
+            deployment, keystore=options.host_keystore, parameters=parameters, setup=tuple(options.setup)
+        )
+    if engine is Engine.COMPOSE:
+        from enclave_launch.deployment.compose import compose_files
+
+        return compose_files(
+            deployment, image=options.image, user=options.user, keystore=options.host_keystore
+        )
+    from enclave_launch.deployment.kubernetes import kubernetes_files
+
+    return kubernetes_files(deployment, image=options.image)

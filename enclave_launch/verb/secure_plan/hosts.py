@@ -1,0 +1,70 @@
+"""Show which process runs on which host, and what flows between hosts.
+
+Hosts come from a file (--hosts: glob of nodes or enclaves -> host, docs/deployment.md), else from the machine
+attributes of the launch file. An enclave on two hosts is one private key on two.
+
+exit status: 0 each process has its host, 1 one has none or an enclave would be on two, 2 wrong usage
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from enclave_launch.boundary.terminal import json_text
+from enclave_launch.errors import UsageError
+from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+
+if TYPE_CHECKING:
+    from keystore.formats.hosts import Hosts
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_plan_arguments(parser)
+    parser.add_argument(
+        "--hosts", type=Path, metavar="FILE", help="which nodes or enclaves belong to which host"
+    )
+    parser.add_argument("--format", choices=("text", "json"), default="text")
+    parser.add_argument(
+        "--write-enclaves",
+        type=Path,
+        metavar="FILE",
+        help="write the hosts with their enclaves, for secure-keystore export --hosts",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    from enclave_launch.deployment.placement import place
+    from enclave_launch.deployment.processes import deployed_processes
+    from enclave_launch.report.hosts import enclaves_yaml, hosts_document, hosts_text
+    from enclave_launch.review.document import plan_from_document
+    from enclave_launch.review.information_flow import flow_graph
+
+    document = read_plan(options.words, options)
+    placement = place(deployed_processes(document), hosts_of(options.hosts))
+    graph = flow_graph(plan_from_document(document))
+    if options.write_enclaves is not None:
+        try:
+            options.write_enclaves.write_text(enclaves_yaml(placement), encoding="utf-8")
+        except OSError as error:
+            raise UsageError(f"{options.write_enclaves}: {error.strerror}") from error
+    if options.format == "json":
+        sys.stdout.write(json_text(hosts_document(placement, graph), indent=2) + "\n")
+    else:
+        sys.stdout.write(hosts_text(placement, graph))
+    return 1 if placement.nowhere or placement.shared else 0
+
+
+def hosts_of(file: Path | None) -> Hosts:
+    """Raises ``UsageError`` for a file that is not understood."""
+    from keystore.errors import InvalidInputError
+    from keystore.formats.hosts import Hosts, load_hosts
+
+    if file is None:
+        return Hosts()
+    try:
+        return load_hosts(file)
+    except InvalidInputError as error:
+        raise UsageError(str(error)) from error
