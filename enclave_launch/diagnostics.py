@@ -11,6 +11,8 @@ from collections.abc import Sequence
 from enum import Enum
 from typing import NamedTuple
 
+from enclave_launch.boundary.suggestion import did_you_mean
+from enclave_launch.boundary.terminal import quoted
 from enclave_launch.source_location import SourceLocation
 
 
@@ -36,6 +38,7 @@ class Code(str, Enum):
         "A parameter file cannot be read, so names made from it are not known",
     )
     PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file is not there"
+    ROS_DISTRO_UNKNOWN = "ros-distro-unknown", "ROS_DISTRO names no distribution that is known here"
     PROGRAM_NOT_INSTALLED = "program-not-installed", "A placeholder stands for what a program would write"
     PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start is not there"
     # of interfaces and permissions
@@ -171,6 +174,12 @@ def program_not_installed(program: str) -> Diagnostic:
 
 def program_not_executable(program: str, text: str, location: SourceLocation | None) -> Diagnostic:
     return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)
+
+
+def ros_distro_unknown(name: str, known: Sequence[str], taken: str) -> Diagnostic:
+    text = f"ROS_DISTRO={quoted(name)} is not a distribution that is known here: the rules of {taken} are followed"
+    remedy = f"set it, or give --distro{did_you_mean(name, known)}"
+    return Diagnostic(Code.ROS_DISTRO_UNKNOWN, name, text, None, remedy)
 
 
 # -- of interfaces and permissions ------------------------------------------------------------------------------------

@@ -21,6 +21,7 @@ from enclave_launch.boundary.files import read_text
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
+_LAUNCH_FILE = re.compile(r"launch\.(py|xml|ya?ml)$")  # ros2launch/api/api.py, is_launch_file
 _PACKAGE_VERSION = re.compile(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
 _PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
 
@@ -44,7 +45,12 @@ class PackageNotFoundError(KeyError):
 
 
 class ExecutableNotFoundError(LookupError):
-    """The package is installed, but not this executable of it."""
+    """The package is installed, but not this executable of it; ``folder`` is where its executables would be."""
+
+    def __init__(self, message: str, executable: str = "", folder: str = ""):
+        self.executable = executable
+        self.folder = folder
+        super().__init__(message)
 
 
 class LaunchFileNotFoundError(FileNotFoundError):
@@ -82,6 +88,29 @@ def search_prefixes(
     listed = variables.get(PREFIX_VARIABLE, "").split(os.pathsep)
     candidates = [*(os.path.abspath(os.path.expanduser(prefix)) for prefix in extra), *listed]
     return tuple(dict.fromkeys(prefix for prefix in candidates if prefix and os.path.exists(prefix)))
+
+
+def installed_packages(prefixes: Sequence[str]) -> list[str]:
+    """The names of all packages in the index, sorted."""
+    found: set[str] = set()
+    for prefix in prefixes:
+        folder = os.path.join(prefix, INDEX_FOLDER, "packages")
+        found.update(os.listdir(folder) if os.path.isdir(folder) else ())
+    return sorted(found)
+
+
+def executables(folder: str) -> list[str]:
+    """The names of the programs in ``folder``, sorted; none where it does not exist."""
+    if not os.path.isdir(folder):
+        return []
+    return sorted(entry.name for entry in os.scandir(folder) if entry.is_file() and os.access(entry, os.X_OK))
+
+
+def launch_files(package: str, prefixes: Sequence[str]) -> list[str]:
+    """The base names of the launch files below the package's share directory, sorted. Raises as ``package_prefix``."""
+    share = package_share_directory(package, prefixes)
+    files = {file for _, _, files in os.walk(share) for file in files}
+    return sorted(file for file in files if _LAUNCH_FILE.search(file))
 
 
 def package_prefix(package: str, prefixes: Sequence[str]) -> str:
@@ -130,12 +159,14 @@ def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> s
     folder = os.path.join(prefix, "lib", package)
     if not os.path.exists(folder):
         raise ExecutableNotFoundError(
-            f"package '{package}' found at '{prefix}', but libexec directory '{folder}' does not exist"
+            f"package '{package}' found at '{prefix}', but libexec directory '{folder}' does not exist",
+            executable,
+            folder,
         )
     found = shutil.which(executable, path=folder)
     if found is None:
         raise ExecutableNotFoundError(
-            f"executable '{executable}' not found on the libexec directory '{folder}' "
+            f"executable '{executable}' not found on the libexec directory '{folder}' ", executable, folder
         )
     return found
 

@@ -57,8 +57,11 @@ def add_version(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}")
 
 
-def complete(parser: argparse.ArgumentParser) -> None:
-    """Answer a shell that asks for completions, and end; otherwise do nothing.
+def complete(
+    parser: argparse.ArgumentParser, offer: Callable[[argparse.ArgumentParser], None] | None = None
+) -> None:
+    """Answer a shell that asks for completions, and end; otherwise do nothing. ``offer`` tells the arguments of
+    ``parser`` what can be offered for them.
 
     The shell asks through argcomplete (``register-python-argcomplete``, as for ``ros2``), an optional dependency:
     without it the shell gets no answer.
@@ -69,6 +72,8 @@ def complete(parser: argparse.ArgumentParser) -> None:
         import argcomplete
     except ImportError:
         raise SystemExit(1) from None
+    if offer is not None:
+        offer(parser)
     argcomplete.autocomplete(parser, always_complete_options="long")
 
 

@@ -65,6 +65,13 @@ def raw(stream: TextIO) -> TextIO:
     return stream._stream if isinstance(stream, _SafeText) else stream
 
 
+def write_coloured(text: str, stream: TextIO) -> None:
+    """Write ``text``, whose parts were made safe before colours were added, past ``safe_output``."""
+    target = raw(stream)
+    encoding = getattr(target, "encoding", None) or "utf-8"
+    target.write(text.encode(encoding, "backslashreplace").decode(encoding))
+
+
 class _SafeText:
     """A text stream that escapes what it is given; otherwise the stream itself."""
 

@@ -11,17 +11,23 @@ import re
 import sys
 from collections.abc import Iterator
 from types import TracebackType
+from typing import cast
 
 from enclave_launch.boundary.dependencies import missing_dependency
+from enclave_launch.boundary.suggestion import did_you_mean
 from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.description.conditions import InvalidConditionExpressionError
+from enclave_launch.description.markup.expose import action_parse_methods, substitution_parse_methods
+from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.host.protocol import MISSING_PREFIX
-from nodl.ament_index import PackageNotFoundError
+from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executables, installed_packages
 
 _OWN_PACKAGES = ("enclave_launch", "nodl", "keystore", "boundary")
 
 _TYPE = re.compile(r"'<class '(\w+)'>'")  # upstream's "of type '<class 'str'>'"
+
+_UNKNOWN_WORD = re.compile(r"^(?:Unrecognized entity of the type|(Unknown substitution)): (\S+)$")
 
 _PLACE = re.compile(r": line \d+(, column \d+)?$")  # at the end of what XML parsers say
 
@@ -76,10 +82,18 @@ def _frames(traceback: TracebackType | None) -> Iterator[TracebackType]:
 
 def _next_step(error: BaseException, text: str) -> str:
     if isinstance(error, PackageNotFoundError) and "not found, searching:" in text:
-        return (
+        return did_you_mean(error.package, installed_packages(error.prefixes)) + (
             "\nsource its workspace (AMENT_PREFIX_PATH) or name the install prefix with --prefix; "
             "--allow-missing-packages goes on without it, for looking only"
         )
+    if isinstance(error.__cause__ or error, ExecutableNotFoundError):
+        missing = cast("ExecutableNotFoundError", error.__cause__ or error)
+        return did_you_mean(missing.executable, executables(missing.folder))
+    if unknown := _UNKNOWN_WORD.match(text):
+        known = (
+            (SUBSTITUTIONS, substitution_parse_methods) if unknown[1] else (ELEMENTS, action_parse_methods)
+        )
+        return did_you_mean(unknown[2], [name for names in known for name in names])
     if text.startswith((MISSING_ARGUMENT, REQUIRED_ARGUMENT)):
         return "\ngive it as NAME:=VALUE after the launch file (--show-args lists all), or in the include"
     if isinstance(error, OSError) and f"'{MISSING_PREFIX}/" in text:

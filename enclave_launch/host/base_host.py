@@ -12,9 +12,10 @@ from enclave_launch.diagnostics import (
     executable_not_built,
     package_not_installed,
     program_not_installed,
+    ros_distro_unknown,
 )
 from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult, HostOptions
-from enclave_launch.ros_rules.distro import choose_release
+from enclave_launch.ros_rules.distro import Distro, choose_release
 from nodl import ament_index
 
 if TYPE_CHECKING:
@@ -26,13 +27,15 @@ class BaseHost:
     """What a dry run and a live run have in common: reading the ament index, running commands, warnings."""
 
     def __init__(self, options: HostOptions, outcomes: Outcomes | None = None) -> None:
-        self.release = choose_release(
-            options.distro, os.environ.get("ROS_DISTRO"), ament_index.search_prefixes()
-        )
+        named = os.environ.get("ROS_DISTRO")
+        self.release = choose_release(options.distro, named, ament_index.search_prefixes())
         self.allow_missing_packages = options.allow_missing_packages
         self.no_python = options.no_python
         self.outcomes = outcomes
         self.warnings: list[Diagnostic] = []
+        known = [distro.value for distro in Distro]
+        if named and not options.distro and named not in known:
+            self.warnings.append(ros_distro_unknown(named, known, self.release.distro.value))
         self._warned: set[Diagnostic] = set()
         self._process_count = 0
         self._anonymous_seed = options.anonymous_seed

@@ -34,6 +34,7 @@ SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
 CONTAINER_PACKAGE = "rclcpp_components"
 """Its executables (``component_container``, ``_mt``, ``_isolated``) are containers and nothing else."""
 
+_PLACES = 2  # named in a message
 _CONTAINER_NODE_NAME = (
     "ComponentManager"  # rclcpp_components/src/component_manager.hpp, the constructor's default
 )
@@ -114,7 +115,7 @@ class InterfaceFinder:
         recorded = self._library.recorded(subject.package, name)
         if recorded:
             return Found((recorded.document.interface,), InterfaceOrigin.RECORDED, recorded.doubt), False
-        searched = ["looked at " + ", ".join(manifest.searched)]
+        searched = ["looked at " + _shortly(manifest.searched)]
         analysed = self._inferred(subject, started)
         searched += [analysed.why] if analysed is not None and analysed.why else []
         inferred = analysed.interfaces if analysed is not None else ()
@@ -151,6 +152,13 @@ class InterfaceFinder:
         named = [str(folder) for folder in self._options.source_folders]
         named += [folder for folder in os.environ.get(SOURCE_VARIABLE, "").split(os.pathsep) if folder]
         return SourcesInReach(self._prefixes, named)
+
+
+def _shortly(places: Sequence[str]) -> str:
+    """The first, which are the package's own, and how many more: each prefix of a workspace has some."""
+    if len(places) <= _PLACES + 1:
+        return ", ".join(places)
+    return f"{', '.join(places[:_PLACES])} and {len(places) - _PLACES} more places"
 
 
 def _complete(interface: NodeInterface) -> bool:

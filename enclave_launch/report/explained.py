@@ -21,6 +21,14 @@ def explained(plan: LaunchPlan, subject: str) -> list[str]:
     return lines
 
 
+def explainable(plan: LaunchPlan) -> set[str]:
+    """What ``explained`` knows an answer to."""
+    planned: list[PlannedProcess | PlannedComponent] = [*plan.processes, *plan.components]
+    names = {enclave.path for enclave in plan.derived.policy.enclaves} | {label(item) for item in planned}
+    names |= {node.fqn for item in planned for node in item.nodes}
+    return names | {rule.expression for reasons in plan.derived.reasons.values() for rule in reasons}
+
+
 def _of_process(plan: LaunchPlan, item: PlannedProcess | PlannedComponent) -> Iterator[str]:
     if isinstance(item, PlannedProcess):
         enclave = item.enclave

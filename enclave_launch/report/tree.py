@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
+from enclave_launch.report.look import Look
 from enclave_launch.report.plan_json import allowed_names
 from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_enclave
+from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import EnclavePolicy
 
 _LABELS = {
@@ -21,19 +24,27 @@ _LABELS = {
     "serve_actions": "serve action",
 }
 
-Branch = tuple[str, Sequence["Branch"]]
+
+class Branch(NamedTuple):
+    """``names``: the text is a list of names, which may be folded."""
+
+    text: str
+    below: Sequence[Branch] = ()
+    names: bool = False
 
 
-def plan_tree(plan: LaunchPlan) -> str:
-    """Text that ends with a newline. Interfaces that every node has are counted, not listed."""
-    lines = [printable(f"{plan.launch_file} (as {plan.distro})")]
+def plan_tree(plan: LaunchPlan, look: Look | None = None) -> str:
+    """Text that ends with a newline. Interfaces that every node has are counted, not listed. ``look``: by default
+    lines of any length without colours, as for a pipe."""
+    look = look or Look()
+    lines = look.wrapped(look.one_line(f"{plan.launch_file} (as {plan.distro})"), "", "    ")
     gains = gains_by_sharing(plan.derived, composed_only=True)
-    lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves])
+    lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves], look)
     outside = _outside(plan)
     if outside:
-        lines += ["without an enclave", *_draw(outside)]
-    for kind, texts in (("error under --secure", plan.problems), ("warning", plan.warnings)):
-        lines += [f"{kind}: {message(text)}" for text in texts]
+        lines += ["without an enclave", *_draw(outside, look)]
+    lines += look.told("error under --secure", plan.problems)
+    lines += look.told("warning", plan.warnings)
     return "\n".join(lines) + "\n"
 
 
@@ -41,13 +52,13 @@ def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) ->
     processes = [item for item in plan.processes if item.enclave and item.enclave.path == enclave.path]
     branches: list[Branch] = [_process(item, plan) for item in processes]
     if plan.launcher and plan.launcher.enclave == enclave.path:
-        branches.append((f"the launcher itself, node {plan.launcher.fqn}", ()))
+        branches.append(Branch(f"the launcher itself, node {plan.launcher.fqn}"))
     branches.extend(_permissions(plan, enclave))
     if unknown := unknown_by_enclave(plan).get(enclave.path):
-        branches.append((f"{UNKNOWN} of {' '.join(map(label, unknown))}", ()))
-    branches.extend((str(gain), ()) for gain in gains if gain.enclave == enclave.path)
+        branches.append(Branch(f"{UNKNOWN} of {' '.join(map(label, unknown))}"))
+    branches.extend(Branch(str(gain), names=True) for gain in gains if gain.enclave == enclave.path)
     merged = f"  (shared by {len(processes)} processes)" if len(processes) > 1 else ""
-    return f"enclave {enclave.path}{merged}", branches
+    return Branch(f"enclave {enclave.path}{merged}", branches)
 
 
 def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
@@ -57,19 +68,22 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
     source = f", {_origin(item)}" if item.origin not in (None, InterfaceOrigin.PACKAGE) else ""
-    place = (
-        f"line {process.location.line}"
-        if process.location.file == plan.launch_file
-        else str(process.location)
-    )
+    place = _place(process.location, plan.launch_file)
     also = f", behind {shlex.join(process.prefix)}" if process.prefix else ""
     also += f", domain {item.domain}" if item.domain else ""
     also += f": {UNKNOWN}" if item.missing else ""
     head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{source}{also}{event})"
-    loaded: list[Branch] = [
-        (_component(component), ()) for component in plan.components if component.container is item
-    ]
-    return head, loaded
+    loaded = [Branch(_component(component)) for component in plan.components if component.container is item]
+    return Branch(head, loaded)
+
+
+def _place(location: SourceLocation, launch_file: str) -> str:
+    """Where in the launch file; in another file by the name it has in its package or beside the launch file."""
+    if location.file == launch_file:
+        return f"line {location.line}"
+    folder = os.path.join(os.path.dirname(launch_file), "")
+    _, share, in_package = str(location).rpartition("/share/")
+    return in_package if share else str(location).removeprefix(folder)
 
 
 def _component(item: PlannedComponent) -> str:
@@ -94,25 +108,30 @@ def _permissions(plan: LaunchPlan, enclave: EnclavePolicy) -> Iterator[Branch]:
         shown = [name for name in names if (key, name) not in built_in]
         hidden += len(names) - len(shown)
         if shown:
-            yield f"{_LABELS[key]}: {' '.join(shown)}", ()
+            yield Branch(f"{_LABELS[key]}: {' '.join(shown)}", names=True)
     if hidden:
-        yield f"and {hidden} that every node has (see --format json or --explain {enclave.path})", ()
+        yield Branch(f"and {hidden} that every node has (see --format json or --explain {enclave.path})")
 
 
 def _outside(plan: LaunchPlan) -> list[Branch]:
-    without: list[Branch] = [_process(item, plan) for item in plan.processes if item.enclave is None]
+    without = [_process(item, plan) for item in plan.processes if item.enclave is None]
     without += [
-        (f"{_component(item)} in {item.component.container}", ())
+        Branch(f"{_component(item)} in {item.component.container}")
         for item in plan.components
         if item.container is None
     ]
     return without
 
 
-def _draw(branches: Sequence[Branch], indent: str = "") -> list[str]:
+def _draw(branches: Sequence[Branch], look: Look, indent: str = "") -> list[str]:
     lines: list[str] = []
-    for index, (text, below) in enumerate(branches):
+    for index, branch in enumerate(branches):
         last = index == len(branches) - 1
-        lines.append(f"{indent}{'└── ' if last else '├── '}{printable(text)}")
-        lines += _draw(below, indent + ("    " if last else "│   "))
+        below = indent + ("    " if last else "│   ")
+        head, further = (
+            f"{indent}{'└── ' if last else '├── '}",
+            f"{below}{'│   ' if branch.below else '    '}",
+        )
+        lines += look.wrapped(look.one_line(branch.text), head, further, fold=branch.names)
+        lines += _draw(branch.below, look, below)
     return lines

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
-from enclave_launch.boundary.terminal import message, printable, safe_output
+from enclave_launch.boundary.terminal import message, printable, safe_output, write_coloured
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 from enclave_launch.verb.usage import CommandLine, check_options, read_command_line, unsecured_notice
@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _guarded_main(argv: Sequence[str] | None) -> int:
     parser = build_parser()
-    complete(parser)
+    complete(parser, _offer)
     line = read_command_line(parser, argv)
     before = gc.get_threshold()
     gc.set_threshold(_ALLOCATIONS)
@@ -47,6 +47,12 @@ def _guarded_main(argv: Sequence[str] | None) -> int:
         return guarded("secure-launch", lambda: _checked_main(line, parser), EnclaveLaunchError)
     finally:
         gc.set_threshold(*before)
+
+
+def _offer(parser: argparse.ArgumentParser) -> None:
+    from enclave_launch.verb.completion import offer_launches
+
+    offer_launches(parser)
 
 
 def _checked_main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
@@ -181,15 +187,26 @@ def _show_file(target: Target, options: argparse.Namespace) -> int:
 
 def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> int:
     """Print the form of ``plan`` that ``options`` ask for. Gives the exit status."""
+    if options.format == "tree" and not options.explain and not options.dump_params:
+        return _show_tree(plan, options)
     text = _plan_text(plan, options, keystore)
     told = (*plan.problems, *plan.warnings)
     if options.explain and told:
         _warn((f"problems: {len(plan.problems)}, warnings: {len(plan.warnings)}; --dry-run shows them",))
-    elif options.format == "policy" or options.dump_params:  # the tree and the JSON hold them
+    elif options.format == "policy" or options.dump_params:  # the JSON holds them
         _warn(told)
-    machine_readable = options.dump_params or (options.format != "tree" and not options.explain)
-    sys.stdout.write(text if machine_readable else _with_short_paths(text))
+    sys.stdout.write(_with_short_paths(text) if options.explain else text)
     gc.freeze()  # the process ends now: no last search for garbage among all that was read
+    return 0
+
+
+def _show_tree(plan: LaunchPlan, options: argparse.Namespace) -> int:
+    from enclave_launch.report.look import look_for
+    from enclave_launch.report.tree import plan_tree
+
+    shown = plan._replace(warnings=()) if options.quiet else plan
+    write_coloured(plan_tree(shown, look_for(sys.stdout, os.environ, verbose=options.verbose)), sys.stdout)
+    gc.freeze()  # as in show_plan
     return 0
 
 
@@ -213,14 +230,10 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
         return plan_json(plan, security) + "\n"
     if options.format == "policy":
         return _policy_text(plan)
-    if options.format != "tree":
-        from enclave_launch.report.plan_json import plan_document
-        from enclave_launch.verb.secure_plan.report import report_text
+    from enclave_launch.report.plan_json import plan_document
+    from enclave_launch.verb.secure_plan.report import report_text
 
-        return report_text(plan_document(plan), options.format, " ".join(options.words), keystore=keystore)
-    from enclave_launch.report.tree import plan_tree
-
-    return plan_tree(plan)
+    return report_text(plan_document(plan), options.format, " ".join(options.words), keystore=keystore)
 
 
 def _policy_text(plan: LaunchPlan) -> str:
@@ -236,13 +249,17 @@ def _policy_text(plan: LaunchPlan) -> str:
 
 
 def _explained(plan: LaunchPlan, subject: str) -> str:
-    from enclave_launch.report.explained import explained
+    from enclave_launch.boundary.suggestion import did_you_mean
+    from enclave_launch.report.explained import explainable, explained
 
     lines = explained(plan, subject)
     if not lines:
-        known = " ".join(enclave.path for enclave in plan.derived.policy.enclaves)
+        enclaves = [enclave.path for enclave in plan.derived.policy.enclaves]
         what = "enclave, node, process, topic, service or action"
-        raise UsageError(f"{subject!r} is no {what} of this launch; enclaves: {known}")
+        meant = did_you_mean(subject, explainable(plan))
+        raise UsageError(
+            f"{subject!r} is not an {what} of this launch{meant or '; enclaves: ' + ' '.join(enclaves)}"
+        )
     return "\n".join(map(printable, lines)) + "\n"
 
 
@@ -262,23 +279,20 @@ def _launch(
 ) -> int | None:
     """The exit status; ``None`` when it was ended in order to be renewed and started anew (``--restart-expiring``)."""
     from enclave_launch.flow import provision, run
-    from enclave_launch.verb.security import expiry_notices, repair_notices, security_options
+    from enclave_launch.verb.security import created_notices, expiry_notices, repair_notices, security_options
 
-    _warn(plan.warnings)
+    _warn(() if options.quiet else plan.warnings)
     _check_before_keys_are_made(plan)
     if options.strategy == "Permissive":
         from enclave_launch.verb.usage import PERMISSIVE_NOTICE
 
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
-    _warn(
-        (
-            *repair_notices(launch),
-            *launch.report.warnings,
-            *launch.handshakes,
-            *expiry_notices(launch, options.warn_expiry),
-        )
-    )
+    if not options.quiet:
+        for text in created_notices(launch):
+            print(f"secure-launch: {printable(text)}", file=sys.stderr)
+    repaired = (*repair_notices(launch), *launch.report.warnings, *launch.handshakes)
+    _warn((*repaired, *expiry_notices(launch, options.warn_expiry)))
     deadline = _deadline(launch) if options.restart_expiring else None
     status = run(launch, options=_run_settings(options, companion, deadline))
     return None if deadline is not None and deadline.reached else status

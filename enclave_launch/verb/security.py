@@ -15,6 +15,7 @@ from keystore.formats.validity import later, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.steps.options import ProvisionOptions
 
+_LISTED = 8
 _NEW_KEYSTORE = "governance signed"
 
 
@@ -61,6 +62,17 @@ def _passphrase(options: argparse.Namespace) -> Secret | None:
     if options.ca_passphrase_env is not None:
         return Secret(variable=options.ca_passphrase_env)
     return None
+
+
+def created_notices(launch: ProvisionedLaunch) -> Iterator[str]:
+    """What of the keystore is new, in a few lines."""
+    report = launch.report
+    if _NEW_KEYSTORE in report.created:
+        yield f"keystore {report.keystore} created"
+    new = [enclave.enclave for enclave in report.enclaves if "created" in enclave.actions]
+    if new:
+        listed = " ".join(new[:_LISTED]) + (f" and {len(new) - _LISTED} more" if len(new) > _LISTED else "")
+        yield f"{len(new)} enclave{'s' * (len(new) != 1)} created: {listed}"
 
 
 def repair_notices(launch: ProvisionedLaunch) -> Iterator[str]:

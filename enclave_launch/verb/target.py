@@ -10,6 +10,7 @@ import os
 from collections.abc import Sequence
 from typing import NamedTuple
 
+from enclave_launch.boundary.suggestion import did_you_mean
 from enclave_launch.errors import UsageError
 from nodl import ament_index
 
@@ -30,8 +31,15 @@ def find_target(words: Sequence[str], prefixes: Sequence[str]) -> Target:
         return Target(first, parse_arguments(rest))
     if not rest or ":=" in rest[0]:
         what = "is not a regular file" if os.path.exists(first) else "does not exist"
-        raise UsageError(f"launch file {first!r} {what} (give PACKAGE LAUNCH_FILE or a PATH)")
+        raise UsageError(f"launch file {first!r} {what} (give PACKAGE LAUNCH_FILE or a PATH){_beside(first)}")
     return Target(_in_package(first, rest[0], prefixes), parse_arguments(rest[1:]))
+
+
+def _beside(path: str) -> str:
+    """The file in the same folder that was probably meant."""
+    folder, name = os.path.split(path)
+    beside = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
+    return did_you_mean(name, [each for each in beside if each.endswith((".py", ".xml", ".yaml", ".yml"))])
 
 
 def _in_package(package: str, file_name: str, prefixes: Sequence[str]) -> str:
@@ -40,11 +48,20 @@ def _in_package(package: str, file_name: str, prefixes: Sequence[str]) -> str:
     except ament_index.PackageNotFoundError as error:
         searched = "".join(f"\n  {prefix}" for prefix in prefixes) or " no prefix at all"
         raise UsageError(
-            f"package {error.package!r} not found, searched:{searched}\n"
+            f"package {error.package!r} not found{_meant(error.package, prefixes)}, searched:{searched}\n"
             "source the workspace (AMENT_PREFIX_PATH) or name its install prefix with --prefix"
         ) from error
-    except (ament_index.MultipleLaunchFilesError, ament_index.LaunchFileNotFoundError, ValueError) as error:
+    except ament_index.LaunchFileNotFoundError as error:
+        known = ament_index.launch_files(package, prefixes)
+        raise UsageError(f"{error}{did_you_mean(file_name, known)}") from error
+    except (ament_index.MultipleLaunchFilesError, ValueError) as error:
         raise UsageError(str(error)) from error
+
+
+def _meant(package: str, prefixes: Sequence[str]) -> str:
+    """Of a package that is not installed, in brackets; the sentence goes on."""
+    meant = did_you_mean(package, ament_index.installed_packages(prefixes)).removeprefix("; ")
+    return f" ({meant})" if meant else ""
 
 
 def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:

@@ -10,7 +10,14 @@ import argparse
 from collections.abc import Sequence
 from importlib import import_module
 
-from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
+from enclave_launch.boundary.command_line import (
+    CommandParser,
+    add_verbosity,
+    add_version,
+    complete,
+    guarded,
+    parsers,
+)
 from enclave_launch.boundary.terminal import safe_output
 from keystore.errors import KeystoreError
 
@@ -28,9 +35,28 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _main(argv: Sequence[str] | None) -> int:
     parser = build_parser()
-    complete(parser)
+    complete(parser, _offer)
     arguments = parser.parse_args(argv)
     return guarded("secure-keystore", lambda: int(arguments.run(arguments)), KeystoreError)
+
+
+def _offer(parser: argparse.ArgumentParser) -> None:
+    """Enclaves are offered where they must exist."""
+    for each in parsers(parser):
+        for action in each._actions:
+            if action.dest == "enclaves" and not (
+                each.prog.endswith("create-enclave") or action.option_strings
+            ):
+                setattr(action, "completer", _enclaves)  # noqa: B010  # argcomplete's own attribute
+
+
+def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:
+    from keystore.steps.enclaves import list_enclaves
+
+    try:
+        return list_enclaves(parsed_args.keystore)
+    except KeystoreError:
+        return []
 
 
 def build_parser() -> argparse.ArgumentParser:

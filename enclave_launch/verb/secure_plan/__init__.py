@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.verb.completion import offer_launches
 from enclave_launch.verb.secure_plan import check, diff, export, flow, hosts, report, show, suggest
 
 VERBS = (show, check, diff, flow, hosts, export, suggest, report)
@@ -39,6 +40,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv``. Gives the exit status, never a traceback for what a user can cause."""
     with safe_output():
         parser = build_parser()
-        complete(parser)
+        complete(parser, offer_launches)
         options = parser.parse_args(argv)
         return guarded("secure-plan", lambda: int(options.verb(options)), EnclaveLaunchError)
