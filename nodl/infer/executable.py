@@ -132,7 +132,8 @@ class _Finder:
 
     def __init__(self, prefixes: Sequence[str]):
         self._sites = [site for prefix in prefixes for site in _sites_of(prefix)]
-        self._program = Program(folder for site in self._sites for folder in (site, *_linked_folders(site)))
+        folders = (folder for site in self._sites for folder in (site, *_linked_folders(site)))
+        self._program = Program(folders, prefixes)
 
     def run(self, path: str, package: str, executable: str) -> Run:
         text = read_text(path, errors="replace")

@@ -95,6 +95,7 @@ def _merged(paths: list[Path]) -> Findings:
             record.endpoints = made
             merged.add_node(record)
         merged.gaps.update(path.run.findings.gaps)
+        merged.files.update(path.run.findings.files)
         merged.global_arguments = path.run.findings.global_arguments
     return merged
 

@@ -12,7 +12,7 @@ import functools
 import os
 import re
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from enclave_launch.boundary.files import read_bytes
@@ -67,7 +67,8 @@ class SourceModule:
 class Program:
     """Finds and parses modules below ``roots``; one object serves many runs."""
 
-    def __init__(self, roots: Iterable[str] = ()):
+    def __init__(self, roots: Iterable[str] = (), prefixes: Sequence[str] = ()):
+        self.prefixes = tuple(prefixes)  # where packages are installed, with the data that programs ask for
         self.roots = list(dict.fromkeys(os.path.abspath(root) for root in roots))
         self._by_path: dict[str, SourceModule] = {}
         self._found: dict[tuple[str, str], str | None] = {}

@@ -57,7 +57,8 @@ def _united(interfaces: list[NodeInterface]) -> list[NodeInterface]:
 
 def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) -> list[NodeInterface]:
     rules, gaps = _rules(record, findings)
-    endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found, record)))
+    note = f"the program reads {', '.join(findings.files)}" if findings.files else ""
+    endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found, note)))
     gaps.extend(Gap(source, why) for source, why in record.gaps)
     names: list[str | None] = [*_plain_texts(record.names)] or [None]
     if not record.created:
@@ -124,9 +125,9 @@ def _plain_texts(value: Value) -> list[str]:
 # --- endpoints ----------------------------------------------------------------------------------------------
 
 
-def _endpoints(found: FoundEndpoint, record: NodeRecord) -> list[Endpoint]:
+def _endpoints(found: FoundEndpoint, note: str) -> list[Endpoint]:
     return [
-        Endpoint(found.kind, template, found.type, found.source, certainty_of(template))
+        Endpoint(found.kind, template, found.type, found.source, certainty_of(template), note=note)
         for template in templates(found.name)
     ]
 

@@ -6,7 +6,7 @@ import gc
 import itertools
 import os
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -38,14 +38,15 @@ class InferredSystem:
     files: tuple[str, ...]
 
 
-def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
+def infer_paths(paths: Iterable[str | Path], prefixes: Sequence[str] = ()) -> InferredSystem:
     """All nodes that the Python and C++ files in ``paths`` (files, or folders with everything below) may create.
 
+    ``prefixes``: where the packages are installed whose data the programs read.
     Raises ``FileNotFoundError`` for a path that does not exist. A file that cannot be parsed is a gap.
     """
     found = list(dict.fromkeys(file for path in paths for file in _source_files(Path(path))))
     files = [file for file in found if file.endswith(".py") or not file.endswith(CPP_SUFFIXES)]
-    program = Program()
+    program = Program(prefixes=prefixes)
     for file in files:
         program.add_root(program.top_folder(file))
     with without_collector():

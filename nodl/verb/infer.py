@@ -132,7 +132,7 @@ def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
     from nodl.infer.system import InferredSystem, infer_paths
 
     paths = [subject for subject in subjects if os.path.exists(subject)]
-    found = [infer_paths(paths)] if paths else []
+    found = [infer_paths(paths, prefixes)] if paths else []
     found.extend(_infer_package(subject, prefixes) for subject in subjects if subject not in paths)
     return InferredSystem(
         tuple(node for each in found for node in each.nodes),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import io
 from collections.abc import Callable
 from typing import Any
 
@@ -322,6 +323,8 @@ def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
             result = join(result, run.call(enter, Arguments(), node, frame))
         elif isinstance(atom, Sequence) and atom.kind == "generator":
             result = join(result, atom.items.any_element())
+        elif isinstance(atom, NativeObject) and isinstance(atom.object, io.IOBase):
+            result = join(result, (atom,))
         elif isinstance(atom, NativeObject):
             result = join(result, _advanced(run, atom, node, frame) or NONE)
         else:
@@ -341,7 +344,7 @@ def _exited(run: Run, managers: list[Value], node: ast.AST, frame: Frame) -> Non
     """``__exit__`` without an exception, and perhaps with one."""
     for atom in (atom for manager in reversed(managers) for atom in manager):
         leave = special.method(atom, "__exit__") or special.method(atom, "__aexit__")
-        if isinstance(atom, NativeObject):
+        if isinstance(atom, NativeObject) and not isinstance(atom.object, io.IOBase):
             _advanced(run, atom, node, frame)
         if leave:
             run.call(leave, Arguments([NONE, NONE, NONE]), node, frame)

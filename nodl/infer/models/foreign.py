@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import functools
 import sys
+from pathlib import PurePosixPath
 
 from nodl.infer.interpreter.assign import plain_store
 from nodl.infer.interpreter.iterate import lose
 from nodl.infer.interpreter.raising import is_builtin_exception
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.models import builtin, concrete, endpoints, native, pure, ros, stdlib
+from nodl.infer.models import builtin, concrete, endpoints, files, native, pure, ros, stdlib
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
 from nodl.infer.values import (
@@ -34,7 +35,7 @@ from nodl.infer.values import (
     unknown,
 )
 
-_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS}
+_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS, **files.FUNCTIONS}
 NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 
 # Libraries that create no endpoints on a node they are given, keep their hands off names and off the program's
@@ -284,12 +285,10 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
 
 
 def _native_method(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
-    if not concrete.is_usable(run, receiver) or pure.is_io(name):
-        return (
-            lose(run, receiver)
-            if not concrete.is_usable(run, receiver)
-            else unknown("what a file system says")
-        )
+    if not concrete.is_usable(run, receiver):
+        return lose(run, receiver)
+    if isinstance(receiver.object, PurePosixPath) and pure.is_io(name):
+        return files.path_method(run, receiver.object, name, call)
     run.state.pulled += 1
     found = concrete.compute(run, getattr(receiver.object, name), call)
     if found is None:
@@ -300,6 +299,8 @@ def _native_method(run: Run, receiver: NativeObject, name: str, call: Call) -> V
 
 def native_attribute(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
     """An attribute of a real object: a method of it, or a value."""
+    if isinstance(receiver.object, PurePosixPath) and pure.is_io(name):
+        return (NativeMethod(receiver, name),)
     if name.startswith("_") or not hasattr(receiver.object, name):
         return unknown(f"attribute {name} of a {type(receiver.object).__name__}")
     if callable(getattr(receiver.object, name)):

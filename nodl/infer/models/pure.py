@@ -11,6 +11,7 @@ import builtins
 import collections
 import functools
 import importlib
+import io
 import itertools
 import json
 import math
@@ -122,10 +123,22 @@ def _tee(iterable: Any, n: int = 2) -> Any:
     return tuple(iter(list(kept)) for _ in range(n))
 
 
-def _yaml(text: Any, *_: Any, **__: Any) -> Any:
+def _whole(source: Any) -> Any:
+    """The text of a file, or the text itself."""
+    if isinstance(source, io.StringIO | io.BytesIO):
+        source = source.read()
+    if isinstance(source, bytes):
+        source = source.decode()
+    if not isinstance(source, str):
+        raise NotConcrete
+    return source
+
+
+def _yaml(source: Any, *_: Any, **__: Any) -> Any:
     import yaml
 
-    if not isinstance(text, str) or ("*" in text and "&" in text):
+    text = _whole(source)
+    if "*" in text and "&" in text:
         raise NotConcrete
     try:
         return yaml.safe_load(text)
@@ -133,8 +146,9 @@ def _yaml(text: Any, *_: Any, **__: Any) -> Any:
         raise ValueError(str(error)) from error
 
 
-def _json(text: Any, **named: Any) -> Any:
-    if not isinstance(text, str) or named:
+def _json(source: Any, **named: Any) -> Any:
+    text = _whole(source)
+    if named:
         raise NotConcrete
     return json.loads(text)
 
@@ -192,7 +206,10 @@ DEEP: dict[str, Function] = {
     "builtins.ascii": ascii,
     "json.dumps": _dumps,
     "json.loads": _json,
+    "json.load": _json,
     "yaml.safe_load": _yaml,
+    "yaml.load": _yaml,
+    "yaml.full_load": _yaml,
     "copy.deepcopy": lambda value: value,
 }
 IMMUTABLE_ATTRIBUTES = frozenset({"pattern", "string", "lastindex", "lastgroup", "template", "delimiter"})
@@ -205,6 +222,20 @@ _PATH_IO = frozenset(
         "is_file",
         "is_dir",
         "read_text",
+        "read_bytes",
+        "write_text",
+        "write_bytes",
+        "stat",
+        "lstat",
+        "touch",
+        "mkdir",
+        "unlink",
+        "rename",
+        "replace",
+        "rglob",
+        "is_symlink",
+        "owner",
+        "samefile",
         "open",
         "glob",
         "iterdir",

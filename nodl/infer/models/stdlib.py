@@ -353,7 +353,6 @@ FUNCTIONS: dict[str, Model] = {
     "yaml.safe_load": _file_contents,
     "yaml.load": _file_contents,
     "json.load": _file_contents,
-    "builtins.open": _file_contents,
 }
 
 METHODS: dict[tuple[str, str], Method] = {
