@@ -22,6 +22,7 @@ class Code(str, Enum):
     meaning: str
 
     # of the evaluation
+    ARGUMENT_UNKNOWN = "argument-unknown", "A launch argument was given that no launch file looks at"
     COMMAND_STDERR = "command-stderr", "A command of the launch file wrote to stderr"
     EXECUTABLE_NOT_BUILT = (
         "executable-not-built",
@@ -111,6 +112,12 @@ class Diagnostic(NamedTuple):
 
 
 # -- of the evaluation ------------------------------------------------------------------------------------------------
+
+
+def argument_unknown(name: str, alike: str) -> Diagnostic:
+    """``alike``: the question after the name that was probably meant, or empty."""
+    text = f"no launch file declares or reads the argument {name!r}{alike}"
+    return Diagnostic(Code.ARGUMENT_UNKNOWN, name, text, None, "secure-launch --show-args lists them")
 
 
 def command_stderr(message: str, command: str) -> Diagnostic:

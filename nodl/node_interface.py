@@ -52,6 +52,9 @@ class Endpoint(NamedTuple):
     written: str = ""  # the text in the source where a reader took it for another name, else empty
     introspected: bool = False  # a service whose calls are published below its name (service introspection)
     note: str = ""  # what else a reader should know: the parameter or plugin that the name comes from
+    qos: tuple[
+        tuple[str, str | int], ...
+    ] = ()  # policies that the description fixes, by NoDL v2's names; sorted
 
 
 class Gap(NamedTuple):

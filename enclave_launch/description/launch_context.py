@@ -8,6 +8,7 @@ from collections.abc import Iterable, MutableMapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from enclave_launch.description.events.dispatch import Buckets, EventQueue, HandlerTable, QueuedEvent
+from enclave_launch.description.watched_configurations import WatchedConfigurations
 from enclave_launch.host.current import current_host
 from enclave_launch.host.environment import Environment
 from enclave_launch.host.protocol import Host
@@ -74,7 +75,8 @@ class LaunchContext:
         self.__locals: dict[str, Any] = {}
         self.__locals_stack: list[dict[str, Any]] = []
         self.__combined: dict[str, Any] | None = None
-        self.__configurations: dict[str, Any] = {}
+        self.configurations_looked_at: set[str] = set()
+        self.__configurations: dict[str, Any] = WatchedConfigurations(self.configurations_looked_at)
         self.__configurations_stack: list[dict[str, Any]] = []
         self.process_environment = Environment()
         self._event_queue = EventQueue()
@@ -221,7 +223,7 @@ class LaunchContext:
         """Everything that an event could change, for ``restore``."""
         configurations = {
             name: list(value) if isinstance(value, list) else value
-            for name, value in self.__configurations.items()
+            for name, value in dict(self.__configurations).items()
         }
         return ContextState(
             configurations=configurations,
@@ -236,7 +238,8 @@ class LaunchContext:
         )
 
     def restore(self, saved: ContextState) -> None:
-        self.__configurations = saved.configurations
+        self.__configurations = WatchedConfigurations(self.configurations_looked_at)
+        self.__configurations.update(saved.configurations)
         self.__configurations_stack = saved.configurations_stack
         self.__locals = saved.locals
         self.__locals_stack = saved.locals_stack

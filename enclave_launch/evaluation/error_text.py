@@ -19,6 +19,7 @@ from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_
 from enclave_launch.description.conditions import InvalidConditionExpressionError
 from enclave_launch.description.markup.expose import action_parse_methods, substitution_parse_methods
 from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
+from enclave_launch.description.watched_configurations import WatchedConfigurations
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.host.protocol import MISSING_PREFIX
 from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executables, installed_packages
@@ -67,10 +68,12 @@ def _syntax(error: SyntaxError) -> str:
 
 
 def _raised_by_us(error: BaseException) -> bool:
-    frames = list(_frames(error.__traceback__))
-    if not frames:
+    modules = [frame.tb_frame.f_globals.get("__name__", "") for frame in _frames(error.__traceback__)]
+    if modules[-1:] == [WatchedConfigurations.__module__]:  # a dict to whoever looks something up in it
+        modules.pop()
+    if not modules:
         return type(error).__module__.partition(".")[0] in _OWN_PACKAGES
-    module = frames[-1].tb_frame.f_globals.get("__name__", "")
+    module = modules[-1]
     return isinstance(module, str) and module.partition(".")[0] in _OWN_PACKAGES
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,7 @@ from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_description import LaunchDescription
+    from enclave_launch.diagnostics import Diagnostic
 
 Arguments = Sequence[tuple[str, str]]
 
@@ -63,6 +64,7 @@ def evaluate(
             context.register_event_handler(OnIncludeLaunchDescription())
             context.emit_event_sync(IncludeLaunchDescription(top_description(path, arguments)))
             Explorer(context, host).run()
+            host.warnings.extend(_unknown_arguments(arguments, context.configurations_looked_at))
         except EnclaveLaunchError:
             raise
         except Exception as error:  # launch files run code of their own: any exception is theirs
@@ -165,6 +167,16 @@ def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
             raise RuntimeError(f"malformed launch argument '{word}', expected format '<name>:=<value>'")
         parsed[name] = value
     return list(parsed.items())
+
+
+def _unknown_arguments(arguments: Arguments, looked_at: Collection[str]) -> Iterator[Diagnostic]:
+    """``ros2 launch`` passes over a mistyped argument without a word."""
+    from enclave_launch.boundary.suggestion import did_you_mean
+    from enclave_launch.diagnostics import argument_unknown
+
+    for name, _ in arguments:
+        if name not in looked_at:
+            yield argument_unknown(name, did_you_mean(name, looked_at))
 
 
 def _evaluation(host: PlanHost) -> Evaluation:

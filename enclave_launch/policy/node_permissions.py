@@ -53,7 +53,7 @@ class Reason(NamedTuple):
     """Why a permission is there. ``place``: file:line of the manifest, source or policy, or a table row.
 
     ``written`` is the name as found there; ``rules`` the remap rules that changed it; ``note`` what else
-    a reader should know; ``type`` the interface's, empty where it is not known.
+    a reader should know; ``type`` the interface's, empty where it is not known; ``qos`` what is known of it.
     """
 
     node: str
@@ -63,6 +63,7 @@ class Reason(NamedTuple):
     rules: tuple[ParsedRule, ...] = ()
     note: str = ""
     type: str = ""
+    qos: tuple[tuple[str, str | int], ...] = ()
 
 
 class Permission(NamedTuple):
@@ -164,7 +165,9 @@ class _Collector:
             self._result.warnings.append(name_unremappable(self._fqn, template.text, where))
         try:
             for final_operation, resolved in self._resolve(operation, template.text, place):
-                reason = Reason(self._fqn, "declared", place, written, resolved.rules, note, endpoint.type)
+                reason = Reason(
+                    self._fqn, "declared", place, written, resolved.rules, note, endpoint.type, endpoint.qos
+                )
                 self._result.permissions.append(Permission(final_operation, resolved.name, reason))
                 if endpoint.introspected:
                     self._introspection(final_operation, resolved.name, reason)

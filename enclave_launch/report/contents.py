@@ -7,16 +7,9 @@ from typing import Any, NamedTuple
 
 from enclave_launch.report.graph import Graph, Use, plan_graph, short_path
 from enclave_launch.report.review_text import Judged
+from enclave_launch.review.checks.keystore import Ending
 from enclave_launch.review.document import PlanDocument, Told, plan_from_document
 from enclave_launch.review.information_flow import Step, flow_graph, opened_by_sharing, reached_from
-
-
-class Ending(NamedTuple):
-    """Something of the keystore that ends: ``ends`` as ISO 8601, ``days_left`` negative when it has ended."""
-
-    subject: str
-    ends: str
-    days_left: int
 
 
 class Count(NamedTuple):

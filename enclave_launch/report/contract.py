@@ -145,6 +145,9 @@ class Interface(_Strict, frozen=True):
     written: str = Field(description="the name as found there")
     remapped_by: list[str]
     note: str
+    qos: dict[str, Union[StrictInt, StrictStr]] = Field(
+        default={}, description="policies that the description fixes, by the names of NoDL v2"
+    )
 
 
 class Node(_Strict, frozen=True):
@@ -153,6 +156,9 @@ class Node(_Strict, frozen=True):
     fqn: str
     enclave: str
     program: str = Field(description="package/executable or package/plugin")
+    parameters: Optional[list[str]] = Field(
+        default=None, description="all that it declares; null where that is not known"
+    )
     interfaces: list[Interface]
 
 

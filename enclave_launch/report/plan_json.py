@@ -14,6 +14,7 @@ from enclave_launch.report.unknown import label, unknown_by_enclave
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
 from keystore.formats.policy import EnclavePolicy, Qualifier, Rule
+from nodl.node_interface import NodeInterface
 
 VERSION = 1
 
@@ -128,23 +129,32 @@ def _enclaves(plan: LaunchPlan) -> dict[str, dict[str, list[str]]]:
 
 def _nodes(plan: LaunchPlan) -> list[dict[str, object]]:
     """Every node with what it asks for and what it has as every node, sorted by name."""
-    programs = {
-        (
-            node.enclave,
-            node.fqn,
-        ): f"{node.interface.package}/{node.interface.executable or node.interface.plugin}"
-        for node in plan.nodes
-    }
-    found: dict[tuple[str, str], list[dict[str, object]]] = {key: [] for key in programs}
+    interfaces = {(node.enclave, node.fqn): node.interface for node in plan.nodes}
+    found: dict[tuple[str, str], list[dict[str, object]]] = {key: [] for key in interfaces}
     for enclave, reasons in plan.derived.reasons.items():
         for rule, why in reasons.items():
             for reason in why:
                 if rule.qualifier is Qualifier.ALLOW and (enclave, reason.node) in found:
                     found[enclave, reason.node].append(_interface(rule, reason))
     return [
-        {"fqn": fqn, "enclave": enclave, "program": programs[enclave, fqn], "interfaces": interfaces}
-        for (enclave, fqn), interfaces in sorted(found.items(), key=lambda item: (item[0][1], item[0][0]))
+        {
+            "fqn": fqn,
+            "enclave": enclave,
+            "program": _program(interfaces[enclave, fqn]),
+            "parameters": _declared(interfaces[enclave, fqn]),
+            "interfaces": uses,
+        }
+        for (enclave, fqn), uses in sorted(found.items(), key=lambda item: (item[0][1], item[0][0]))
     ]
+
+
+def _program(interface: NodeInterface) -> str:
+    return f"{interface.package}/{interface.executable or interface.plugin}"
+
+
+def _declared(interface: NodeInterface) -> list[str] | None:
+    """A description without any parameter says nothing of them; one with gaps may not say all."""
+    return None if interface.gaps or not interface.parameters else sorted(interface.parameters)
 
 
 def _interface(rule: Rule, reason: Reason) -> dict[str, object]:
@@ -159,6 +169,7 @@ def _interface(rule: Rule, reason: Reason) -> dict[str, object]:
             f"{each.text} at {each.origin}" if each.origin else each.text for each in reason.rules
         ],
         "note": reason.note,
+        "qos": dict(reason.qos),
     }
 
 

@@ -233,7 +233,8 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
     from enclave_launch.report.plan_json import plan_document
     from enclave_launch.verb.secure_plan.report import report_text
 
-    return report_text(plan_document(plan), options.format, " ".join(options.words), keystore=keystore)
+    there = keystore if keystore is not None and os.path.isdir(keystore) else None
+    return report_text(plan_document(plan), options.format, " ".join(options.words), keystore=there)
 
 
 def _policy_text(plan: LaunchPlan) -> str:

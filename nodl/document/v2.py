@@ -143,7 +143,8 @@ def _endpoints(
             seen[name] = source
             about = learnt.get((category, name), LearntName(NameTemplate.literal(name)))
             full_type = _full_type(type_name, kind)
-            yield Endpoint(kind, about.template, full_type, source, introspected=about.introspected)
+            introspected, qos = about.introspected, tuple(sorted(_qos(entry)))
+            yield Endpoint(kind, about.template, full_type, source, introspected=introspected, qos=qos)
 
 
 def _entries(documents: Sequence[Included], category: str) -> Iterator[YamlMap]:
@@ -152,6 +153,18 @@ def _entries(documents: Sequence[Included], category: str) -> Iterator[YamlMap]:
         for entry in listed.items if isinstance(listed, YamlList) else ():
             if isinstance(entry, YamlMap):
                 yield entry
+
+
+_UNDECIDED = ("SYSTEM_DEFAULT", "BEST_AVAILABLE")
+"""Values of QoS policies that are only known when the node runs."""
+
+
+def _qos(entry: YamlMap) -> Iterator[tuple[str, str | int]]:
+    given = entry.items.get("qos")
+    for name, value in given.items.items() if isinstance(given, YamlMap) else ():
+        fixed = value.value if isinstance(value, YamlScalar) else None
+        if isinstance(fixed, (str, int)) and fixed not in _UNDECIDED:
+            yield name, fixed
 
 
 def _field(entry: YamlMap, key: str) -> tuple[str, SourceRef]:

@@ -46,6 +46,7 @@ def process(fqn: str, enclave: str | None, line: int) -> dict[str, Any]:
         "enclave": enclave,
         "environment": {},
         "parameters": {},
+        "remaps": [],
         "launch_file": "bringup.launch.xml",
         "line": line,
     }

@@ -74,12 +74,23 @@ def test_an_enclave_whose_nodes_gain_by_sharing() -> None:
     assert "enclave-shared" not in codes(document({"/a": {"/n": {"publish": ["/x"]}}, "/b": {"/m": {}}}))
 
 
+def test_a_permission_that_no_node_asks_for() -> None:
+    checked = document({"/a": {"/n": {"publish": ["/x"]}}})
+    assert "permission-unasked" not in codes(checked)
+    checked["enclaves"]["/a"]["publish"].append("/of_policy")
+    (told,) = [told for told in check_plan(checked) if told.code == "permission-unasked"]
+    assert told.text == "enclave /a may publish /of_policy, and no node of it asks for that"
+    checked["enclaves"]["/a"]["permissions_unknown"] = ["/helper"]
+    assert "permission-unasked" not in codes(checked), "the policy speaks for a program that nobody describes"
+
+
 def process(**values: Any) -> dict[str, Any]:
     return {
         "fqn": "/n",
         "executable": "e",
         "environment": {},
         "parameters": {},
+        "remaps": [],
         "launch_file": "f.launch.xml",
         "line": 3,
         **values,

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from enclave_launch.report.contents import Ending, Influence, ReportContents
+from enclave_launch.report.contents import Influence, ReportContents
 from enclave_launch.report.flows import step_text
 from enclave_launch.report.graph import Graph, Use
 from enclave_launch.report.html.markup import row, table, text
 from enclave_launch.report.reasons import evidence_text
+from enclave_launch.review.checks.keystore import Ending
 from enclave_launch.review.document import Told
 
 SOON = 30

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
+from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN
 from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
 
 if TYPE_CHECKING:
@@ -26,11 +27,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_plan_arguments(parser)
     parser.add_argument("--format", choices=("text", "json", "sarif"), default="text")
     parser.add_argument("--strict", action="store_true", help="warnings count as errors")
+    parser.add_argument("--keystore", metavar="DIR", type=Path, help="hold the plan against it; reads only")
+    parser.add_argument("--within", metavar="TIME", default=DEFAULT_MARGIN, help="what ends soon (30d)")
     parser.add_argument("--expect", type=Path, metavar="FILE", help=f"default: {EXPECTATIONS}, if it exists")
 
 
 def run(options: argparse.Namespace) -> int:
-    found = judged(read_plan(options.words, options), options.expect)
+    found = judged(read_plan(options.words, options), options.expect, options.keystore, options.within)
     sys.stdout.write(_text(found, options.format))
     open_ones = [told for told, accepted in found if accepted is None]
     return 1 if any(options.strict or told.severity == "error" for told in open_ones) else 0
@@ -41,10 +44,12 @@ def _text(found: list[tuple[Told, str | None]], form: str) -> str:
 
     if form == "sarif":
         from enclave_launch import __version__
+        from enclave_launch.diagnostics import Code
         from enclave_launch.report.sarif import sarif_document
         from enclave_launch.review.checks import RULES
 
-        return json_text(sarif_document(found, RULES, __version__, os.getcwd()), indent=2) + "\n"
+        rules = {**{code.value: code.meaning for code in Code}, **RULES}
+        return json_text(sarif_document(found, rules, __version__, os.getcwd()), indent=2) + "\n"
     if form == "json":
         return json_text(findings_document(found), indent=2) + "\n"
     return findings_text(found)

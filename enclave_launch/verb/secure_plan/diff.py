@@ -2,6 +2,11 @@
 
   secure-plan diff before.json PACKAGE LAUNCH_FILE [name:=value ...]
   secure-plan diff before.json after.json --format markdown
+  secure-plan diff main: PACKAGE LAUNCH_FILE                 the same launch in a revision of its git repository
+  secure-plan diff v1.0:launch/robot.launch.xml launch/robot.launch.xml
+  secure-plan diff KEYSTORE PACKAGE LAUNCH_FILE              what a keystore has signed, and what the plan asks for
+
+Of another revision everything is taken that git has; packages that are installed elsewhere are taken as they are now.
 
 exit status: 0 no enclave may do more than before, 1 rights grew, 2 wrong usage
 """
@@ -9,14 +14,21 @@ exit status: 0 no enclave may do more than before, 1 rights grew, 2 wrong usage
 from __future__ import annotations
 
 import argparse
+import os
 import sys
+from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.verb.secure_plan.plans import WORDS, add_resolving_options, read_plan
 
+if TYPE_CHECKING:
+    from enclave_launch.review.document import PlanDocument
+
+BEFORE = "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("before", metavar="BEFORE", help="a saved plan (.json) or the PATH of a launch file")
+    parser.add_argument("before", metavar="BEFORE", help=BEFORE)
     parser.add_argument("words", nargs="+", metavar=WORDS, help="what it is compared with")
     add_resolving_options(parser)
     parser.add_argument("--format", choices=("text", "json", "markdown"), default="text")
@@ -25,12 +37,31 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
     from enclave_launch.review.changes import changes
-    from enclave_launch.review.document import plan_from_document
 
-    before = plan_from_document(read_plan([options.before], options))
-    changed = changes(before, plan_from_document(read_plan(options.words, options)))
+    changed = changes(*_both(options))
     if options.format == "json":
         sys.stdout.write(json_text(changes_document(changed), indent=2) + "\n")
     else:
         sys.stdout.write((changes_markdown if options.format == "markdown" else changes_text)(changed))
     return 1 if changed.rights_grew else 0
+
+
+def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument]:
+    from enclave_launch.review.document import plan_from_document
+    from enclave_launch.verb.secure_plan import revisions
+
+    after = plan_from_document(read_plan(options.words, options))
+    if os.path.isdir(options.before):
+        return _keystore_and(after, options.before)
+    if revisions.names_revision(options.before):
+        return plan_from_document(revisions.plan_before(options.before, options.words, options)), after
+    return plan_from_document(read_plan([options.before], options)), after
+
+
+def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:
+    """Enclaves of other launches in the keystore are none of this plan's business."""
+    from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
+    from enclave_launch.verb.secure_plan.keystores import signed_grants
+
+    signed = {path: grants for path, grants in signed_grants(keystore).items() if path in plan.enclaves}
+    return keystore_as_plan(signed, plan), plan_as_signed(plan)

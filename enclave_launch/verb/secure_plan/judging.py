@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN, endings, signed_grants
+
 if TYPE_CHECKING:
     from enclave_launch.review.document import Told
     from enclave_launch.review.expectations import Expectations
@@ -14,15 +16,32 @@ if TYPE_CHECKING:
 EXPECTATIONS = "enclaves.review.yaml"
 
 
-def judged(document: Mapping[str, Any], expect: Path | None) -> list[tuple[Told, str | None]]:
-    """Findings of the dry run's JSON ``document`` and of the rules in ``expect`` (default: ``EXPECTATIONS`` in the
-    working directory, if it is there). Raises ``UsageError`` for rules that are missing or not understood."""
+def judged(
+    document: Mapping[str, Any],
+    expect: Path | None,
+    keystore: Path | str | None = None,
+    within: str = DEFAULT_MARGIN,
+) -> list[tuple[Told, str | None]]:
+    """Findings of the dry run's JSON ``document``, of the rules in ``expect`` (default: ``EXPECTATIONS`` in the
+    working directory, if it is there), and of ``keystore``, where one is given; what ends ``within`` that time is one.
+
+    Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
+    """
     from enclave_launch.review.checks import check_plan
     from enclave_launch.review.expectations import rule_findings
 
     expected = expectations(expect)
     findings = [*check_plan(document), *rule_findings(document, expected.never)]
+    if keystore is not None:
+        findings += _of_keystore(document, keystore, within)
     return [(told, expected.reason_to_accept(told)) for told in findings]
+
+
+def _of_keystore(document: Mapping[str, Any], keystore: Path | str, within: str) -> list[Told]:
+    from enclave_launch.review.checks.keystore import against_keystore
+    from enclave_launch.review.document import plan_from_document
+
+    return against_keystore(plan_from_document(document), signed_grants(keystore), endings(keystore, within))
 
 
 def expectations(file: Path | None) -> Expectations:

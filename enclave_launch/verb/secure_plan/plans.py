@@ -38,6 +38,11 @@ def read_plan(words: Sequence[str], options: argparse.Namespace) -> Mapping[str,
     """
     if len(words) == 1 and words[0].endswith(".json"):
         return read_saved(Path(words[0]))
+    return plan_of(words, options)
+
+
+def plan_of(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
+    """The same for a launch file. Raises ``UsageError`` and what ``resolve`` raises."""
     from enclave_launch.flow import resolve
     from enclave_launch.report.plan_json import plan_document
     from enclave_launch.verb.secure_launch import resolve_options

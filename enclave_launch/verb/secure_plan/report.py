@@ -3,7 +3,8 @@
   secure-plan report PACKAGE LAUNCH_FILE -o report.html             one file; it needs no network
   secure-plan report plan.json --format mermaid                     the graph alone; or dot
 
-Findings are those of check, with what enclaves.review.yaml accepts. --keystore adds what ends when.
+Findings are those of check, with what enclaves.review.yaml accepts. --keystore adds where it differs
+and what ends when.
 """
 
 from __future__ import annotations
@@ -11,16 +12,14 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
+from enclave_launch.verb.secure_plan.keystores import endings
 from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
-
-if TYPE_CHECKING:
-    from enclave_launch.report.contents import Ending
 
 FORMATS = ("html", "markdown", "dot", "mermaid")
 
@@ -29,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_plan_arguments(parser)
     parser.add_argument("--format", choices=FORMATS, default="html")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
-    parser.add_argument("--keystore", metavar="DIR", type=Path, help="tell what of it ends when")
+    parser.add_argument("--keystore", metavar="DIR", type=Path, help="tell what of it differs, and ends when")
     parser.add_argument("--expect", type=Path, metavar="FILE", help=f"default: {EXPECTATIONS}, if it exists")
 
 
@@ -67,9 +66,9 @@ def report_text(
         return (diagrams.dot if form == "dot" else diagrams.mermaid)(plan_graph(document))
     from enclave_launch.report.contents import report_contents
 
-    endings = tuple(_endings(keystore)) if keystore is not None else None
-    found = judged(document, expect)
-    contents = report_contents(document, found, title=title, root=os.getcwd(), endings=endings)
+    ends = endings(keystore) if keystore is not None else None
+    found = judged(document, expect, keystore)
+    contents = report_contents(document, found, title=title, root=os.getcwd(), endings=ends)
     if form == "markdown":
         from enclave_launch.report.markdown import markdown_report
 
@@ -77,18 +76,3 @@ def report_text(
     from enclave_launch.report.html.page import html_report
 
     return html_report(contents)
-
-
-def _endings(keystore: Path | str) -> Iterator[Ending]:
-    from enclave_launch.errors import ProvisionError
-    from enclave_launch.report.contents import Ending
-    from keystore.errors import KeystoreError
-    from keystore.formats.validity import iso
-    from keystore.steps.expiry import status
-
-    try:
-        report = status(keystore)
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
-    for one in report.expiries:
-        yield Ending(one.subject, iso(one.not_after), (one.not_after - report.now).days)

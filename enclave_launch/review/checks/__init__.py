@@ -1,0 +1,37 @@
+"""Checks of a plan beyond what planning itself tells. Pure; each check is one function from a plan to findings.
+
+rules.py       what each code means
+meetings.py    names, types and QoS of which two ends should meet and do not
+enclaves.py    what an enclave holds: wildcards, sharing, permissions that nobody asks for, one name for two nodes
+launched.py    what the launch file gives to its processes: remap rules, parameters, secrets, security variables
+keystore.py    a plan held against what a keystore has signed
+
+A finding has a stable code, a place where there is one, and what to do next.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from enclave_launch.review.checks import enclaves, launched, meetings
+from enclave_launch.review.checks.rules import RULES
+from enclave_launch.review.document import Told, plan_from_document
+
+__all__ = ["RULES", "check_plan"]
+
+
+def check_plan(document: Mapping[str, Any]) -> list[Told]:
+    """All findings of the dry run's JSON ``document``: what planning told first, then each check's, sorted."""
+    plan = plan_from_document(document)
+    own = (
+        told
+        for room in (meetings, enclaves, launched)
+        for check in room.CHECKS
+        for told in check(plan, document)
+    )
+    return [*plan.told, *sorted(own, key=_order)]
+
+
+def _order(told: Told) -> tuple[str, str, str, str, int]:
+    return told.severity, told.code, told.subject, told.file or "", told.line

@@ -1,0 +1,66 @@
+"""What enclaves hold: more than their nodes ask for, and more than one node should. Pure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from enclave_launch.review.checks.rules import finding
+from enclave_launch.review.document import Grant, PlanDocument, Told
+from enclave_launch.review.similarity import splits
+
+_NAMED = 3  # permissions that a node gains, by name; the rest is counted
+
+
+def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+    for name, count in sorted(Counter(node.fqn for node in plan.nodes).items()):
+        if count > 1:
+            text = f"{count} nodes are called {name}"
+            yield finding("node-name-twice", name, text, "give each a name of its own")
+
+
+def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+    for enclave, grants in sorted(plan.enclaves.items()):
+        for grant in sorted(grants):
+            if any(character in grant.name for character in "*?["):
+                yield finding(
+                    "wildcard",
+                    grant.name,
+                    f"enclave {enclave} may {grant}",
+                    "name what is meant, or accept it with the reason why that is not possible",
+                )
+
+
+def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+    for split in splits(plan):
+        gains = "; ".join(f"{node} gains {_some(grants)}" for node, grants in split.saved)
+        yield finding(
+            "enclave-shared",
+            split.enclave,
+            f"{len(plan.nodes_of(split.enclave))} nodes share enclave {split.enclave}: {gains}",
+            "give them enclaves of their own (enclave=, --enclave-scope node); secure-plan suggest shows all",
+        )
+
+
+def _some(grants: tuple[Grant, ...]) -> str:
+    named = ", ".join(map(str, grants[:_NAMED]))
+    return f"{named} and {len(grants) - _NAMED} more" if len(grants) > _NAMED else named
+
+
+def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+    """Of enclaves whose every program is known: a policy file may speak for what nobody else describes."""
+    for enclave, grants in sorted(plan.enclaves.items()):
+        nodes = plan.nodes_of(enclave)
+        if not nodes or document["enclaves"][enclave].get("permissions_unknown"):
+            continue
+        for grant in sorted(grants - frozenset[Grant]().union(*(node.grants for node in nodes))):
+            yield finding(
+                "permission-unasked",
+                enclave,
+                f"enclave {enclave} may {grant}, and no node of it asks for that",
+                "take it out of the policy file, or describe who needs it",
+            )
+
+
+CHECKS = (names_twice, wildcards, shared, unasked)

@@ -1,0 +1,72 @@
+"""A plan held against a keystore: what is missing there, granted beyond it or less, and what ends. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import NamedTuple
+
+from enclave_launch.review.checks.rules import finding
+from enclave_launch.review.document import Grant, PlanDocument, Told
+from enclave_launch.review.signed import as_signed
+
+_NAMED = 4
+_PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
+
+
+class Ending(NamedTuple):
+    """Something of the keystore that ends: ``enclave`` is ``None`` for what all share. ``ends`` as ISO 8601,
+    ``days_left`` negative when it has ended."""
+
+    subject: str
+    enclave: str | None
+    ends: str
+    days_left: int
+
+
+def against_keystore(
+    plan: PlanDocument, signed: Mapping[str, frozenset[Grant]], endings: Iterable[Ending]
+) -> list[Told]:
+    """``endings``: what is due, of the whole keystore; what belongs to enclaves of other plans is left out."""
+    found = [told for enclave in sorted(plan.enclaves) for told in _enclave(plan, enclave, signed)]
+    return [*found, *_expiring(plan, endings)]
+
+
+def _enclave(plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[Grant]]) -> Iterator[Told]:
+    if enclave not in signed:
+        yield finding(
+            "keystore-enclave-missing",
+            enclave,
+            f"the keystore has no permissions for enclave {enclave}",
+            _PROVISION,
+        )
+        return
+    wanted = as_signed(plan.enclaves[enclave])
+    for code, grants, words in (
+        ("keystore-grants-more", signed[enclave] - wanted, "beyond the plan the keystore lets"),
+        ("keystore-grants-less", wanted - signed[enclave], "the keystore does not let"),
+    ):
+        if grants:
+            text = f"{words} enclave {enclave} {_some(sorted(grants))}"
+            yield finding(code, enclave, text, f"{_PROVISION}; secure-plan diff KEYSTORE ... shows all")
+
+
+def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[Told]:
+    for one in endings:
+        if one.enclave is None or one.enclave in plan.enclaves:
+            when = (
+                f"ended on {one.ends}"
+                if one.days_left < 0
+                else f"ends on {one.ends}, in {one.days_left} days"
+            )
+            told = finding(
+                "keystore-expires",
+                one.enclave or one.subject,
+                f"{one.subject} {when}",
+                "secure-keystore renew",
+            )
+            yield told._replace(severity="error") if one.days_left < 0 else told
+
+
+def _some(grants: list[Grant]) -> str:
+    named = ", ".join(map(str, grants[:_NAMED]))
+    return f"{named} and {len(grants) - _NAMED} more" if len(grants) > _NAMED else named

@@ -1,0 +1,135 @@
+"""What a launch file gives to its processes and components: rules, parameters, variables. Pure."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
+from enclave_launch.review.checks.rules import finding
+from enclave_launch.review.document import PlanDocument, Told
+
+Document = Mapping[str, Any]
+Item = Mapping[str, Any]
+
+_SECRET = re.compile(
+    r"(^|[._-])(pass(word|wd|phrase)?|pwd|secrets?|(access|auth|bearer|api|refresh)?[._-]?token|credentials?"
+    r"|(api|access|private|secret)[._-]?key)$",
+    re.IGNORECASE,
+)
+_CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
+_OF_EVERY_NODE = re.compile(
+    r"use_sim_time$|start_type_description_service$|qos_overrides\.|.*/qos_overrides\."
+)
+"""Parameters that client libraries declare themselves (rclcpp TimeSource, node_type_descriptions, qos_overriding)."""
+
+
+def remaps(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """A rule counts as used when any node that gets it has a name that it changes. Where it goes to a program of which
+    something is not known it may be of use there."""
+    used, unknown = _used_rules(document), _not_wholly_known(document)
+    dead: dict[tuple[str, str], Item] = {}
+    alive: set[tuple[str, str]] = set()
+    for item in launched(document):
+        for source, target in item["remaps"]:
+            rule = (source, target)
+            if f"{source}:={target}" in used.get(_key(item), ()) or _key(item) in unknown or source == target:
+                alive.add(rule)
+            dead.setdefault(rule, item)
+    for rule, item in sorted(dead.items(), key=lambda each: each[0]):
+        if rule not in alive:
+            yield finding(
+                "remap-dead",
+                _subject(item),
+                f"the rule {rule[0]} -> {rule[1]} changes no name of {_subject(item)}",
+                "look for a slip in the name, or remove the rule",
+                _place(item),
+            )
+
+
+def _used_rules(document: Document) -> dict[tuple[str, str | None], set[str]]:
+    """Program and enclave -> the texts of rules that changed a name of a node of it."""
+    found: dict[tuple[str, str | None], set[str]] = {}
+    for node in document["nodes"]:
+        texts = found.setdefault((node["program"], node["enclave"]), set())
+        for interface in node["interfaces"]:
+            for text in interface["remapped_by"]:
+                rule = text.partition(" at ")[0]
+                texts.update((rule, rule.partition(":")[2] if rule.count(":") > 1 else rule))
+    return found
+
+
+def _not_wholly_known(document: Document) -> set[tuple[str, str | None]]:
+    """Programs of which nothing is known, and those of nodes with gaps."""
+    described = {(node["program"], node["enclave"]) for node in document["nodes"]}
+    gaps = {told["subject"] for told in document["diagnostics"] if told["code"] == "interface-unknown"}
+    doubtful = {(node["program"], node["enclave"]) for node in document["nodes"] if node["fqn"] in gaps}
+    return doubtful | {_key(item) for item in launched(document)} - described
+
+
+def parameters(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """Where the description of every node of the program says what it declares."""
+    declared: dict[tuple[str, str | None], list[list[str] | None]] = {}
+    for node in document["nodes"]:
+        declared.setdefault((node["program"], node["enclave"]), []).append(node.get("parameters"))
+    for item in launched(document):
+        known = declared.get(_key(item), [])
+        if not known or any(names is None for names in known):
+            continue
+        names = {name for some in known for name in some or ()}
+        for parameter in sorted(item["parameters"]):
+            if parameter not in names and not _OF_EVERY_NODE.match(parameter):
+                yield finding(
+                    "parameter-unknown",
+                    _subject(item),
+                    f"{_subject(item)} is given parameter {parameter}, which it does not declare",
+                    "look for a slip in the name; rcl passes over what is not declared",
+                    _place(item),
+                )
+
+
+def security_variables(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    for process in document["processes"]:
+        for name, value in sorted(process["environment"].items()):
+            if name.startswith("ROS_SECURITY_"):
+                yield finding(
+                    "security-variable-set",
+                    _subject(process),
+                    f"the launch file sets {name}={value}",
+                    "leave it to --secure",
+                    _place(process),
+                )
+
+
+def secrets(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    for item in launched(document):
+        for name, value in sorted(item["parameters"].items()):
+            if _SECRET.search(_CAMEL.sub("_", name)) and isinstance(value, str) and value:
+                yield finding(
+                    "secret-in-parameters",
+                    _subject(item),
+                    f"parameter {name} holds what looks like a secret",
+                    "let the node read it from a file or variable that only it can read",
+                    _place(item),
+                )
+
+
+def launched(document: Document) -> tuple[Item, ...]:
+    """Processes and components."""
+    return (*document["processes"], *document["components"])
+
+
+def _key(item: Item) -> tuple[str, str | None]:
+    return f"{item.get('package')}/{item.get('executable') or item.get('plugin')}", item.get("enclave")
+
+
+def _subject(item: Item) -> str:
+    return str(item["fqn"] or item.get("executable", "")).replace(UNSPECIFIED_NODE_NAMESPACE, "")
+
+
+def _place(item: Item) -> tuple[str | None, int]:
+    return item["launch_file"], item["line"]
+
+
+CHECKS = (remaps, parameters, security_variables, secrets)

@@ -1,0 +1,196 @@
+"""Ends that should meet: topics, services and actions whose other end is missing, misspelt or of another kind. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from itertools import combinations, product
+from typing import Any, NamedTuple
+
+from enclave_launch.review.checks.rules import finding
+from enclave_launch.review.document import Grant, Operation, PlanDocument, Told
+from keystore.formats.permissions_patterns import can_meet
+from nodl.graph.quality import INFINITE, Quality, unmet
+
+Document = Mapping[str, Any]
+
+_ENDS: tuple[tuple[Operation, Operation, str, str], ...] = (
+    ("subscribe", "publish", "no-publisher", "publishes"),
+    ("publish", "subscribe", "no-subscriber", "subscribes"),
+    ("call_services", "serve_services", "no-server", "serves"),
+    ("call_actions", "serve_actions", "no-server", "serves"),
+)
+_PAIRS: tuple[tuple[Operation, Operation], ...] = (
+    ("publish", "subscribe"),
+    ("serve_services", "call_services"),
+    ("serve_actions", "call_actions"),
+)
+_KINDS: Mapping[str, str] = {
+    "publish": "topic",
+    "subscribe": "topic",
+    "call_services": "service",
+    "serve_services": "service",
+    "call_actions": "action",
+    "serve_actions": "action",
+}
+_SHORTEST = 6  # letters of a name of which one edit is taken for a slip
+
+
+class _User(NamedTuple):
+    """A node that uses a name, and where its description says so."""
+
+    node: str
+    interface: Mapping[str, Any]
+
+
+_Users = Mapping[tuple[str, str], list[_User]]
+
+
+def missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """Only what nodes ask for themselves; what runs outside of this launch is not known here."""
+    asked, users = _asked_for(plan), _users(document)
+    everywhere: dict[Operation, set[str]] = {}
+    for grant in frozenset[Grant]().union(*plan.enclaves.values()):
+        everywhere.setdefault(grant.operation, set()).add(grant.name)
+    for here, there, code, verb in _ENDS:
+        others = everywhere.get(there, set())
+        patterns = {name for name in others if any(character in name for character in "*?[")}
+        for name in sorted(asked.get(here, ())):
+            candidates = others if any(character in name for character in "*?[") else patterns
+            if name not in others and not any(can_meet(name, other) for other in candidates):
+                who = sorted({user.node for user in users.get((here, name), ())})
+                yield finding(
+                    code,
+                    name,
+                    f"nothing in this plan {verb} {name}, which {' and '.join(who)} use{'' if len(who) > 1 else 's'}",
+                    "look for a slip in the name, or accept it if the other end runs elsewhere",
+                    _first_place(users.get((here, name), ())),
+                )
+
+
+def near_names(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    asked, users = _asked_for(plan), _users(document)
+    for here, there in _PAIRS:
+        lonely_here = asked.get(here, set()) - asked.get(there, set())
+        lonely_there = asked.get(there, set()) - asked.get(here, set())
+        for one, two in product(sorted(lonely_here), sorted(lonely_there)):
+            if _nearly(one, two):
+                yield finding(
+                    "nearly-the-same-name",
+                    one,
+                    f"{one} ({here.replace('_', ' ')}) and {two} ({there.replace('_', ' ')}) never meet and "
+                    "are nearly the same",
+                    "if they are meant to be one, write or remap both alike",
+                    _first_place(users.get((here, one), ())),
+                )
+
+
+def _nearly(one: str, two: str) -> bool:
+    """One edit apart, or the same but for slashes and capitals; digits count as different on purpose."""
+    plain_one, plain_two = (name.replace("/", "").replace("_", "").lower() for name in (one, two))
+    if plain_one == plain_two:
+        return True
+    if len(one) < _SHORTEST or abs(len(one) - len(two)) > 1 or _digits(one) != _digits(two):
+        return False
+    return _one_edit(one, two)
+
+
+def _digits(name: str) -> str:
+    return "".join(character for character in name if character.isdigit())
+
+
+def _one_edit(one: str, two: str) -> bool:
+    short, long = sorted((one, two), key=len)
+    for index, character in enumerate(short):
+        if character != long[index]:
+            rest = short[index + 1 :] if len(short) == len(long) else short[index:]
+            return rest == long[index + 1 :]
+    return len(long) - len(short) <= 1
+
+
+def types(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    found: dict[tuple[str, str], dict[str, list[_User]]] = {}
+    for (operation, name), users in _users(document).items():
+        for user in users:
+            if user.interface["type"] and "*" not in name:
+                by_type = found.setdefault((_KINDS[operation], name), {})
+                by_type.setdefault(user.interface["type"], []).append(user)
+    for (kind, name), by_type in sorted(found.items()):
+        for one, two in combinations(sorted(by_type), 2):
+            yield finding(
+                "types-differ",
+                name,
+                f"{kind} {name} is {one} for {_nodes(by_type[one])} and {two} for {_nodes(by_type[two])}",
+                "they never match: correct one of them",
+                _first_place(by_type[two]),
+            )
+
+
+def qos(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """Where both descriptions say what they offer and ask for; what they leave open is not judged."""
+    users = _users(document)
+    for (operation, name), publishers in sorted(users.items(), key=lambda item: item[0]):
+        if operation != "publish":
+            continue
+        for publisher, subscriber in product(publishers, users.get(("subscribe", name), ())):
+            why = _unmet(publisher.interface.get("qos", {}), subscriber.interface.get("qos", {}))
+            if why:
+                yield finding(
+                    "qos-differs",
+                    name,
+                    f"{subscriber.node} gets nothing of {name} from {publisher.node}: {'; '.join(why)}",
+                    "let the publisher offer it, or the subscription ask for less",
+                    _place(subscriber.interface["place"]),
+                )
+
+
+def _unmet(offered: Mapping[str, Any], requested: Mapping[str, Any]) -> tuple[str, ...]:
+    return unmet(_quality(offered, requested), _quality(requested, offered))
+
+
+def _quality(qos: Mapping[str, Any], other: Mapping[str, Any]) -> Quality:
+    """Times only where both say one; 0 is rmw's word for none."""
+
+    def time(key: str) -> int:
+        return (qos[key] or INFINITE) if key in qos and key in other else INFINITE
+
+    return Quality(
+        reliability=qos.get("reliability", ""),
+        durability=qos.get("durability", ""),
+        deadline=time("deadline_ns"),
+        liveliness=qos.get("liveliness", ""),
+        lease=time("liveliness_lease_duration_ns"),
+    )
+
+
+def _asked_for(plan: PlanDocument) -> dict[str, set[str]]:
+    asked: dict[str, set[str]] = {}
+    for node in plan.nodes:
+        for grant in node.own:
+            asked.setdefault(grant.operation, set()).add(grant.name)
+    return asked
+
+
+def _users(document: Document) -> _Users:
+    found: dict[tuple[str, str], list[_User]] = {}
+    for node in document.get("nodes", ()):
+        for interface in node["interfaces"]:
+            found.setdefault((interface["operation"], interface["name"]), []).append(
+                _User(node["fqn"], interface)
+            )
+    return found
+
+
+def _nodes(users: list[_User]) -> str:
+    return ", ".join(sorted({user.node for user in users}))
+
+
+def _first_place(users: Any) -> tuple[str | None, int]:
+    return next((_place(user.interface["place"]) for user in users), (None, 0))
+
+
+def _place(text: str) -> tuple[str | None, int]:
+    file, colon, line = text.rpartition(":")
+    return (file, int(line)) if colon and line.isdigit() else (None, 0)
+
+
+CHECKS = (missing_ends, near_names, types, qos)

@@ -1,0 +1,47 @@
+"""What a keystore has signed, as a review sees it; and a plan's permissions as they would come back from being signed.
+
+DDS knows topics only: a service is two of them, an action eight. Read back, a topic that belongs to an action may count
+to it or stand alone, so both sides of a comparison go the same way through ``permissions_names``. Pure.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from enclave_launch.review.document import Grant, Operation, PlanDocument
+from keystore.formats.permissions_names import add_dds_topics, ros_rules
+from keystore.formats.policy import Operation as Rules
+from keystore.formats.policy import Rule
+
+_RULES: Mapping[Operation, Rules] = {
+    "publish": Rules.PUBLISH,
+    "subscribe": Rules.SUBSCRIBE,
+    "call_services": Rules.REQUEST,
+    "serve_services": Rules.REPLY,
+    "call_actions": Rules.CALL,
+    "serve_actions": Rules.EXECUTE,
+}
+_OPERATIONS: Mapping[Rules, Operation] = {rule: operation for operation, rule in _RULES.items()}
+
+
+def as_signed(grants: Iterable[Grant]) -> frozenset[Grant]:
+    """``grants`` through DDS topics and back."""
+    publish: set[str] = set()
+    subscribe: set[str] = set()
+    for grant in grants:
+        add_dds_topics(_RULES[grant.operation], grant.name, publish, subscribe)
+    return grants_of_rules(ros_rules(publish, subscribe)[0])
+
+
+def grants_of_rules(rules: Iterable[Rule]) -> frozenset[Grant]:
+    return frozenset(Grant(_OPERATIONS[rule.operation], rule.expression) for rule in rules)
+
+
+def plan_as_signed(plan: PlanDocument) -> PlanDocument:
+    """``plan`` with the permissions that would be read back from its keystore."""
+    return plan._replace(enclaves={path: as_signed(grants) for path, grants in plan.enclaves.items()})
+
+
+def keystore_as_plan(signed: Mapping[str, frozenset[Grant]], plan: PlanDocument) -> PlanDocument:
+    """The keystore's enclaves with the nodes that ``plan`` has in them: a keystore knows no nodes."""
+    return PlanDocument(signed, tuple(node for node in plan.nodes if node.enclave in signed), ())

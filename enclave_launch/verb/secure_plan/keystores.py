@@ -1,0 +1,50 @@
+"""What the verbs ask of a keystore. Reads only; every error is a ``ProvisionError`` in the keystore's own words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from enclave_launch.review.checks.keystore import Ending
+    from enclave_launch.review.document import Grant
+
+DEFAULT_MARGIN = "30d"
+
+
+@contextmanager
+def keystore_errors() -> Iterator[None]:
+    """Raises ``ProvisionError`` in the place of a ``KeystoreError``."""
+    from enclave_launch.errors import ProvisionError
+    from keystore.errors import KeystoreError
+
+    try:
+        yield
+    except KeystoreError as error:
+        raise ProvisionError(str(error)) from error
+
+
+def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[Grant]]:
+    """Enclave -> what its signed permissions allow."""
+    from enclave_launch.review.signed import grants_of_rules
+    from keystore.steps.granted import granted
+
+    with keystore_errors():
+        return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}
+
+
+def endings(keystore: Path | str, within: str | None = None) -> tuple[Ending, ...]:
+    """All that ends, or what ends ``within`` a time such as ``30d``; the earliest first."""
+    from enclave_launch.review.checks.keystore import Ending
+    from keystore.formats.validity import iso, parse_duration
+    from keystore.steps.expiry import status
+
+    with keystore_errors():
+        report = status(keystore)
+        chosen = report.expiries if within is None else report.due(parse_duration(within))
+    return tuple(
+        Ending(one.subject, one.enclave, iso(one.not_after), (one.not_after - report.now).days)
+        for one in chosen
+    )
