@@ -114,7 +114,9 @@ class InterfaceFinder:
         name = subject.executable or subject.plugin or ""
         recorded = self._library.recorded(subject.package, name)
         if recorded:
-            return Found((recorded.document.interface,), InterfaceOrigin.RECORDED, recorded.doubt), False
+            interfaces = tuple(hit.document.interface for hit in recorded)
+            doubt = next((hit.doubt for hit in recorded if hit.doubt), "")
+            return Found(interfaces, InterfaceOrigin.RECORDED, doubt), False
         searched = ["looked at " + _shortly(manifest.searched)]
         analysed = self._inferred(subject, started)
         searched += [analysed.why] if analysed is not None and analysed.why else []

@@ -59,12 +59,13 @@ class LibraryAccess:
         version = package_version(package, self._prefixes)
         return self._library.find(package, name, distro=self._distro, version=version)
 
-    def recorded(self, package: str | None, name: str) -> Hit | None:
-        """A document that the user recorded and keeps in a folder of ``--library``. Raises as ``find``."""
-        if not self._folders:
-            return None
-        hit = self.find(package, name)
-        return hit if hit and hit.document.recorded else None
+    def recorded(self, package: str | None, name: str) -> tuple[Hit, ...]:
+        """Documents that the user recorded and keeps in a folder of ``--library``, one for each node of the program.
+        Raises as ``find``."""
+        if not self._folders or package is None:
+            return ()
+        version = package_version(package, self._prefixes)
+        return self._library.recorded(package, name, distro=self._distro, version=version)
 
     def complete(
         self,

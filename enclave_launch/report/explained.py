@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.explanation import explain
+from enclave_launch.report.tree import origin_text
 from enclave_launch.report.unknown import UNKNOWN, is_unknown, label, unknown_by_enclave
 
 
@@ -16,6 +17,8 @@ def explained(plan: LaunchPlan, subject: str) -> list[str]:
     lines += [line for item in unknown_by_enclave(plan).get(path, ()) for line in _unknown(item)]
     planned: list[PlannedProcess | PlannedComponent] = [*plan.processes, *plan.components]
     for item in planned:
+        if path in {node.fqn for node in item.nodes} and item.origin:
+            lines.append(f"  interfaces of {label(item)}: {origin_text(item)}")
         if subject.strip("[]") == label(item) or (is_unknown(item) and path == item.fqn):
             lines += _of_process(plan, item)
     return lines

@@ -67,7 +67,7 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     names = shown_fqn(item)
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
-    source = f", {_origin(item)}" if item.origin not in (None, InterfaceOrigin.PACKAGE) else ""
+    source = f", {origin_text(item)}" if _is_worth_a_word(item) else ""
     place = _place(process.location, plan.launch_file)
     also = f", behind {shlex.join(process.prefix)}" if process.prefix else ""
     also += f", domain {item.domain}" if item.domain else ""
@@ -87,11 +87,17 @@ def _place(location: SourceLocation, launch_file: str) -> str:
 
 
 def _component(item: PlannedComponent) -> str:
-    unknown = f"  ({UNKNOWN})" if item.missing else ""
-    return f"component {item.component.package} {item.component.plugin} as {item.fqn}{unknown}"
+    told = UNKNOWN if item.missing else origin_text(item) if _is_worth_a_word(item) else ""
+    component = f"component {item.component.package} {item.component.plugin} as {item.fqn}"
+    return f"{component}  ({told})" if told else component
 
 
-def _origin(item: PlannedProcess | PlannedComponent) -> str:
+def _is_worth_a_word(item: PlannedProcess | PlannedComponent) -> bool:
+    """The package's own manifest is what one expects."""
+    return item.origin not in (None, InterfaceOrigin.PACKAGE)
+
+
+def origin_text(item: PlannedProcess | PlannedComponent) -> str:
     """Where its interfaces come from, with the document of the library."""
     if item.origin is InterfaceOrigin.LIBRARY and item.nodes:
         file = item.nodes[0].interface.source.file

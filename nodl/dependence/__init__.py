@@ -85,13 +85,16 @@ class PluginList(NamedTuple):
 class Transport(NamedTuple):
     """A base topic of image_transport: each installed transport adds names below it.
 
-    ``side`` is ``publishers`` or ``subscriptions``; a subscription uses one transport, that of ``parameter``.
+    ``side`` is ``publishers`` or ``subscriptions``. With ``parameter`` it is the one transport that this names; a
+    subscription uses one only.
+    ``each`` as of a ``Variation``: one base topic for each entry.
     """
 
     side: str
     base: str
     parameter: str = ""
     when: When = When()
+    each: str = ""
 
 
 class Configuration(NamedTuple):

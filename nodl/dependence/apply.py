@@ -98,7 +98,8 @@ class _Application:
         for plugins in depends.plugins:
             self._load(plugins, scope, interface, depth)
         for transport in depends.transports:
-            self._transport(transport, scope, interface, notes)
+            for item in _repeated(transport.each, scope):
+                self._transport(transport, item, scope, interface, notes)
         for node in depends.nodes:
             self._further(node, scope, interface)
         for configuration in depends.configurations:
@@ -161,24 +162,20 @@ class _Application:
         return (item for item in self._situation.launched.spawned if item.manager == manager)
 
     def _transport(
-        self, transport: Transport, scope: Scope, by: NodeInterface, notes: tuple[str, ...]
+        self, transport: Transport, item: str, scope: Scope, by: NodeInterface, notes: tuple[str, ...]
     ) -> None:
-        if not scope.holds(transport.when):
+        if not scope.holds(transport.when, item):
             return
-        base = scope.fill(transport.base)
+        base = scope.fill(transport.base, item)
         name = base.text
         if not name:
             return
-        wanted = scope.value(f"{name.lstrip('~/').replace('/', '.')}.enable_pub_plugins")
         chosen = scope.value(transport.parameter) if transport.parameter else None
         for short, package, described in self._documents.transports():
-            if transport.side == "publishers":
-                enabled = wanted is None or any(
-                    short in (entry.rpartition("/")[2], entry) for entry in map(str, _sequence(wanted.value))
-                )
-                if not enabled or not self._is_installed(package):
+            if transport.parameter or transport.side == "subscriptions":
+                if chosen is None or str(chosen.value) != short:
                     continue
-            elif chosen is None or str(chosen.value) != short:
+            elif not (self._is_enabled(short, name, scope) and self._is_installed(package)):
                 continue
             kind = EndpointKind.PUBLISHER if transport.side == "publishers" else EndpointKind.SUBSCRIPTION
             for endpoint in described.endpoints:
@@ -187,6 +184,13 @@ class _Application:
                 self.endpoints.append(
                     endpoint._replace(kind=kind, name=NameTemplate.literal(full), source=by.source, note=note)
                 )
+
+    @staticmethod
+    def _is_enabled(transport: str, base: str, scope: Scope) -> bool:
+        wanted = scope.value(f"{base.lstrip('~/').replace('/', '.')}.enable_pub_plugins")
+        return wanted is None or any(
+            transport in (entry.rpartition("/")[2], entry) for entry in map(str, _sequence(wanted.value))
+        )
 
     def _is_installed(self, package: str) -> bool:
         return self._situation.installed is not None and package in self._situation.installed

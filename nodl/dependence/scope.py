@@ -24,6 +24,7 @@ from nodl.name_template import NameTemplate, Part, UnknownPart
 
 _REFERENCE = re.compile(r"\$\(([a-z_]+)(?: ([^()]*))?\)")
 _ARGUMENTS = "arguments "
+_ARGUMENT = "argument "
 _HELD = re.compile("\x00([0-9]+)\x00")
 
 
@@ -101,9 +102,12 @@ class Scope:
             yield from _entries(value.value)
 
     def value(self, name: str, default: object = None) -> Value | None:
-        """Of a parameter, or of an option when ``name`` begins with ``--``."""
+        """Of a parameter; of an option when ``name`` begins with ``--``, of a word of the command line when it is
+        ``argument N``."""
         if name.startswith("--"):
             return self.option(name[2:], default)
+        if name.startswith(_ARGUMENT):
+            return self.argument(name.removeprefix(_ARGUMENT), default)
         if name in self.situation.parameters:
             return Value(self.situation.parameters[name], f"parameter {name}, set by launch")
         if default is None:
@@ -128,13 +132,8 @@ class Scope:
 
     def _passes(self, test: Test, item: str) -> bool:
         name = self._plain(test.parameter).replace("$(item)", item)
-        found: Value | None
-        if name == "words":
-            found = Value(self.situation.words, "the command line")
-        elif name.startswith("argument "):
-            found = self.argument(name.removeprefix("argument "))
-        else:
-            found = self.value(name)
+        words = Value(self.situation.words, "the command line")
+        found = words if name == "words" else self.value(name)
         return self._meets(test, None if found is None else found.value) is not test.negated
 
     @staticmethod

@@ -74,7 +74,7 @@ _PLUGINS = map_of(
     required=("parameter",),
 )
 _TRANSPORT = map_of(
-    {"side": one_of(*_SIDES), "base": text_of(), "parameter": text_of(), **_CONDITION},
+    {"side": one_of(*_SIDES), "base": text_of(), "parameter": text_of(), "each": text_of(), **_CONDITION},
     required=("side", "base"),
 )
 _CONFIGURATION = map_of(
@@ -170,8 +170,8 @@ def dependence_of(root: YamlMap) -> Dependence | None:
         ),
         plugins=tuple(_plugins(each) for each in _maps(given, "plugins")),
         transports=tuple(
-            Transport(each["side"], each["base"], each.get("parameter", ""), _when(each))
-            for each in _maps(given, "transports")
+            Transport(e["side"], e["base"], e.get("parameter", ""), _when(e), e.get("each", ""))
+            for e in _maps(given, "transports")
         ),
         configurations=tuple(
             Configuration(each["kind"], each.get("file", ""), each.get("document", ""), _when(each))

@@ -35,7 +35,7 @@ class Library:
                 raise NoDLError(f"--library {folder}: no such directory")
         self._shipped = shipped
         self._indexes: dict[str, tuple[IndexEntry, ...]] = {}
-        self._documents: dict[str, LibraryDocument] = {}
+        self._documents: dict[tuple[str, str], LibraryDocument] = {}
 
     def find(self, package: str, name: str, *, distro: str = "", version: str | None = None) -> Hit | None:
         """The document of executable or plugin ``name``. ``version``: of the installed package, if known.
@@ -47,6 +47,16 @@ class Library:
             if entries:
                 return self._chosen(folder, entries, distro, version)
         return None
+
+    def recorded(self, package: str, name: str, *, distro: str, version: str | None) -> tuple[Hit, ...]:
+        """What the user recorded of a program, one document for each of its nodes. Raises as ``find``."""
+        for folder in self._folders:
+            entries = [e for e in self._entries(folder) if e.package == package and name in e.programs]
+            hits = (self._chosen(folder, [entry], distro, version) for entry in entries)
+            found = tuple(hit for hit in hits if hit.document.recorded)
+            if found:
+                return found
+        return ()
 
     def of_class(self, plugin_class: str, *, distro: str = "") -> Hit | None:
         """The document of a plugin, by the name of its class as launch files give it."""
@@ -70,18 +80,18 @@ class Library:
         for folder in self._all():
             for entry in self._entries(folder):
                 if entry.transport and entry.transport not in found:
-                    interface = read_library_document(os.path.join(folder, entry.file)).interface
+                    interface = read_library_document(folder, entry.file).interface
                     found[entry.transport] = (entry.transport, entry.package, interface)
         return tuple(found.values())
 
     def documents(self) -> Iterator[LibraryDocument]:
         """All of them, each package and name once, sorted."""
-        seen: dict[str, str] = {}
+        seen: dict[str, tuple[str, str]] = {}
         for folder in self._all():
             for entry in self._entries(folder):
-                seen.setdefault(entry.file, os.path.join(folder, entry.file))
-        for file in sorted(seen):
-            yield read_library_document(seen[file])
+                seen.setdefault(entry.stem, (folder, entry.file))
+        for stem in sorted(seen):
+            yield read_library_document(*seen[stem])
 
     def _all(self) -> Sequence[str]:
         return [*self._folders, *([self._shipped] if self._shipped else [])]
@@ -94,10 +104,10 @@ class Library:
     def _chosen(self, folder: str, entries: Sequence[IndexEntry], distro: str, version: str | None) -> Hit:
         """The entry for this version, else the last, with a doubt that names both."""
         fitting = [entry for entry in entries if fits(entry.versions, distro, version)]
-        path = os.path.join(folder, (fitting or entries)[-1].file)
-        if path not in self._documents:
-            self._documents[path] = read_library_document(path)
-        document = self._documents[path]
+        file = (fitting or entries)[-1].file
+        if (folder, file) not in self._documents:
+            self._documents[folder, file] = read_library_document(folder, file)
+        document = self._documents[folder, file]
         return Hit(document, "" if fitting else _doubt(document, distro, version))
 
 

@@ -22,13 +22,15 @@ _MOST = 10_000
 
 
 class Verdict(NamedTuple):
-    """``only_document`` and ``only_source``: names that the other side does not have. ``why``: the document's words
-    for it; ``not_compared``: why there was nothing to compare with."""
+    """``only_document`` and ``only_source``: names that the other side does not have; ``not_compared``: why there was
+    nothing to compare with. ``version``: of the package whose source was read."""
 
     document: LibraryDocument
     only_document: tuple[str, ...] = ()
     only_source: tuple[str, ...] = ()
     not_compared: str = ""
+    version: str | None = None
+    of_other_version: bool = False
 
     @property
     def agrees(self) -> bool:
@@ -38,6 +40,13 @@ class Verdict(NamedTuple):
     def is_wrong(self) -> bool:
         """They differ, and the document does not say why."""
         return bool(self.only_document or self.only_source) and not self.document.evidence.differs
+
+    @property
+    def in_short(self) -> str:
+        """For a table."""
+        if self.not_compared:
+            return self.not_compared.partition(",")[0]
+        return "agrees" if self.agrees else "differs" if self.is_wrong else "differs, explained"
 
     def __str__(self) -> str:
         if self.not_compared:
@@ -68,11 +77,12 @@ def check(library: Library, folder: str) -> list[Verdict]:
             continue
         version = package_file_version(os.path.join(source, "package.xml"))
         if not fits(document.versions, "", version):
-            verdicts.append(Verdict(document, not_compared=f"these sources are of version {version}"))
+            reason = f"these sources are of version {version}"
+            verdicts.append(Verdict(document, not_compared=reason, version=version, of_other_version=True))
             continue
         if document.package not in inferred:
             inferred[document.package] = infer_paths([source]).nodes
-        verdicts.append(compare(document, inferred[document.package], library))
+        verdicts.append(compare(document, inferred[document.package], library)._replace(version=version))
     return verdicts
 
 

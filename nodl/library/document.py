@@ -45,10 +45,17 @@ class LibraryDocument(NamedTuple):
         return self.stem.partition("/")[0]
 
 
-def read_library_document(path: str) -> LibraryDocument:
-    """The document at ``.../PACKAGE/NAME.nodl.yaml``. Raises ``InvalidNoDLError``."""
-    package = os.path.basename(os.path.dirname(path))
-    name = os.path.basename(path).removesuffix(SUFFIX)
+def stem_of(file: str) -> str:
+    """``PACKAGE/NAME`` of a file of a library: ``PACKAGE/NAME.nodl.yaml``, or ``PACKAGE__NAME.nodl.yaml``."""
+    name = file.removesuffix(SUFFIX)
+    return name if "/" in name else name.replace("__", "/", 1)
+
+
+def read_library_document(folder: str, file: str) -> LibraryDocument:
+    """The document ``file`` of the library in ``folder``. Raises ``InvalidNoDLError``."""
+    path = os.path.join(folder, file)
+    stem = stem_of(file)
+    package, _, name = stem.partition("/")
     root = read_root(path)
     section = section_of(root)
     given = plain(section) if section else {}
@@ -58,7 +65,7 @@ def read_library_document(path: str) -> LibraryDocument:
     programs = () if classes or given.get("transport") else (node.executable, node.plugin)
     return LibraryDocument(
         interface=node,
-        stem=f"{package}/{name}",
+        stem=stem,
         file=path,
         programs=(*(each for each in programs if each), *(given.get("also") or ())),
         classes=classes,

@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from nodl.library.document import SUFFIX, LibraryDocument, read_library_document
+from nodl.library.document import SUFFIX, LibraryDocument, read_library_document, stem_of
 
 INDEX = "index.json"
 
@@ -27,11 +27,11 @@ class IndexEntry(NamedTuple):
 
     @property
     def package(self) -> str:
-        return self.file.partition("/")[0]
+        return self.stem.partition("/")[0]
 
     @property
     def stem(self) -> str:
-        return self.file.removesuffix(SUFFIX)
+        return stem_of(self.file)
 
 
 def read_index(folder: str) -> tuple[IndexEntry, ...]:
@@ -51,7 +51,7 @@ def read_index(folder: str) -> tuple[IndexEntry, ...]:
 
 def scanned(folder: str) -> tuple[IndexEntry, ...]:
     """The entries of all documents below ``folder``. Raises ``InvalidNoDLError`` for a broken one."""
-    return tuple(_entry(folder, read_library_document(path)) for path in _files(folder))
+    return tuple(_entry(folder, read_library_document(folder, file)) for file in _files(folder))
 
 
 def index_text(folder: str) -> str:
@@ -76,12 +76,13 @@ def _entry(folder: str, document: LibraryDocument) -> IndexEntry:
 
 
 def _files(folder: str) -> Iterator[str]:
-    for package in sorted(os.listdir(folder)):
-        inside = os.path.join(folder, package)
+    """``PACKAGE/NAME.nodl.yaml``, and ``PACKAGE__NAME.nodl.yaml`` as ``--learn`` writes them."""
+    for name in sorted(os.listdir(folder)):
+        inside = os.path.join(folder, name)
         if os.path.isdir(inside):
-            yield from (
-                os.path.join(inside, name) for name in sorted(os.listdir(inside)) if name.endswith(SUFFIX)
-            )
+            yield from (f"{name}/{each}" for each in sorted(os.listdir(inside)) if each.endswith(SUFFIX))
+        elif name.endswith(SUFFIX) and "__" in name:
+            yield name
 
 
 def write_index(folder: str) -> None:

@@ -33,7 +33,12 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         add_prefix_argument(action)
     checking = actions.add_parser("check", help="hold the documents against sources in a folder")
     checking.add_argument("sources", metavar="DIR", help="a folder with packages, such as a workspace's src")
+    checking.add_argument(
+        "--keep", action="store_true", help="note the verdicts beside the shipped documents (for its keepers)"
+    )
     checking.set_defaults(run=_check)
+    table = actions.add_parser("table", help="all documents as a table in Markdown: docs/library-contents.md")
+    table.set_defaults(run=_table)
     index = actions.add_parser("index", help="write the index of a folder of documents anew")
     index.add_argument("folder", nargs="?", default=SHIPPED, metavar="DIR")
     index.set_defaults(run=_index)
@@ -114,7 +119,20 @@ def _check(arguments: argparse.Namespace) -> int:
     if not verdicts:
         print(f"no package of the library is in {arguments.sources}", file=sys.stderr)
         return 1
+    if arguments.keep:
+        from nodl.library.agreement import keep_agreements
+
+        compared = (verdict for verdict in verdicts if not verdict.of_other_version)
+        keep_agreements(SHIPPED, compared, (each.stem for each in Library().documents()))
     return 1 if any(verdict.is_wrong for verdict in verdicts) else 0
+
+
+def _table(arguments: argparse.Namespace) -> int:
+    from nodl.library.agreement import read_agreements
+    from nodl.library.contents import contents_text
+
+    print(contents_text(Library().documents(), read_agreements(SHIPPED)), end="")
+    return 0
 
 
 def _index(arguments: argparse.Namespace) -> int:

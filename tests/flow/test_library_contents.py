@@ -177,6 +177,15 @@ def test_republish_uses_the_transports_it_is_told(launch: Launch) -> None:
     assert (allowed(plan, "subscribe"), allowed(plan, "publish")) == (["/in/compressed"], ["/out"])
 
 
+def test_republish_publishes_in_the_one_transport_that_it_is_told(launch: Launch) -> None:
+    node = '<node pkg="image_transport" exec="republish" name="r" {}</node>'
+    told = node.format('><param name="out_transport" value="compressed"/>')
+    assert allowed(launch(told), "publish") == ["/out/compressed"]
+    arguments = launch(node.format('args="compressed raw">'), "humble")
+    assert allowed(arguments, "subscribe") == ["/in/compressed"]
+    assert allowed(arguments, "publish") == ["/out"]
+
+
 CONTROL = """
 <node pkg="robot_state_publisher" exec="robot_state_publisher"><param name="robot_description" value="{urdf}"/></node>
 <node pkg="controller_manager" exec="ros2_control_node"><param from="{file}"/></node>

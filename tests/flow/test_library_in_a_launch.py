@@ -13,6 +13,7 @@ from enclave_launch.errors import UsageError
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
+from enclave_launch.report.explained import explained
 from enclave_launch.report.plan_json import allowed_names, plan_json
 from enclave_launch.report.tree import plan_tree
 
@@ -122,6 +123,20 @@ def test_the_sources_of_interfaces_have_an_order(
     assert allowed(plan, "publish") == ["/from_option"]
 
 
+def test_a_folder_that_learn_wrote_is_a_library_too(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    """``PACKAGE__PROGRAM.NODE.nodl.yaml``: one document for each node of a program."""
+    install("pkg", "prog")
+    section = "{package: pkg, executable: prog, node: NODE, runs: [{id: a}]}"
+    for node in ("one", "two"):
+        folder = document(f"pkg__prog.{node}", f"from_{node}", section.replace("NODE", node))
+    plan = launch('<node pkg="pkg" exec="prog"/>', library_folders=(folder,))
+    assert allowed(plan, "publish") == ["/from_one", "/from_two"]
+    assert [node.fqn for node in plan.nodes] == ["/one", "/two"]
+    assert str(plan.processes[0].origin) == "recorded"
+
+
 def test_the_library_answers_where_an_analysis_leaves_something_open(
     launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
 ) -> None:
@@ -137,6 +152,7 @@ def test_the_plan_says_where_interfaces_come_from(
     install("pkg", "prog")
     plan = launch(NODE, library_folders=(document("pkg/prog", "a"),))
     assert "library pkg/prog)" in plan_tree(plan)
+    assert "  interfaces of prog-1: library pkg/prog" in explained(plan, "/n")
     assert json.loads(plan_json(plan))["processes"][0]["interfaces"] == "library"
     install("pkg", "prog", source=PYTHON.format(topic="'a'"))
     assert json.loads(plan_json(launch(NODE)))["processes"][0]["interfaces"] == "inferred"

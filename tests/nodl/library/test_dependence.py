@@ -44,7 +44,9 @@ def in_situation(path: Path, distro: str = "jazzy", words: str = "", **parameter
     given = {name.replace("__", "."): value for name, value in parameters.items()}
     situation = Situation(distro, "n", "/", given, tuple(words.split()), frozenset({"p", "zip_transport"}))
     return applied(
-        read_library_document(str(path)).interface, situation, Documents(path.parents[1])
+        read_library_document(str(path.parents[1]), f"{path.parent.name}/{path.name}").interface,
+        situation,
+        Documents(path.parents[1]),
     ).interface
 
 
@@ -200,7 +202,8 @@ def test_a_section_that_says_something_unknown_is_refused(
     write_document: WriteDocument, section: str
 ) -> None:
     with pytest.raises(InvalidNoDLError, match=r"n\.nodl\.yaml:\d+"):
-        read_library_document(str(write_document("p/n", section, "publishers: a")))
+        path = write_document("p/n", section, "publishers: a")
+        read_library_document(str(path.parents[1]), "p/n.nodl.yaml")
 
 
 @given(st.text(max_size=20))

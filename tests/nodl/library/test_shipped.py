@@ -9,13 +9,14 @@ import pytest
 
 from nodl.dependence import Dependence
 from nodl.library import SHIPPED, Library, fits
+from nodl.library.agreement import read_agreements
 from nodl.library.document import LibraryDocument, read_library_document
 from nodl.library.index import INDEX, index_text, read_index
 from nodl.node_interface import EndpointKind
 from nodl.verb import main
 
 FILES = sorted(str(path.relative_to(SHIPPED)) for path in Path(SHIPPED).glob("*/*.nodl.yaml"))
-DOCUMENTS = {file: read_library_document(os.path.join(SHIPPED, file)) for file in FILES}
+DOCUMENTS = {file: read_library_document(SHIPPED, file) for file in FILES}
 LIBRARY = Library()
 
 
@@ -35,9 +36,9 @@ def test_there_are_at_least_a_hundred_pairs_of_package_and_program_or_plugin() -
 def test_a_look_up_opens_one_document(monkeypatch: pytest.MonkeyPatch) -> None:
     opened: list[str] = []
 
-    def read(path: str) -> LibraryDocument:
-        opened.append(path)
-        return read_library_document(path)
+    def read(folder: str, file: str) -> LibraryDocument:
+        opened.append(file)
+        return read_library_document(folder, file)
 
     monkeypatch.setattr("nodl.library.read_library_document", read)
     assert Library().find("nav2_lifecycle_manager", "lifecycle_manager", distro="jazzy")
@@ -140,3 +141,20 @@ def test_sources_are_held_against_documents(tmp_path: Path, capsys: pytest.Captu
     assert main(["library", "check", str(tmp_path)]) == 1
     out = capsys.readouterr().out
     assert "only in the document: publisher chatter" in out and "only in the source: publisher chat" in out
+
+
+def test_the_table_in_the_documentation_is_what_the_command_prints(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert main(["library", "table"]) == 0
+    written = Path(__file__).parents[3] / "docs" / "library-contents.md"
+    assert capsys.readouterr().out == written.read_text(), (
+        "run: secure-nodl library table > docs/library-contents.md"
+    )
+
+
+def test_kept_verdicts_are_of_documents_that_there_are_and_differences_have_a_reason() -> None:
+    stems = {document.stem: document for document in DOCUMENTS.values()}
+    for stem, agreement in read_agreements(SHIPPED).items():
+        assert stem in stems and agreement.said != "differs", stem
+        assert stems[stem].evidence.differs or agreement.said != "differs, explained", stem
