@@ -10,9 +10,11 @@ from pathlib import Path
 import setuptools
 
 NAME = "enclave_launch"
+COMMANDS = ("secure-launch", "secure-plan", "secure-keystore", "secure-nodl")
 DATA_FILES = [
     ("share/ament_index/resource_index/packages", [f"resource/{NAME}"]),
     (f"share/{NAME}", ["package.xml"]),
+    ("share/man/man1", [f"docs/man/{command}.1" for command in COMMANDS]),
 ]
 VERSION = "0.1.0"
 REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "pydantic>=1.8"]

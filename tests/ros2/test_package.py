@@ -42,6 +42,9 @@ def test_the_index_gets_the_marker_and_the_manifest() -> None:
     assert files == {
         "share/ament_index/resource_index/packages": ["resource/enclave_launch"],
         "share/enclave_launch": ["package.xml"],
+        "share/man/man1": [
+            f"docs/man/secure-{command}.1" for command in ("launch", "plan", "keystore", "nodl")
+        ],
     }
     assert all((ROOT / file).is_file() for group in files.values() for file in group)
 
