@@ -46,6 +46,7 @@ class Code(str, Enum):
     ACTION_REMAP_IDLE = "action-remap-idle", "A remap rule for an action has no effect in this distribution"
     INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not (wholly) known"
     LIBRARY_VERSION = "library-version", "A document of the library was written for another version"
+    RECORDING_INCOMPLETE = "recording-incomplete", "What was learnt of a node may not be all of it"
     NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"
     NO_MANIFEST = "no-manifest", "Nothing says what a node or component does"
     NODE_NAME_IMPOSSIBLE = "node-name-impossible", "No node can run under the name it is given"
@@ -201,6 +202,17 @@ IN_MANIFEST = (
 def library_version(program: str, doubt: str, location: SourceLocation) -> Diagnostic:
     remedy = "compare them (secure-nodl library show), and keep a corrected copy in a folder for --library"
     return Diagnostic(Code.LIBRARY_VERSION, program, f"library document {doubt}", location, remedy)
+
+
+def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocation) -> Diagnostic:
+    remedy = "record it once more where it gets so far (--learn); runs are united"
+    return Diagnostic(
+        Code.RECORDING_INCOMPLETE,
+        node,
+        f"node {node} is learnt incompletely ({manifest}): {why}",
+        place,
+        remedy,
+    )
 
 
 def action_remap_idle(node: str, rule: str, action: str, distro: str, place: SourceLocation) -> Diagnostic:

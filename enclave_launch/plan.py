@@ -35,6 +35,7 @@ from enclave_launch.diagnostics import (
     node_name_unknown,
     not_foreseeable,
     parameters_unknown,
+    recording_incomplete,
 )
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope, assign_enclave
 from enclave_launch.host.outcomes import Outcomes
@@ -55,7 +56,8 @@ from nodl.node_interface import RANDOM_ENDING, NodeInterface
 
 
 class InterfaceOrigin(str, Enum):
-    """Where the interfaces of a node come from; the first that knows it decides, in this order."""
+    """Where the interfaces of a node come from; the first that knows it decides, in this order. Manifests that were
+    learnt from runs are ``RECORDED`` wherever they lie."""
 
     NAMED = "--nodl"
     PACKAGE = "manifest of the package"
@@ -454,6 +456,7 @@ def _notes(
             target, place = component.component.container, component.component.location
             yield container_elsewhere(component.fqn, target, _alike(target, processes), place)
     yield from _library_versions(processes, components)
+    yield from _incomplete(_nodes(processes, components, None))
     for item in processes:
         process, attribute = item.process, item.process.enclave.attribute
         if item.enclave and process.enclave.argument is not None and attribute is not None:
@@ -475,6 +478,13 @@ def _library_versions(
         if component.doubt:
             program = f"{component.component.package}/{component.component.plugin}"
             yield library_version(program, component.doubt, component.component.location)
+
+
+def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:
+    """What was learnt from runs that cannot have shown all of a node."""
+    for node in nodes:
+        for why in node.interface.incomplete:
+            yield recording_incomplete(node.fqn, why, str(node.interface.source), node.location)
 
 
 def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:

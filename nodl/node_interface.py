@@ -85,7 +85,8 @@ class NodeInterface(NamedTuple):
     node obeys them before the process's, and the process's even in a container; ``own_parameters`` stand in the
     same options. ``global_arguments``: the node listens to the arguments of its process, so that a launch can rename
     and remap it and give it parameters; ``None``: not known. ``parameter_services``: the program does not switch them
-    off. ``depends``: what varies with its start.
+    off. ``depends``: what varies with its start. ``runs``: of a recorded node, how many it was seen in; ``incomplete``:
+    why they may not have shown all of it.
     """
 
     package: str | None
@@ -104,3 +105,5 @@ class NodeInterface(NamedTuple):
     global_arguments: bool | None = True
     parameter_services: bool = True
     depends: Dependence | None = None
+    runs: int = 0
+    incomplete: tuple[str, ...] = ()

@@ -98,8 +98,7 @@ class InterfaceFinder:
                 subject.package or "", executable=subject.executable, plugin=subject.plugin
             )
             if manifest:
-                origin = InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
-                return Found(manifest.found, origin), False
+                return Found(manifest.found, _origin(manifest)), False
             if subject.package == CONTAINER_PACKAGE and subject.executable:
                 return Found((_container(subject),)), False
             return self._without_manifest(subject, manifest, started)
@@ -161,6 +160,13 @@ def _shortly(places: Sequence[str]) -> str:
     if len(places) <= _PLACES + 1:
         return ", ".join(places)
     return f"{', '.join(places[:_PLACES])} and {len(places) - _PLACES} more places"
+
+
+def _origin(manifest: Lookup) -> InterfaceOrigin:
+    """A manifest that was learnt says so itself, wherever it lies."""
+    if any(each.runs for each in manifest.found):
+        return InterfaceOrigin.RECORDED
+    return InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
 
 
 def _complete(interface: NodeInterface) -> bool:

@@ -149,7 +149,8 @@ class _Collector:
                 note = note or "from a default value in the source"
             self._name(endpoint, template, note)
             return
-        note = _parameter_note(template, self._node)
+        learnt = endpoint.note if self._node.interface.runs else ""
+        note = "; ".join(filter(None, (_parameter_note(template, self._node), learnt)))
         inputs = self._node.inputs
         for filled in inputs.doubtful(template).fill_each({**inputs.values, **self._node.parameters}):
             if filled.is_literal:

@@ -104,6 +104,9 @@ def origin_text(item: PlannedProcess | PlannedComponent) -> str:
         return f"library {'/'.join(file.split('/')[-2:]).removesuffix('.nodl.yaml')}"
     if item.origin is InterfaceOrigin.ANALYSIS:
         return "inferred from its source"
+    if item.origin is InterfaceOrigin.RECORDED and item.nodes:
+        runs = max(node.interface.runs for node in item.nodes)
+        return f"recorded in {runs} run{'s' * (runs != 1)}" if runs else str(item.origin)
     return str(item.origin)
 
 

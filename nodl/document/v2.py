@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 from nodl.document.manifest_node import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
-from nodl.document.v2_learnt import LearntName, learnt_names, logger_services
+from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services
 from nodl.document.v2_schema import check_document
 from nodl.document.v2_section import CATEGORIES, dependence_of, section_of
 from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
@@ -62,7 +62,7 @@ def parse_root(
 ) -> ManifestNode:
     """``parse_v2`` for a document that was read and checked."""
     documents = (Included(file, root), *follow_includes(root, file, prefixes))
-    identity = _identity(root, name)
+    identity, learnt = _identity(root, name), learnt_from(root)
     endpoints = (*_endpoints(documents, learnt_names(root)), *logger_services(root))
     parameters = _parameters(documents)
     interface = NodeInterface(
@@ -77,6 +77,8 @@ def parse_root(
         lifecycle=identity.lifecycle,
         parameters=tuple(parameters),
         depends=dependence_of(root),
+        runs=learnt.runs,
+        incomplete=learnt.incomplete,
     )
     included = tuple(document.file for document in documents[1:])
     return ManifestNode(interface, VERSION, parameters, identity.explicit, included)
@@ -144,7 +146,9 @@ def _endpoints(
             about = learnt.get((category, name), LearntName(NameTemplate.literal(name)))
             full_type = _full_type(type_name, kind)
             introspected, qos = about.introspected, tuple(sorted(_qos(entry)))
-            yield Endpoint(kind, about.template, full_type, source, introspected=introspected, qos=qos)
+            yield Endpoint(
+                kind, about.template, full_type, source, introspected=introspected, qos=qos, note=about.note
+            )
 
 
 def _entries(documents: Sequence[Included], category: str) -> Iterator[YamlMap]:

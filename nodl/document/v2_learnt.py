@@ -10,7 +10,7 @@
 a word of its command line) whose value the name is, ``each`` says that it is a list, ``suffix`` what the program
 appends to the value, ``default`` the name where nothing is set. ``written`` is the source's name where NoDL v2 cannot
 hold it, ``introspection`` says that the calls of a service are published. ``proof``, ``undecided`` and ``runs`` are
-for the reader.
+for the reader: plans show them.
 """
 
 from __future__ import annotations
@@ -27,8 +27,25 @@ from nodl.node_interface import Endpoint, EndpointKind
 
 
 class LearntName(NamedTuple):
+    """``note``: how it was learnt, for the reader of a plan."""
+
     template: NameTemplate
     introspected: bool = False
+    note: str = ""
+
+
+class LearntFrom(NamedTuple):
+    """``runs``: how many; ``incomplete``: why they may not have shown everything."""
+
+    runs: int = 0
+    incomplete: tuple[str, ...] = ()
+
+
+def learnt_from(root: YamlMap) -> LearntFrom:
+    """What the document says of the runs that taught it; nothing, where a person wrote it."""
+    section = _section(root)
+    runs = section.get("runs")
+    return LearntFrom(len(runs.items) if isinstance(runs, YamlList) else 0, _texts(section.get("incomplete")))
 
 
 def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
@@ -40,9 +57,29 @@ def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
             fields = {key: value.value for key, value in row.items.items() if isinstance(value, YamlScalar)}
             template = _template(fields, row)
             found[str(fields["in"]), str(fields["name"])] = LearntName(
-                template, fields.get("introspection") is True
+                template, fields.get("introspection") is True, _note(row)
             )
     return found
+
+
+def _note(row: YamlMap) -> str:
+    """``recorded in 2 runs``, and how sure its source is."""
+    runs, undecided = _texts(row.items.get("runs")), _texts(row.items.get("undecided"))
+    proof = row.items.get("proof")
+    texts = [f"recorded in {len(runs)} run{'s' * (len(runs) != 1)}"] if runs else []
+    if undecided:
+        texts.append(
+            f"undecided whether it is fixed or comes from {' or '.join(undecided)}: only this name is granted"
+        )
+    if isinstance(proof, YamlScalar):
+        source_is_known = proof.value != "one run"
+        texts.append(str(proof.value) if source_is_known else "from the parameter as far as one run tells")
+    return "; ".join(texts)
+
+
+def _texts(value: YamlValue | None) -> tuple[str, ...]:
+    items = value.items if isinstance(value, YamlList) else ()
+    return tuple(str(item.value) for item in items if isinstance(item, YamlScalar))
 
 
 def logger_services(root: YamlMap) -> Iterator[Endpoint]:

@@ -6,9 +6,15 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch.diagnostics import Code
+from enclave_launch.flow import resolve
+from enclave_launch.options import ResolveOptions
+from enclave_launch.plan import InterfaceOrigin, LaunchPlan
+from enclave_launch.report.explained import explained
+from enclave_launch.report.tree import plan_tree
 from nodl.document import read_document
 from nodl.name_template import NameTemplate, ParameterPart
-from tests.recording.stand_in_launch import PACKAGE, Program, make_workspace
+from tests.recording.stand_in_launch import PACKAGE, Program, make_workspace, manifest_text
 
 LEARN = ("--learn-for", "1s", "--learn-isolation", "local")
 
@@ -69,6 +75,39 @@ def test_a_lifecycle_node_that_was_never_active_is_incomplete(stand_in: Path, tm
     learn(tmp_path, stand_in, program)
     (file,) = (tmp_path / "learnt").glob("*.nodl.yaml")
     assert "incomplete:\n    - 'a lifecycle node that was never active" in file.read_text()
+    (warning,) = [each for each in plan_of(tmp_path).warnings if each.code is Code.RECORDING_INCOMPLETE]
+    assert "node /life is learnt incompletely" in str(warning) and "record it once more" in str(warning)
+
+
+def plan_of(folder: Path) -> LaunchPlan:
+    """The launch that was learnt, with what was learnt."""
+    file = folder / "ws" / "share" / PACKAGE / "launch" / "all.launch.xml"
+    options = ResolveOptions(prefixes=(folder / "ws",), manifests=(folder / "learnt",), distro="jazzy")
+    return resolve(file, options=options)
+
+
+def test_the_plan_says_what_was_recorded_and_how_sure_it_is(stand_in: Path, tmp_path: Path) -> None:
+    program = Program(
+        "fixed",
+        "node fixed\npublisher map nav_msgs/msg/OccupancyGrid\npublisher out std_msgs/msg/String\n"
+        "subscription goal std_msgs/msg/String\nwait\n",
+        inside='<param name="world" value="map"/><param name="a_topic" value="goal"/>'
+        '<param name="b_topic" value="goal"/>',
+    )
+    learn(tmp_path, stand_in, program)
+    plan = plan_of(tmp_path)
+    assert plan.processes[0].origin is InterfaceOrigin.RECORDED
+    assert "recorded in 1 run)" in plan_tree(plan)
+    explained_ = "\n".join(explained(plan, "/fixed"))
+    assert (
+        "parameter world, set by launch; recorded in 1 run; from the parameter as far as one run tells"
+        in explained_
+    )
+    assert "recorded in 1 run; undecided whether it is fixed or comes from a_topic or b_topic" in explained_
+    (file,) = (tmp_path / "learnt").glob("*.nodl.yaml")
+    file.write_text(manifest_text([("publisher", "out")], "package: stand_in_nodes, executable: fixed"))
+    by_hand = plan_of(tmp_path)
+    assert by_hand.processes[0].origin is InterfaceOrigin.NAMED and "recorded" not in plan_tree(by_hand)
 
 
 def test_the_node_of_a_transform_listener_has_its_own_row(stand_in: Path, tmp_path: Path) -> None:
