@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.preprocess import Preprocessed
+from nodl.infer.cpp.reading.writes import Writes
 from nodl.infer.cpp.syntax import line_of, text
 
 if TYPE_CHECKING:
@@ -45,9 +46,7 @@ class Function:
     virtual: bool = False
     static: bool = False
     variadic: bool = False
-    written: frozenset[str] | None = (
-        None  # variables that it may change (``writes.written_words``), when asked
-    )
+    written: Writes | None = None  # variables that it may change, when asked
     _words: frozenset[str] | None = None
 
     @property

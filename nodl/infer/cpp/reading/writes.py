@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.syntax import text, walk
 
@@ -20,12 +21,38 @@ _READING = frozenset({
 """Methods that leave their object as it is."""
 
 
-def written_words(node: Node) -> frozenset[str]:
-    """Assigned, counted up, read from a stream, given to a call or changed by a method of theirs; aliases included."""
-    found: set[str] = set()
+class Writes(NamedTuple):
+    """``changed``: assigned, counted up, read from a stream, given to a call or changed by a method of theirs, aliases
+    included; ``replaced``: those that may hold another object afterwards."""
+
+    changed: frozenset[str]
+    replaced: frozenset[str]
+
+    def union(self, others: Iterable[Writes]) -> Writes:
+        listed = list(others)
+        return Writes(
+            self.changed.union(*(each.changed for each in listed)),
+            self.replaced.union(*(each.replaced for each in listed)),
+        )
+
+
+def writes_of(node: Node) -> Writes:
+    """What the code below ``node`` may change itself."""
+    changed: set[str] = set()
+    replaced: set[str] = set()
     for each in walk(node):
-        found |= _words_of(each)
-    return frozenset(found)
+        changed |= _words_of(each)
+        replaced |= _replaced(each)
+    return Writes(frozenset(changed | replaced), frozenset(replaced))
+
+
+def _replaced(node: Node) -> set[str]:
+    if node.type == "assignment_expression":
+        return _in(node.child_by_field_name("left"))
+    callee = node.child_by_field_name("function") if node.type == "call_expression" else None
+    if callee is not None and text(callee.child_by_field_name("field")) in ("reset", "swap"):
+        return _in(callee.child_by_field_name("argument"))
+    return set()
 
 
 def _words_of(node: Node) -> set[str]:

@@ -9,11 +9,25 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.ledger import Reach
-from nodl.infer.cpp.reading.writes import written_words
+from nodl.infer.cpp.reading.writes import Writes, writes_of
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
-from nodl.infer.cpp.running.machine import NEXT, WORD, Frame, Machine
-from nodl.infer.cpp.running.store import Changes
-from nodl.infer.cpp.running.values import Bound, Lambda, Map, Seq, Text, join, one_map, one_sequence, unknown
+from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, WORD, Frame, Machine
+from nodl.infer.cpp.running.store import Cell, Changes
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Bound,
+    Lambda,
+    Map,
+    Seq,
+    Text,
+    Value,
+    as_one_map,
+    join,
+    one_map,
+    one_sequence,
+    open_sequence,
+    unknown,
+)
 from nodl.infer.cpp.syntax import text
 from nodl.source_ref import SourceRef
 
@@ -22,7 +36,9 @@ if TYPE_CHECKING:
 
 PATIENCE = 5
 """Rounds after which a variable that callbacks still change counts as not known."""
-MAX_ROUNDS = 12
+MAX_ROUNDS = 16
+SIDE_STEPS = 30_000
+"""For a callback that makes no interface itself; what one that needs more may change is not known."""
 
 Key = tuple[object, object]
 
@@ -39,8 +55,10 @@ class _Ran:
 class _Rounds:
     run: Machine
     last: dict[Key, _Ran] = field(default_factory=dict)
-    read: set[str] = field(default_factory=set)  # names of variables that callbacks have read
-    writes: dict[object, frozenset[str]] = field(default_factory=dict)
+    read: set[Cell] = field(default_factory=set)  # by callbacks
+    names_read: set[str] = field(default_factory=set)
+    writes: dict[object, Writes] = field(default_factory=dict)
+    given_up: set[Key] = field(default_factory=set)  # callbacks that only change variables, in too many steps
 
 
 def run_callbacks(run: Machine) -> None:
@@ -79,10 +97,39 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
     last = rounds.last.get(key)
     if not certainly and last is not None and last.facts == _facts(run) and run.store.holds(last.reads):
         return False
-    reads = run.store.watched(lambda: _run(run, atom, frame, certainly))
+    if key in rounds.given_up:
+        return _unsettle(rounds, atom)
+    makes = certainly or _makes(run, atom)
+    done = True
+
+    def go() -> None:
+        nonlocal done
+        done = run.attempt(lambda: _run(run, atom, frame, certainly), MAX_STEPS if makes else SIDE_STEPS)
+
+    reads = run.store.watched(go)
+    if not done:
+        rounds.given_up.add(key)
+        return _unsettle(rounds, atom)
     rounds.last[key] = _Ran(reads, _facts(run))
-    rounds.read |= {name for _, name in reads}
+    rounds.read.update(reads)
+    rounds.names_read.update(name for _, name in reads)
     return True
+
+
+def _unsettle(rounds: _Rounds, atom: object) -> bool:
+    """What a callback may change that was not followed is not known; whether that is news."""
+    store, writes, news = rounds.run.store, _writes(rounds, atom), False
+    for cell in rounds.read:
+        if cell[1] not in writes.changed:
+            continue
+        before = store.get(cell) or BOTTOM
+        after = join(*(_settled(each, BOTTOM) for each in before))
+        if cell[1] in writes.replaced:
+            after = join(after, unknown("a value that callbacks change"))
+        if set(after) != set(before):
+            store.set(cell, after)
+            news = True
+    return news
 
 
 def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
@@ -109,32 +156,33 @@ def _facts(run: Machine) -> tuple[int, ...]:
 
 def _matters(rounds: _Rounds, atom: object) -> bool:
     """Whether it may make an interface, or change what a callback that runs has read."""
-    run = rounds.run
+    return _makes(rounds.run, atom) or not rounds.names_read.isdisjoint(_writes(rounds, atom).changed)
+
+
+def _makes(run: Machine, atom: object) -> bool:
     if isinstance(atom, Lambda):
-        return run.subtree_matters(atom.node) or not rounds.read.isdisjoint(_writes(rounds, atom))
-    if isinstance(atom, Bound):
-        return run.makes_interfaces(atom.function) or not rounds.read.isdisjoint(_writes(rounds, atom))
-    return False
+        return run.subtree_matters(atom.node)
+    return isinstance(atom, Bound) and run.makes_interfaces(atom.function)
 
 
-def _writes(rounds: _Rounds, atom: Lambda | Bound) -> frozenset[str]:
-    """Names of variables that it, or whatever it may call, may change."""
+def _writes(rounds: _Rounds, atom: object) -> Writes:
+    """Of the callback, and of whatever it may call."""
     run = rounds.run
-    subject = atom.node.id if isinstance(atom, Lambda) else atom.function
-    key = (subject, len(run.used_classes()))
+    if not isinstance(atom, Lambda | Bound):
+        return Writes(frozenset(), frozenset())
+    key = (atom.node.id if isinstance(atom, Lambda) else atom.function, len(run.used_classes()))
     if key not in rounds.writes:
         if isinstance(atom, Lambda):
-            own, words = written_words(atom.node), frozenset(WORD.findall(text(atom.node)))
+            own, words = writes_of(atom.node), frozenset(WORD.findall(text(atom.node)))
         else:
             own, words = _written(atom.function), atom.function.words
-        reached = Reach(run).from_words(words).reached
-        rounds.writes[key] = own.union(*map(_written, reached))
+        rounds.writes[key] = own.union(map(_written, Reach(run).from_words(words).reached))
     return rounds.writes[key]
 
 
-def _written(function: Function) -> frozenset[str]:
+def _written(function: Function) -> Writes:
     if function.written is None:
-        function.written = written_words(function.node)
+        function.written = writes_of(function.node)
     return function.written
 
 
@@ -148,10 +196,21 @@ def _widen(run: Machine, mark: int, give_up: bool) -> None:
             value = one_sequence(value)
         if any(isinstance(atom, Map) for atom in value):
             value = one_map(value)
-        if give_up and any(isinstance(atom, Text | int | float) for atom in value):
-            kept = tuple(a for a in value if a in before or not isinstance(a, Text | int | float))
-            value = join(kept, unknown("a value that callbacks change"))
-        run.store.set(cell, value)
+        run.store.set(cell, join(*(_settled(atom, before) for atom in value)) if give_up else value)
+
+
+def _settled(atom: object, before: Value) -> Value:
+    """What is not known any more: a text or number that is new, also within a list or map."""
+    if atom in before:
+        return (atom,)
+    if isinstance(atom, Text | int | float):
+        return unknown("a value that callbacks change")
+    if isinstance(atom, Seq):
+        return (open_sequence(join(*(_settled(each, BOTTOM) for each in item)) for item in atom.items),)
+    if isinstance(atom, Map):
+        values = [_settled(each, BOTTOM) for _, value in atom.entries for each in value]
+        return (as_one_map([(unknown("one of many keys"), join(*values))], True),)
+    return (atom,)
 
 
 def _find_overrides(run: Machine) -> None:

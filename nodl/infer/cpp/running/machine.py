@@ -142,6 +142,7 @@ class Machine:
         self.global_arguments: list[Value] = []
         self.active: list[Function] = []
         self.steps = 0
+        self.limit = MAX_STEPS
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
         self.plugins_used: dict[str, None] = {}
@@ -157,7 +158,7 @@ class Machine:
         if node is None:
             return BOTTOM
         self.steps += 1
-        if self.steps > MAX_STEPS:
+        if self.steps > self.limit:
             raise BudgetExceeded
         handler = EXPRESSIONS.get(node.type)
         if handler is None:
@@ -166,7 +167,7 @@ class Machine:
 
     def execute(self, node: Node, frame: Frame) -> int:
         self.steps += 1
-        if self.steps > MAX_STEPS:
+        if self.steps > self.limit:
             raise BudgetExceeded
         self.ran.setdefault(frame.file.file, set()).add(node.start_byte)
         handler = STATEMENTS.get(node.type)
@@ -174,6 +175,25 @@ class Machine:
             self.evaluate(node, frame)
             return NEXT
         return handler(self, node, frame)
+
+    def attempt(self, action: Callable[[], None], steps: int) -> bool:
+        """Run ``action`` if it takes no more than so many steps; else nothing of what it wrote is left.
+
+        Raises ``BudgetExceeded`` at the end of all steps.
+        """
+        before, mark, active = self.limit, self.store.mark(), len(self.active)
+        self.limit = min(before, self.steps + steps)
+        try:
+            action()
+        except BudgetExceeded:
+            if self.steps > before:
+                raise
+            self.store.undo(mark)
+            del self.active[active:]
+            return False
+        finally:
+            self.limit = before
+        return True
 
     def branches(self, alternatives: Sequence[Callable[[], int]]) -> int:
         """Run each alternative from the present state; continue with any that goes on."""
