@@ -1,5 +1,6 @@
 #include "participant.hpp"
 
+#include <cstdlib>
 #include <fstream>
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
@@ -18,22 +19,28 @@ namespace {
 
 constexpr uint32_t kPeersLookedFor = 60;  // participants on one host that can find each other
 
-rtps::Locator_t loopback() {
+// An IPv4 address of the environment, for networks that a test made; else loopback.
+std::string address(const char* variable) {
+  const char* given = std::getenv(variable);
+  return given ? given : "127.0.0.1";
+}
+
+rtps::Locator_t locator_of(const std::string& ip) {
   rtps::Locator_t locator;
-  rtps::IPLocator::setIPv4(locator, 127, 0, 0, 1);
+  rtps::IPLocator::setIPv4(locator, ip);
   return locator;
 }
 
-// Traffic stays on loopback: UDP only, no multicast, peers are looked for at 127.0.0.1.
-void stay_on_loopback(dds::DomainParticipantQos& qos) {
+// Traffic stays in one network: UDP only, no multicast, peers are looked for at one address.
+void stay_in_one_network(dds::DomainParticipantQos& qos) {
   auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-  udp->interfaceWhiteList.push_back("127.0.0.1");
+  udp->interfaceWhiteList.push_back(address("PROBE_ADDRESS"));
   udp->maxInitialPeersRange = kPeersLookedFor;
   qos.transport().use_builtin_transports = false;
   qos.transport().user_transports.push_back(udp);
   auto& builtin = qos.wire_protocol().builtin;
-  builtin.metatrafficUnicastLocatorList.push_back(loopback());
-  builtin.initialPeersList.push_back(loopback());
+  builtin.metatrafficUnicastLocatorList.push_back(locator_of(address("PROBE_ADDRESS")));
+  builtin.initialPeersList.push_back(locator_of(address("PROBE_PEER")));
   // Finds peers that start a moment later without waiting for the default 3 s.
   builtin.discovery_config.leaseDuration_announcementperiod = eprosima::fastrtps::Duration_t(1, 0);
 }
@@ -67,7 +74,7 @@ Participant::Participant(std::string label, const std::string& directory, uint32
     : label_(std::move(label)) {
   dds::DomainParticipantQos qos;
   qos.name(label_);
-  stay_on_loopback(qos);
+  stay_in_one_network(qos);
   if (directory != "-") secure(qos, directory);
   auto* factory = dds::DomainParticipantFactory::get_instance();
   participant_ = factory->create_participant(domain, qos);
