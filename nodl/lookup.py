@@ -28,11 +28,12 @@ from nodl.node_interface import NodeInterface
 
 class Lookup(NamedTuple):
     """``found`` is empty when no document describes the executable; ``searched`` says where we looked. ``named``: the
-    user named the document."""
+    user named the document; ``described``: the programs of the documents that were named in vain."""
 
     found: tuple[NodeInterface, ...]
     searched: tuple[str, ...]
     named: bool = False
+    described: tuple[str, ...] = ()
 
     def __bool__(self) -> bool:
         return bool(self.found)
@@ -59,7 +60,8 @@ class ManifestLookup:
             return Lookup(_agreed(subject, chosen), self._manifests, named=True)
         installed = self._package(package)
         found = [node for node in installed.nodes if fits(node)]
-        return Lookup(_agreed(subject, found), (*self._manifests, *installed.searched))
+        others = tuple(dict.fromkeys(map(_program, self._chosen_nodes())))
+        return Lookup(_agreed(subject, found), (*self._manifests, *installed.searched), described=others)
 
     def all_of(self, package: str) -> Lookup:
         """Every node that the documents of ``package`` describe, conflicts included."""
@@ -144,6 +146,13 @@ def _files(path: str) -> list[str]:
         return [path]
     suffixes = (V1_SUFFIX, *(suffix for suffix in V2_SUFFIXES if suffix.startswith(".nodl.")))
     return sorted(str(file) for file in Path(path).rglob("*.nodl.*") if file.name.endswith(suffixes))
+
+
+def _program(node: ManifestNode) -> str:
+    """Package and program as far as the document says them."""
+    interface = node.interface
+    program = interface.executable or interface.plugin or "a node of no program"
+    return f"{interface.package}/{program}" if interface.package else program
 
 
 def _describes(node: ManifestNode, *, executable: str | None, plugin: str | None) -> bool:

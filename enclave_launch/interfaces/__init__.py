@@ -117,6 +117,7 @@ class InterfaceFinder:
             doubt = next((hit.doubt for hit in recorded if hit.doubt), "")
             return Found(interfaces, InterfaceOrigin.RECORDED, doubt), False
         searched = ["looked at " + _shortly(manifest.searched)]
+        searched += [f"--nodl describes {', '.join(manifest.described)}"] if manifest.described else []
         analysed = self._inferred(subject, started)
         searched += [analysed.why] if analysed is not None and analysed.why else []
         inferred = analysed.interfaces if analysed is not None else ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
-from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE
 
 UNKNOWN = "permissions unknown"
 
@@ -36,6 +36,8 @@ def label(item: PlannedProcess | PlannedComponent) -> str:
 
 
 def shown_fqn(item: PlannedProcess) -> str:
-    """Its nodes, or what launch knows of the name: without a placeholder for a namespace that nobody gave."""
+    """Its nodes, or what launch knows of the name: without a placeholder for a namespace that nobody gave, and nothing
+    where nobody gave a name."""
     names = " ".join(dict.fromkeys(node.fqn for node in item.nodes))
-    return names or (item.fqn or "").replace(UNSPECIFIED_NODE_NAMESPACE, "")
+    known = "" if UNSPECIFIED_NODE_NAME in (item.fqn or "") else item.fqn or ""
+    return names or known.replace(UNSPECIFIED_NODE_NAMESPACE, "")

@@ -30,6 +30,11 @@ def describe(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
 
 
+def counted(number: int, what: str) -> str:
+    """``1 enclave``, ``2 enclaves``."""
+    return f"{number} {what}{'s' if number != 1 else ''}"
+
+
 def run(arguments: argparse.Namespace) -> int:
     from keystore.formats.governance_yaml import governance_of
     from keystore.verification import Requirements, verify
@@ -60,4 +65,4 @@ def _print(report: VerifyReport) -> None:
         if finding.repair:
             print(f"    {finding.repair}")
     verdict = "good" if report.is_good else "not good"
-    print(f"{report.enclaves} enclaves, {len(report.findings)} findings: {verdict}")
+    print(f"{counted(report.enclaves, 'enclave')}, {counted(len(report.findings), 'finding')}: {verdict}")

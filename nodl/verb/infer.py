@@ -56,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
     expanded = expand(system)
     chosen = args.format or ("v2" if args.output else "text")
     documents = _documents(chosen, system, expanded, args)
+    if chosen in ("v1", "v2") and not args.quiet:
+        _tell_guesses(system)
     if args.output:
         _write(args.output, documents)
     else:
@@ -71,6 +73,16 @@ def run(args: argparse.Namespace) -> int:
         for question in expanded.unresolved:
             print(printable(f"  {question.source}: {question.why}"), file=sys.stderr)
     return 0 if system.nodes else 1
+
+
+def _tell_guesses(system: InferredSystem) -> None:
+    """A manifest must name a program; a source file that nothing installs does not say which it becomes."""
+    for node in system.nodes:
+        if node.executable is None and node.plugin is None and node.name:
+            text = (
+                f"note: which executable runs node {node.name} is not known; the manifest says {node.name!r}"
+            )
+            print(printable(f"{text}: correct it if that is not its name ({node.source})"), file=sys.stderr)
 
 
 def _documents(

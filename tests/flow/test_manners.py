@@ -73,3 +73,50 @@ def test_a_verbose_keystore_names_what_it_left_alone(tmp_path: Path) -> None:
     again = ["create-enclave", str(tmp_path / "ks"), "/a"]
     assert run("secure-keystore", *again).stdout == "1 enclave unchanged\n"
     assert run("secure-keystore", *again[:1], "-v", *again[1:]).stdout == "/a: unchanged\n"
+
+
+def test_counts_agree_in_number(tmp_path: Path) -> None:
+    run("secure-keystore", "create", str(tmp_path / "ks"))
+    assert run("secure-keystore", "verify", str(tmp_path / "ks")).stdout.startswith("0 enclaves, 0 findings")
+    run("secure-keystore", "create-enclave", str(tmp_path / "ks"), "/a")
+    assert run("secure-keystore", "verify", str(tmp_path / "ks")).stdout.startswith("1 enclave, 0 findings")
+
+
+@pytest.fixture
+def robot(tmp_path: Path) -> Path:
+    """A prefix with one compiled program, and a launch file that starts it."""
+    (tmp_path / "ws/share/ament_index/resource_index/packages").mkdir(parents=True)
+    (tmp_path / "ws/share/ament_index/resource_index/packages/pk").touch()
+    program = tmp_path / "ws/lib/pk/prog"
+    program.parent.mkdir(parents=True)
+    program.write_bytes(b"\x7fELF")
+    program.chmod(0o755)
+    file = tmp_path / "robot.launch.xml"
+    file.write_text('<launch><node pkg="pk" exec="prog"/></launch>')
+    return file
+
+
+def test_a_manifest_that_describes_another_program_says_which(robot: Path, tmp_path: Path) -> None:
+    manifest = tmp_path / "other.nodl.xml"
+    topic = '<topic name="in" type="std_msgs/msg/String" role="subscription"/>'
+    text = '<interface version="1"><node name="s" executable="{}">' + topic + "</node></interface>"
+    manifest.write_text(text.format("speaker"))
+    words = ["--dry-run", "--prefix", str(tmp_path / "ws"), "--nodl", str(manifest), str(robot)]
+    assert "; --nodl describes speaker; " in run("secure-launch", *words).stdout
+    manifest.write_text(text.format("prog"))
+    assert "no NoDL manifest" not in run("secure-launch", *words).stdout
+
+
+def test_placeholders_of_launch_are_not_shown_as_names(robot: Path, tmp_path: Path) -> None:
+    tree = run("secure-launch", "--dry-run", "--prefix", str(tmp_path / "ws"), str(robot)).stdout
+    assert "[prog-1] pk/prog  (line 1" in tree and "unspecified" not in tree
+
+
+def test_an_executable_that_is_guessed_from_a_node_name_is_told(tmp_path: Path) -> None:
+    source = tmp_path / "node.py"
+    source.write_text(
+        "import rclpy\nfrom rclpy.node import Node\nrclpy.init()\nrclpy.spin(Node('chatterbox'))\n"
+    )
+    made = run("secure-nodl", "infer", str(source), "-o", str(tmp_path / "out"))
+    assert "which executable runs node chatterbox is not known" in made.stderr
+    assert run("secure-nodl", "infer", "-q", str(source), "-o", str(tmp_path / "out")).stderr == ""
