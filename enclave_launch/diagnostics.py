@@ -78,6 +78,9 @@ class Code(str, Enum):
     DOMAIN_INVALID = "domain-invalid", "A process has an impossible ROS_DOMAIN_ID"
     DOMAIN_NOT_SERVED = "domain-not-served", "A process is in a domain that the permissions leave out"
     DOMAINS_SHARED = "domains-shared", "An enclave may join the domains of several processes"
+    MIDDLEWARES_APART = "middlewares-apart", "Nodes on DDS and nodes on Zenoh cannot talk to each other"
+    ZENOH_CANNOT_GRANT = "zenoh-cannot-grant", "A permission that DDS can express and Zenoh cannot"
+    ZENOH_ROUTER_TRUSTED = "zenoh-router-trusted", "On Zenoh the router is trusted with every message"
     LIBRARY_PRELOADED = "library-preloaded", "The launch file loads a library into a process"
     MIDDLEWARE_REFUSED = "middleware-refused", "The middleware of a process is not known to read enclaves"
     PREFIX_REFUSED = "prefix-refused", "Something between launch and a program may change its environment"
@@ -411,7 +414,10 @@ def middleware_refused(
 ) -> Diagnostic:
     origin = "the launch file" if by_launch_file else "the environment"
     text = f"{process} would run on {middleware} (RMW_IMPLEMENTATION of {origin}) and not be secured: {why}"
-    known = "rmw_cyclonedds_cpp, rmw_fastrtps_cpp, rmw_fastrtps_dynamic_cpp and rmw_connextdds read enclaves"
+    known = (
+        "rmw_cyclonedds_cpp, rmw_fastrtps_cpp, rmw_fastrtps_dynamic_cpp and rmw_connextdds read enclaves, "
+        "rmw_zenoh_cpp is secured by its router"
+    )
     accept = f"; vouch for it with --accept-middleware {middleware}" if "not known" in why else ""
     return Diagnostic(Code.MIDDLEWARE_REFUSED, process, text, place, known + accept)
 
@@ -434,3 +440,46 @@ def security_configured(process: str, variable: str, value: str, place: SourceLo
 def variable_overridden(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
     text = f"{variable}={value} of the launch file has no effect on {process} under --secure"
     return Diagnostic(Code.VARIABLE_OVERRIDDEN, process, text, place)
+
+
+def names_apart(what: str, name: str, on_dds: str, on_zenoh: str) -> Diagnostic:
+    """``on_dds``, ``on_zenoh``: nodes with one end each."""
+    text = f"{what} {name}: {on_dds} is on DDS and {on_zenoh} on Zenoh (RMW_IMPLEMENTATION); they never meet"
+    remedy = "give both the same middleware, or put a bridge between them and give it an enclave on each"
+    return Diagnostic(Code.MIDDLEWARES_APART, name, text, None, remedy)
+
+
+def launcher_apart(
+    service: str, launcher: str, process: str, middleware: str, place: SourceLocation
+) -> Diagnostic:
+    text = (
+        f"launch itself runs on {launcher} and must call {service} of {process}, which runs on {middleware}"
+    )
+    remedy = (
+        f"they never meet: start launch with RMW_IMPLEMENTATION={middleware}, or give {process} the other"
+    )
+    return Diagnostic(Code.MIDDLEWARES_APART, service, text, place, remedy)
+
+
+def enclave_on_both(enclave: str) -> Diagnostic:
+    text = (
+        f"enclave {enclave} has processes on DDS and on Zenoh: whoever holds its key may do the same on both, and what "
+        "only one of them checks (types and node tokens on Zenoh, permissions by each peer on DDS) the other does not"
+    )
+    return Diagnostic(Code.MIDDLEWARES_APART, enclave, text, None, "give them enclaves of their own")
+
+
+def zenoh_cannot_grant(enclave: str, gap: str) -> Diagnostic:
+    text = f"enclave {enclave} is on Zenoh, where this cannot be granted and is denied: {gap}"
+    return Diagnostic(Code.ZENOH_CANNOT_GRANT, enclave, text, None, "name what is meant, one by one")
+
+
+def zenoh_router_trusted(processes: Sequence[str]) -> Diagnostic:
+    shown = ", ".join(processes[:3]) + (f" and {len(processes) - 3} more" if len(processes) > 3 else "")
+    text = (
+        f"{shown} on Zenoh: encryption ends at the router, which reads every message and alone enforces (on DDS every "
+        "participant does, end to end); who of several publishers of a topic sent a message is not proved; "
+        "ROS_SECURITY_STRATEGY has no effect. In return types are enforced, and what is taken away ends at once, "
+        "without a restart of processes"
+    )
+    return Diagnostic(Code.ZENOH_ROUTER_TRUSTED, "rmw_zenoh_cpp", text)

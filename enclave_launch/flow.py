@@ -20,7 +20,7 @@ from enclave_launch.admission.middleware import middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic, middleware_refused, program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
-from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner, mixed_enclaves
+from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner, mixed_enclaves, uses_zenoh
 from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
@@ -51,9 +51,19 @@ def resolve(
     prefixes = search_prefixes(source.prefixes)
     finder = InterfaceFinder(prefixes, chosen, evaluation.distro, launched(evaluation))
     plan = Planner(source, finder, chosen.plan_options()).plan(evaluation)
-    return plan._replace(
+    plan = plan._replace(
         problems=(*plan.problems, *_launcher_refusals(plan)),
         warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)),
+    )
+    return _told_of_middlewares(plan) if uses_zenoh(plan, os.environ) else plan
+
+
+def _told_of_middlewares(plan: LaunchPlan) -> LaunchPlan:
+    from enclave_launch.review.middlewares import middleware_notes, middleware_problems
+
+    return plan._replace(
+        problems=(*plan.problems, *middleware_problems(plan, os.environ)),
+        warnings=(*plan.warnings, *middleware_notes(plan)),
     )
 
 
@@ -137,7 +147,12 @@ def provision(
     ``ProvisionError``.
     """
     from enclave_launch.admission.handshakes import halves
-    from enclave_launch.secured import ProvisionedLaunch, launch_owner, provision_policies
+    from enclave_launch.secured import (
+        ProvisionedLaunch,
+        launch_owner,
+        provision_policies,
+        provision_with_zenoh,
+    )
     from enclave_launch.security_environment import SecuritySettings
     from enclave_launch.served_domains import with_domains
     from keystore.disk.share_files import LaunchHold
@@ -151,8 +166,11 @@ def provision(
     asked = asked._replace(launch=asked.launch or LaunchHold(settings.keystore, launch_owner(plan)))
     asked = asked._replace(guid_halves=halves(mixed_enclaves(plan.processes)))
     wanted = with_domains(plan, asked, os.environ)
-    report = provision_policies(settings, plan, wanted)
-    return ProvisionedLaunch(plan, settings, report, wanted, asked)
+    if not uses_zenoh(plan, os.environ):
+        report = provision_policies(settings, plan, wanted)
+        return ProvisionedLaunch(plan, settings, report, wanted, asked)
+    wanted, report, zenoh = provision_with_zenoh(settings, plan, wanted)
+    return ProvisionedLaunch(plan, settings, report, wanted, asked, zenoh)
 
 
 def run(launch: Launch, *, options: RunSettings | None = None) -> int:

@@ -17,7 +17,7 @@ from enclave_launch.admission import AdmissionOptions, prefix_refusals, refusals
 from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.handshakes import Member, Pair, failing, mixed_pairs
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
-from enclave_launch.admission.middleware import middleware_of, vendor_of
+from enclave_launch.admission.middleware import ZENOH, middleware_of, vendor_of
 from enclave_launch.diagnostics import (
     Code,
     Diagnostic,
@@ -323,6 +323,12 @@ def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
         for item in processes
         if item.enclave
     )
+
+
+def uses_zenoh(plan: LaunchPlan, environment: Mapping[str, str]) -> bool:
+    """Whether a process of the plan, or the launcher's own node in ``environment``, is on Zenoh."""
+    own = plan.launcher is not None and middleware_of(environment, plan.distro) == ZENOH
+    return own or any(item.middleware == ZENOH and item.enclave is not None for item in plan.processes)
 
 
 def _handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:

@@ -38,7 +38,8 @@ def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -
     gate, options = _gate(launch, settings), _options(launch, settings)
     with _expiry_watch(launch):
         _check_programs(launch)
-        return run_launch(source.launch_file, source.arguments, gate=gate, options=options, warden=warden)
+        with _zenoh_router(launch):
+            return run_launch(source.launch_file, source.arguments, gate=gate, options=options, warden=warden)
 
 
 async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
@@ -47,7 +48,8 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     gate, options = _gate(launch, settings), _options(launch, settings)
     with _expiry_watch(launch):
         _check_programs(launch)
-        return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
+        with _zenoh_router(launch):
+            return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
 
 
 def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
@@ -59,7 +61,7 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     _check_programs(launch)
 
     async def main(observe: Observer, hold: Callable[[LaunchService], None]) -> int:
-        with _expiry_watch(launch):
+        with _expiry_watch(launch), _zenoh_router(launch):
             service = LaunchService(
                 source.launch_file, source.arguments, gate=gate, options=options, observe=observe
             )
@@ -76,6 +78,15 @@ def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
     from enclave_launch.expiry_watch import watched
 
     return watched(launch, _say)
+
+
+def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
+    """Before the first process, where one is on Zenoh."""
+    if isinstance(launch, _UNSECURED) or launch.zenoh is None:
+        return nullcontext()
+    from enclave_launch.secured import zenoh_router
+
+    return zenoh_router(launch, _say)
 
 
 def _say(text: str) -> None:

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.admission.handshakes import failing
+from enclave_launch.admission.middleware import ZENOH, middleware_of
 from enclave_launch.diagnostics import Diagnostic, enclave_of_several_launches, handshake_fails
-from enclave_launch.errors import ProvisionError
-from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves
+from enclave_launch.errors import ProvisionError, RuntimeFailure
+from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, uses_zenoh
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import Grant, identity
 from enclave_launch.security_environment import (
@@ -24,14 +25,20 @@ from enclave_launch.security_environment import (
     enclave_arguments,
     launcher_environment,
     secured_environment,
+    zenoh_environment,
 )
 from enclave_launch.served_domains import places, with_domains
+from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
 from keystore.formats.governance import NoGovernanceRuleError
 from keystore.formats.policy import EnclavePolicy
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
 from keystore.steps.report import ProvisionReport
+
+if TYPE_CHECKING:
+    from enclave_launch.runtime.zenoh_router import ZenohRouter
+    from keystore.steps.zenoh_configuration import ZenohReport
 
 
 class ProvisionedLaunch(NamedTuple):
@@ -43,13 +50,13 @@ class ProvisionedLaunch(NamedTuple):
     report: ProvisionReport
     options: ProvisionOptions
     asked: ProvisionOptions
+    zenoh: ZenohReport | None = None
+    """Where processes are on Zenoh: its configuration."""
 
     @property
     def handshakes(self) -> tuple[Diagnostic, ...]:
         """Of processes on two DDS implementations, those that cannot authenticate each other with the certificates
         they have now."""
-        from keystore.disk.view import KeystoreView
-
         pairs = mixed_enclaves(self.plan.processes)
         view = KeystoreView(Path(self.settings.keystore))
         subjects = {path: view.common_name(path) for pair in pairs for path in pair}
@@ -80,6 +87,23 @@ def provision_policies(
         raise ProvisionError(str(error)) from error
 
 
+def provision_with_zenoh(
+    settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions
+) -> tuple[ProvisionOptions, ProvisionReport, ZenohReport]:
+    """As ``provision_policies``, and the configuration of what is on Zenoh. Gives the options that were used, too."""
+    from enclave_launch.review.middlewares import zenoh_enclaves
+    from keystore.formats.zenoh.types import types_text
+    from keystore.steps.zenoh_configuration import options_of, write_zenoh
+
+    on_zenoh = zenoh_enclaves(plan, os.environ)
+    options = options._replace(types={path: types_text(types) for path, types in on_zenoh.items()})
+    report = provision_policies(settings, plan, options)
+    try:
+        return options, report, write_zenoh(settings.keystore, on_zenoh, options=options_of(options))
+    except KeystoreError as error:
+        raise ProvisionError(str(error)) from error
+
+
 def launch_owner(plan: LaunchPlan) -> str:
     """Whose share of an enclave this launch's permissions are: the launch file, whatever its arguments, or the program
     that made the launch description itself."""
@@ -98,6 +122,60 @@ def told_of_shares(plan: LaunchPlan, keystore: str) -> LaunchPlan:
     except KeystoreError as error:
         raise ProvisionError(str(error)) from error
     return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
+
+
+def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> ZenohRouter:
+    """The router of a launch with processes on Zenoh; entering it starts or finds one."""
+    from enclave_launch.runtime.zenoh_router import RouterPlace, ZenohRouter, find_router
+    from keystore.disk import layout
+    from keystore.formats.role import Role
+    from keystore.steps.zenoh_configuration import router_differences
+    from nodl.ament_index import search_prefixes
+
+    zenoh = launch.zenoh
+    assert zenoh is not None, "asked only where processes are on Zenoh"
+    place = RouterPlace(
+        (zenoh.router.host, zenoh.router.port),
+        str(zenoh.keystore / layout.ZENOH_ROUTER),
+        str(zenoh.keystore / layout.ZENOH_ROUTER_CERT),
+        str(zenoh.keystore / layout.ca_cert(Role.IDENTITY)),
+        lambda: _told(router_differences, zenoh.keystore),
+    )
+    program = (
+        find_router(search_prefixes(launch.plan.planner.source.prefixes)) if zenoh.router.is_here else None
+    )
+    environment = {name: value for name, value in os.environ.items() if name not in launch.secret_variables}
+    return ZenohRouter(place, program, environment, say)
+
+
+def check_router(plan: LaunchPlan, keystore: str) -> None:
+    """Before keys are made. Raises ``RuntimeFailure`` where no router is installed and nobody answers in its place."""
+    import socket
+
+    from enclave_launch.runtime.zenoh_router import find_router, missing_router
+    from keystore.disk import layout
+    from keystore.disk.zenoh_files import present_address
+    from keystore.formats.zenoh.address import RouterAddress
+    from nodl.ament_index import search_prefixes
+
+    if not uses_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):
+        return
+    try:
+        address = present_address(KeystoreView(Path(keystore))) or RouterAddress()
+    except KeystoreError as error:
+        raise ProvisionError(str(error)) from error
+    try:
+        socket.create_connection((address.host, address.port), timeout=5.0).close()
+    except OSError:
+        file = os.path.join(keystore, layout.ZENOH_ROUTER)
+        raise RuntimeFailure(missing_router((address.host, address.port), file)) from None
+
+
+def _told(differences: Callable[[Path], tuple[str, ...]], keystore: Path) -> tuple[str, ...]:
+    try:
+        return differences(keystore)
+    except KeystoreError as error:
+        return (str(error),)
 
 
 class PlanProvider:
@@ -166,15 +244,30 @@ class PlanProvider:
             if policy.path in before:  # to extend is not to repair
                 self._check(before[policy.path])
             self._follow_domains()
-            provision_policies(self._launch.settings, self._plan, self._options, policy)
+            if uses_zenoh(self._plan, os.environ):
+                self._extend_zenoh(process)
+            else:
+                provision_policies(self._launch.settings, self._plan, self._options, policy)
         return self.ensure(process)
 
+    def _extend_zenoh(self, process: ResolvedProcess) -> None:
+        """The router has to know of it before it starts."""
+        if self._launch.zenoh is None:
+            raise ProvisionError(
+                f"{process.process_name} is the first process on Zenoh, and no router was started: the plan had none"
+            )
+        _, _, zenoh = provision_with_zenoh(self._launch.settings, self._plan, self._options)
+        zenoh_router(self._launch._replace(zenoh=zenoh), lambda _: None).wait()
+
     def launcher(self) -> Grant | None:
-        launcher = self._plan.launcher
+        launcher, settings = self._plan.launcher, self._launch.settings
         if launcher is None:
             return None
         self._check(self._policies[launcher.enclave])
-        return Grant(("--enclave", launcher.enclave), launcher_environment(self._launch.settings))
+        variables = dict(launcher_environment(settings))
+        if middleware_of(os.environ, self._plan.distro) == ZENOH:
+            variables |= zenoh_environment(launcher.enclave, settings)
+        return Grant(("--enclave", launcher.enclave), variables)
 
     def _check(self, policy: EnclavePolicy) -> None:
         """Nothing is repaired here: what changed since it was signed was changed by somebody else."""
@@ -183,6 +276,10 @@ class PlanProvider:
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = differences(keystore, policy, options=self._options)
+            if self._launch.zenoh is not None:
+                from keystore.steps.zenoh_configuration import session_differences
+
+                wrong = (*wrong, *session_differences(keystore, enclave))
         except KeystoreError as error:
             raise ProvisionError(
                 f"enclave {enclave} cannot be looked at any more, though it was provisioned for this launch: {error}"

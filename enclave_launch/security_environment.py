@@ -2,7 +2,8 @@
 
 Source: rcl/src/rcl/security.c and arguments.c. A node gets ``--enclave`` (the last one given wins, so ours is
 appended only where the user wrote none); an ``executable`` action, whose command line is not ours to extend, gets
-``ROS_SECURITY_ENCLAVE_OVERRIDE``.
+``ROS_SECURITY_ENCLAVE_OVERRIDE``. A process on Zenoh gets its enclave's session configuration too; the variables of
+rcl stay, so that it ends without its enclave, and is secured should it load a DDS after all.
 """
 
 from __future__ import annotations
@@ -11,8 +12,11 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from enclave_launch.admission.domains import domain_of
+from enclave_launch.admission.middleware import ZENOH
+from enclave_launch.admission.variables import ZENOH_CLEARED, ZENOH_SESSION
 from enclave_launch.enclave import AssignmentReason
 from enclave_launch.plan import PlannedProcess
+from keystore.disk import layout
 from keystore.formats.domains import Domains
 
 ENABLE = "ROS_SECURITY_ENABLE"
@@ -58,11 +62,20 @@ def secured_environment(planned: PlannedProcess, settings: SecuritySettings | No
     if settings is None:
         return {}
     if planned.enclave is None:
-        return {ENABLE: "true", KEYSTORE: NO_KEYSTORE, STRATEGY: "Enforce"}
+        nowhere = {ENABLE: "true", KEYSTORE: NO_KEYSTORE, STRATEGY: "Enforce"}
+        return {**nowhere, ZENOH_SESSION: NO_KEYSTORE} if planned.middleware == ZENOH else nowhere
     variables = dict(launcher_environment(settings))
+    if planned.middleware == ZENOH:
+        variables |= zenoh_environment(planned.enclave.path, settings)
     if planned.enclave is not None and planned.process.kind == "executable":
         variables[OVERRIDE] = planned.enclave.path
     return variables
+
+
+def zenoh_environment(enclave: str, settings: SecuritySettings) -> Mapping[str, str]:
+    """What leads a process on Zenoh to the configuration of its enclave, and to no other."""
+    file = f"{settings.keystore}/{layout.enclave_directory(enclave)}/{layout.ENCLAVE_ZENOH}"
+    return {ZENOH_SESSION: file, **dict.fromkeys(ZENOH_CLEARED, "")}
 
 
 def launcher_environment(settings: SecuritySettings) -> Mapping[str, str]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from enclave_launch import diagnostics
 from enclave_launch.admission.domains import domain_of
-from enclave_launch.admission.middleware import VARIABLE, Vendor, middleware_of, vendor_of, why_not
+from enclave_launch.admission.middleware import VARIABLE, ZENOH, Vendor, middleware_of, vendor_of, why_not
 from enclave_launch.admission.variables import overridden, own_security, preloaded
 from enclave_launch.admission.wrappers import obstacles
 from enclave_launch.diagnostics import Diagnostic
@@ -50,10 +50,10 @@ def refusals(process: ResolvedProcess, distro: str, options: AdmissionOptions) -
 def remarks(process: ResolvedProcess, distro: str) -> Iterator[Diagnostic]:
     """What a reader should know of a process that may start."""
     name, place = process.process_name, process.location
-    for setting in overridden(process.environment):
+    middleware = middleware_of(process.final_environment, distro)
+    for setting in overridden(process.environment, on_zenoh=middleware == ZENOH):
         yield diagnostics.variable_overridden(name, setting.variable, setting.value, place)
     for setting in preloaded(process.environment):
         yield diagnostics.library_preloaded(name, setting.variable, setting.value, place)
-    middleware = middleware_of(process.final_environment, distro)
     if vendor_of(middleware) is Vendor.CONNEXT:
         yield diagnostics.connext(name, place)

@@ -1,8 +1,8 @@
 """Which middlewares read enclaves. rcl hands every one the path; what it does with it is its own business.
 
 Sources: rmw_cyclonedds_cpp ``rmw_node.cpp``, rmw_fastrtps_shared_cpp ``participant.cpp``, rmw_connextdds
-``rmw_context.cpp`` (all three set DDS-Security properties from the enclave); rmw_zenoh_cpp reads its access control
-from its own configuration. Pure.
+``rmw_context.cpp`` (all three set DDS-Security properties from the enclave); rmw_zenoh_cpp reads none and is
+secured by a configuration that the keystore has for the enclave, and by its router. Pure.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ HONOURS_ENCLAVES: dict[str, Vendor] = {
     "rmw_fastrtps_dynamic_cpp": Vendor.FAST,
     "rmw_connextdds": Vendor.CONNEXT,
 }
+ZENOH = "rmw_zenoh_cpp"
 _NO_ENCLAVES = {
-    "rmw_zenoh_cpp": "it reads no enclaves; its access control is in its own configuration (ZENOH_SESSION_CONFIG_URI)",
     "rmw_iceoryx_cpp": "it reads no enclaves and has no security of its own",
     "rmw_email_cpp": "it reads no enclaves and has no security of its own",
 }
@@ -48,7 +48,7 @@ def vendor_of(middleware: str) -> Vendor | None:
 
 def why_not(middleware: str, accepted: Collection[str] = ()) -> str | None:
     """Why a process with ``middleware`` must not start in an enclave; None when it may."""
-    if middleware in HONOURS_ENCLAVES:
+    if middleware in HONOURS_ENCLAVES or middleware == ZENOH:
         return None
     if middleware in _NO_ENCLAVES:
         return _NO_ENCLAVES[middleware]

@@ -19,6 +19,15 @@ OURS = (
     "ROS_SECURITY_STRATEGY",
     "ROS_SECURITY_ENCLAVE_OVERRIDE",
 )
+ZENOH_SESSION = "ZENOH_SESSION_CONFIG_URI"
+ZENOH_CLEARED = (
+    "ZENOH_CONFIG_OVERRIDE",  # single settings, which win over the file
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_STATIC_PEERS",
+    "ROS_LOCALHOST_ONLY",
+)
+"""What could lead a process on Zenoh past its configuration. Set to nothing, which counts as not set
+(rcutils_get_env; rmw_zenoh_cpp zenoh_config.cpp, rcl discovery_options.c)."""
 _CONFIGURATIONS = (
     "CYCLONEDDS_URI",
     "FASTRTPS_DEFAULT_PROFILES_FILE",
@@ -34,9 +43,9 @@ class Setting(NamedTuple):
     value: str
 
 
-def overridden(environment: Mapping[str, str]) -> Iterator[Setting]:
+def overridden(environment: Mapping[str, str], *, on_zenoh: bool = False) -> Iterator[Setting]:
     """What a launch file sets (``environment``: its own changes) and a secured start sets otherwise."""
-    for name in OURS:
+    for name in (*OURS, *((ZENOH_SESSION, *ZENOH_CLEARED) if on_zenoh else ())):
         if name in environment:
             yield Setting(name, environment[name])
 

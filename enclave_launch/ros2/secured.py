@@ -10,7 +10,9 @@ Every node gets its enclave and least permissions when its turn comes; what cann
 
 from __future__ import annotations
 
+import atexit
 import os
+import sys
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -26,7 +28,7 @@ from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
 from enclave_launch.ros2.session import EnclaveSession, OpenDoor
 from enclave_launch.ros_rules.distro import choose_release
-from enclave_launch.secured import ProvisionedLaunch
+from enclave_launch.secured import ProvisionedLaunch, zenoh_router
 from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY, SecuritySettings
 from nodl.ament_index import search_prefixes
 
@@ -58,7 +60,14 @@ def secured(
 def enclosed(
     description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch
 ) -> LaunchDescription:
-    """``description`` behind the actions that begin ``session`` and point every process at the keystore."""
+    """``description`` behind the actions that begin ``session`` and point every process at the keystore.
+
+    :raises RuntimeFailure: processes are on Zenoh, and no router answers or can be started.
+    """
+    if launch.zenoh is not None:
+        router = zenoh_router(launch, lambda text: print(f"ros2 launch: warning: {text}", file=sys.stderr))
+        router.__enter__()
+        atexit.register(router.__exit__)  # after the last process
     actions: list[Any] = [
         SetEnvironmentVariable(name, value) for name, value in security_variables(launch.settings).items()
     ]

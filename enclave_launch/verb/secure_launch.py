@@ -283,7 +283,7 @@ def _launch(
     from enclave_launch.verb.security import created_notices, expiry_notices, repair_notices, security_options
 
     _warn(() if options.quiet else plan.warnings)
-    _check_before_keys_are_made(plan)
+    _check_before_keys_are_made(plan, keystore)
     if options.strategy == "Permissive":
         from enclave_launch.verb.usage import PERMISSIVE_NOTICE
 
@@ -293,7 +293,8 @@ def _launch(
         for text in created_notices(launch):
             print(f"secure-launch: {printable(text)}", file=sys.stderr)
     repaired = (*repair_notices(launch), *launch.report.warnings, *launch.handshakes)
-    _warn((*repaired, *expiry_notices(launch, options.warn_expiry)))
+    gaps = launch.zenoh.gaps if launch.zenoh is not None else ()
+    _warn((*repaired, *gaps, *expiry_notices(launch, options.warn_expiry)))
     deadline = _deadline(launch) if options.restart_expiring else None
     status = run(launch, options=_run_settings(options, companion, deadline))
     return None if deadline is not None and deadline.reached else status
@@ -306,13 +307,18 @@ def _deadline(launch: ProvisionedLaunch) -> Deadline | None:
     return renewal_deadline(launch, utc_now())
 
 
-def _check_before_keys_are_made(plan: LaunchPlan) -> None:
+def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
     """What ``run`` would refuse in any case, asked before the keystore is touched. Raises as ``run`` does."""
     from enclave_launch.evaluation.programs import check_programs
+    from enclave_launch.plan import uses_zenoh
 
     if plan.problems:
         return  # told first, by ``provision``
     check_programs(plan.evaluation.processes)
+    if uses_zenoh(plan, os.environ):
+        from enclave_launch.secured import check_router
+
+        check_router(plan, keystore)
     if plan.launcher is not None:
         # It brings asyncio, which otherwise is imported while the warden starts up.
         from enclave_launch.runtime.ros_services import require_rclpy

@@ -134,6 +134,28 @@ def follow(root: Path, options: ZenohOptions) -> list[str]:
     return [*said, *report.gaps]
 
 
+def session_differences(keystore: Path | str, enclave: str) -> tuple[str, ...]:
+    """Why the session file of an enclave is not what ``write_zenoh`` left; empty when it is, or has none to have."""
+    view = KeystoreView(resolve_root(keystore))
+    text = safe_files.read_if_there(view.root, session_file(enclave))
+    address = present_address(view)
+    if text is None or address is None or text == session_content(view, enclave, address):
+        return ()
+    return (f"{session_file(enclave)} is not what was written for it",)
+
+
+def router_differences(keystore: Path | str) -> tuple[str, ...]:
+    """Why the router's file must not be used: it is not what follows from the keystore."""
+    view = KeystoreView(resolve_root(keystore))
+    address = present_address(view)
+    if address is None:
+        return (f"{layout.ZENOH_ROUTER} is missing",)
+    wanted = router_file(view, zenoh_enclaves(view), address)
+    if safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) == wanted.content:
+        return ()
+    return (f"{layout.ZENOH_ROUTER} is not what follows from the permissions that are signed",)
+
+
 RESTART = (
     "a router that runs has to be restarted to enforce it (one that secure-launch started restarts by itself)"
 )

@@ -37,9 +37,9 @@ WAYS = {
 
 @pytest.mark.parametrize("way", WAYS)
 def test_a_middleware_that_reads_no_enclaves_is_refused_with_the_reason(way: str, plan: Plan) -> None:
-    found = plan(WAYS[way].format("RMW_IMPLEMENTATION", "rmw_zenoh_cpp"))
+    found = plan(WAYS[way].format("RMW_IMPLEMENTATION", "rmw_iceoryx_cpp"))
     (problem,) = found.problems
-    assert problem.code is Code.MIDDLEWARE_REFUSED and "ZENOH_SESSION_CONFIG_URI" in problem.text
+    assert problem.code is Code.MIDDLEWARE_REFUSED and "has no security of its own" in problem.text
     assert problem.location is not None and problem.location.element in ("node", "Node")
     assert not plan(WAYS[way].format("RMW_IMPLEMENTATION", "rmw_cyclonedds_cpp")).problems
 
@@ -47,7 +47,7 @@ def test_a_middleware_that_reads_no_enclaves_is_refused_with_the_reason(way: str
 def test_the_environment_counts_and_only_one_node_may_differ(
     plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_iceoryx_cpp")
     other = '<env name="RMW_IMPLEMENTATION" value="rmw_fastrtps_dynamic_cpp"/>'
     (problem,) = plan(TALKER.format("") + TALKER.format(other)).problems
     assert problem.subject == "talker-1" and "RMW_IMPLEMENTATION of the environment" in problem.text
@@ -58,8 +58,8 @@ def test_an_unknown_middleware_needs_somebody_to_vouch_for_it(plan: Plan) -> Non
     (problem,) = plan(text).problems
     assert problem.remedy.endswith("--accept-middleware rmw_new_cpp")
     assert not plan(text, accept_middlewares=("rmw_new_cpp",)).problems
-    zenoh = text.replace("rmw_new_cpp", "rmw_zenoh_cpp")
-    assert plan(zenoh, accept_middlewares=("rmw_zenoh_cpp",)).problems
+    known = text.replace("rmw_new_cpp", "rmw_iceoryx_cpp")
+    assert plan(known, accept_middlewares=("rmw_iceoryx_cpp",)).problems
 
 
 def test_of_connext_is_said_what_is_known(plan: Plan) -> None:
@@ -69,7 +69,7 @@ def test_of_connext_is_said_what_is_known(plan: Plan) -> None:
 
 def test_a_program_that_is_no_node_may_use_what_it_likes(plan: Plan) -> None:
     """rcl looks for the enclave before it loads a middleware: without one a ROS program ends."""
-    text = '<executable cmd="true"{}><env name="RMW_IMPLEMENTATION" value="rmw_zenoh_cpp"/></executable>'
+    text = '<executable cmd="true"{}><env name="RMW_IMPLEMENTATION" value="rmw_iceoryx_cpp"/></executable>'
     assert not plan(text.format("")).problems
     assert codes(plan(text.format(' enclave="/x"'))) == [Code.MIDDLEWARE_REFUSED]
 
@@ -173,7 +173,7 @@ def test_the_launchers_own_node_needs_such_a_middleware_too(
     plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It loads components and changes states from an enclave of its own, in the launcher's environment."""
-    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_iceoryx_cpp")
     text = (
         '<node_container pkg="demo_nodes" exec="component_container" name="box" namespace="">'
         '<env name="RMW_IMPLEMENTATION" value="rmw_cyclonedds_cpp"/>{}</node_container>'

@@ -22,10 +22,11 @@ def types_of_interface(
     Source for actions: rosidl (``Fibonacci_SendGoal``, ``Fibonacci_FeedbackMessage``), rcl_action's names.
     """
     if operation not in (Operation.CALL, Operation.EXECUTE):
-        yield _PLAIN[operation], name, type_chunk(ros_type)
+        part = "msg" if operation in (Operation.PUBLISH, Operation.SUBSCRIBE) else "srv"
+        yield _PLAIN[operation], name, type_chunk(ros_type) if f"/{part}/" in ros_type else None
         return
     service, topic = (Use.CALL, Use.SUBSCRIBE) if operation is Operation.CALL else (Use.SERVE, Use.PUBLISH)
-    own = type_chunk(ros_type)
+    own = type_chunk(ros_type) if "/action/" in ros_type else None
     for part, suffix in (("send_goal", "_SendGoal_"), ("get_result", "_GetResult_")):
         yield service, f"{name}/_action/{part}", own and own[:-1] + suffix
     yield service, f"{name}/_action/cancel_goal", type_chunk("action_msgs/srv/CancelGoal")

@@ -1,0 +1,240 @@
+"""The Zenoh router of a launch: ``rmw_zenohd``, started before the first process and ended after the last.
+
+One router serves a keystore. Where one answers already, it is used if it is the keystore's and knows the present
+rules: its certificate is issued anew with each change of them, so who connects can tell. A router of ours is started
+again when its file changes, and when it ends by itself; clients come back to it by themselves.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import ctypes
+import os
+import signal
+import socket
+import ssl
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from enum import Enum
+from pathlib import Path
+from typing import NamedTuple
+
+from enclave_launch.errors import RuntimeFailure
+
+PROGRAM = "lib/rmw_zenoh_cpp/rmw_zenohd"
+CONFIGURATION = "ZENOH_ROUTER_CONFIG_URI"
+_PATIENCE = 30.0  # seconds until it answers
+_LOOK = 0.1
+_PAUSE = 1.0  # before one that ended is started again
+_PR_SET_PDEATHSIG = 1  # linux/prctl.h
+_LINES_KEPT = 20
+
+
+class RouterPlace(NamedTuple):
+    """``address``: host and port; the others are absolute paths. ``differences``: why the configuration must not be
+    used; it is asked before each start."""
+
+    address: tuple[str, int]
+    configuration: str
+    certificate: str
+    authorities: str
+    differences: Callable[[], Sequence[str]]
+
+
+class Answer(Enum):
+    """Who answers where the router should be."""
+
+    NOBODY = "nobody"
+    STRANGER = "somebody who is not this keystore's router"
+    EARLIER = "this keystore's router with earlier rules"
+    PRESENT = "this keystore's router"
+
+
+def find_router(prefixes: Sequence[str]) -> str | None:
+    """``rmw_zenohd`` of the first of these ament prefixes that has it."""
+    candidates = (os.path.join(prefix, PROGRAM) for prefix in prefixes)
+    return next((path for path in candidates if os.access(path, os.X_OK)), None)
+
+
+def who_answers(place: RouterPlace, timeout: float = 5.0) -> Answer:
+    context = ssl.create_default_context(cafile=place.authorities)
+    host, port = place.address
+    try:
+        with socket.create_connection((host, port), timeout) as plain:
+            plain.settimeout(timeout)
+            with context.wrap_socket(plain, server_hostname=host) as secured:
+                presented = secured.getpeercert(binary_form=True)
+    except ConnectionRefusedError:
+        return Answer.NOBODY
+    except (TimeoutError, ssl.SSLError, ConnectionError):
+        return Answer.STRANGER
+    except OSError:
+        return Answer.NOBODY
+    expected = ssl.PEM_cert_to_DER_cert(Path(place.certificate).read_text())
+    return Answer.PRESENT if presented == expected else Answer.EARLIER
+
+
+class ZenohRouter:
+    """A context: within it a router with the present rules answers. ``program``: None where none is installed.
+
+    :raises RuntimeFailure: on entering, when none answers and none can be started, or somebody else is there.
+    """
+
+    def __init__(
+        self,
+        place: RouterPlace,
+        program: str | None,
+        environment: Mapping[str, str],
+        say: Callable[[str], None],
+    ) -> None:
+        self._place = place
+        self._program = program
+        self._environment = {**environment, CONFIGURATION: place.configuration, "ZENOH_CONFIG_OVERRIDE": ""}
+        self._say = say
+        self._printed: deque[str] = deque(maxlen=_LINES_KEPT)
+        self._stop = threading.Event()
+        self._failed = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def __enter__(self) -> ZenohRouter:
+        answer = who_answers(self._place)
+        if answer is Answer.NOBODY:
+            self._start()
+        self.wait()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def wait(self) -> None:
+        """Until a router with the present rules answers. :raises RuntimeFailure: none does in time."""
+        end = time.monotonic() + _PATIENCE
+        answer = who_answers(self._place)
+        while answer is not Answer.PRESENT:
+            if (
+                self._failed.is_set()
+                or time.monotonic() > end
+                or (answer is Answer.STRANGER and not self._thread)
+            ):
+                self._stop.set()
+                raise RuntimeFailure(self._failure(answer))
+            time.sleep(_LOOK)
+            answer = who_answers(self._place)
+
+    def _failure(self, answer: Answer) -> str:
+        host, port = self._place.address
+        where = f"tls/{host}:{port}"
+        if self._thread is not None:
+            said = "".join(f"\n  {line}" for line in self._printed) or " nothing"
+            return f"the Zenoh router {self._program} does not answer at {where}; it said:{said}"
+        if answer is Answer.EARLIER:
+            return (
+                f"the Zenoh router at {where} runs with earlier rules than those of the keystore: restart it there "
+                f"(with {CONFIGURATION}={self._place.configuration})"
+            )
+        return (
+            f"at {where}, where the Zenoh router should be, {answer.value} answers: end it, or give the router another "
+            "place with secure-keystore zenoh KEYSTORE --router HOST:PORT"
+        )
+
+    def _start(self) -> None:
+        if self._program is None:
+            raise RuntimeFailure(self._missing())
+        if wrong := self._place.differences():
+            raise RuntimeFailure(f"no Zenoh router is started: {'; '.join(wrong)}")
+        self._thread = threading.Thread(target=self._supervise, name="zenoh router", daemon=True)
+        self._thread.start()
+
+    def _missing(self) -> str:
+        return missing_router(self._place.address, self._place.configuration)
+
+    def _supervise(self) -> None:
+        """The only thread that starts it: with this thread the kernel ends it, too."""
+        while not self._stop.is_set():
+            seen = _state(self._place.configuration)
+            try:
+                process = self._popen()
+            except OSError as error:
+                self._printed.append(f"{self._program}: {error.strerror}")
+                self._failed.set()
+                return
+            reader = threading.Thread(target=self._read, args=(process,), daemon=True)
+            reader.start()
+            self._follow(process, seen)
+            _end(process)
+            reader.join(timeout=_PAUSE)
+
+    def _popen(self) -> subprocess.Popen[bytes]:
+        assert self._program is not None, "looked for before"
+        return subprocess.Popen(
+            [self._program], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            env=self._environment, start_new_session=True, preexec_fn=_die_with_parent,
+        )  # fmt: skip
+
+    def _follow(self, process: subprocess.Popen[bytes], seen: object) -> None:
+        """Until it has to be started again, or all is over."""
+        refused = ""
+        while not self._stop.wait(_LOOK):
+            if process.poll() is not None:
+                self._say(f"the Zenoh router ended (exit status {process.returncode}); it is started again")
+                self._stop.wait(_PAUSE)
+                return
+            if _state(self._place.configuration) != seen:
+                wrong = "; ".join(self._place.differences())
+                if not wrong:
+                    return
+                if wrong != refused:
+                    refused = wrong
+                    self._say(f"the Zenoh router keeps the rules that it has: {wrong}")
+
+    def _read(self, process: subprocess.Popen[bytes]) -> None:
+        assert process.stdout is not None, "it is a pipe"
+        with process.stdout:
+            for line in process.stdout:
+                text = line.decode(errors="replace").rstrip()
+                self._printed.append(text)
+                print(f"[rmw_zenohd] {text}", file=sys.stderr)
+
+
+def missing_router(address: tuple[str, int], configuration: str) -> str:
+    host, port = address
+    return (
+        f"processes of this launch are on Zenoh (rmw_zenoh_cpp), no router answers at tls/{host}:{port}, and none can "
+        f"be started: no {PROGRAM} below AMENT_PREFIX_PATH. Install the package rmw_zenoh_cpp (apt: "
+        f"ros-$ROS_DISTRO-rmw-zenoh-cpp) and source its setup file, or start a router with "
+        f"{CONFIGURATION}={configuration}"
+    )
+
+
+def _state(path: str) -> object:
+    try:
+        info = os.stat(path)
+    except OSError:
+        return None
+    return info.st_ino, info.st_mtime_ns, info.st_size
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """As a terminal ends it; one that does not obey is killed."""
+    with contextlib.suppress(ProcessLookupError):
+        process.send_signal(signal.SIGINT)
+    try:
+        process.wait(timeout=5.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+
+
+_libc = ctypes.CDLL(None, use_errno=True)
+
+
+def _die_with_parent() -> None:
+    """In the child: it must not outlive us, however we end."""
+    if hasattr(_libc, "prctl"):
+        _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
