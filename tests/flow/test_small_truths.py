@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from enclave_launch import LaunchFileError, ManifestError, ResolveOptions, provi
 from enclave_launch.diagnostics import Code
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.policy.explanation import explain
+from enclave_launch.verb.secure_launch import main
 
 from .conftest import DEMO
 
@@ -122,3 +124,17 @@ def test_remaps_of_a_python_file_may_come_in_any_collection(rules: str, tmp_path
     found = resolve(tmp_path / "a.launch.py", options=ResolveOptions(prefixes=(DEMO,)))
     (enclave,) = found.derived.policy.enclaves
     assert "/x" in {rule.expression for profile in enclave.profiles for rule in profile.rules}
+
+
+def test_what_a_launch_file_prints_does_not_get_into_the_plan(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """turtlebot3_bringup's launch files print the name of their URDF."""
+    file = tmp_path / "printing.launch.py"
+    file.write_text(
+        "from launch import LaunchDescription\n"
+        "def generate_launch_description():\n    print('urdf_file_name')\n    return LaunchDescription([])\n"
+    )
+    assert main([str(file), "--dry-run", "--format", "json"]) == 0
+    said = capsys.readouterr()
+    assert json.loads(said.out) and "urdf_file_name" in said.err
