@@ -16,7 +16,7 @@ from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Grants, Need
-from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, Cause, cause_of
+from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
@@ -57,8 +57,8 @@ class Denial(NamedTuple):
         if self.granted:
             why = "; ".join(asked.error) or "no reason was given"
             lines.append(f"  the plan grants it, so that it is refused for another reason: {why}")
-            if self.cause is not None:
-                lines.append(f"  {self.cause.what}; {self.cause.remedy}")
+            cause = self.cause or NOT_AS_PLANNED
+            lines.append(f"  {'' if self.cause else 'it may be that '}{cause.what}; {cause.remedy}")
             return lines
         lines.append(f"  the node is described by {self.described.text}; that does not ask for it")
         if self.patch is not None:

@@ -76,21 +76,48 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
         "its governance asks for other protection than its peer's",
         "give all processes the governance of one keystore",
     ),
+    (
+        r"validate_local_identity",
+        "its certificate was not accepted: it was issued by another CA than the one its enclave names, or has ended",
+        "secure-keystore verify tells which",
+    ),
 )
+_AT_LAST = (
+    (
+        r"Cannot create participant due to initialization error",
+        "Fast DDS does not accept the files of its enclave, and does not say which",
+        "secure-keystore verify tells whether its permissions, governance or certificates are damaged, have ended or "
+        "were signed by another CA; " + _PROVISION,
+    ),
+)
+"""Said in any case, whatever the reason: of use where nothing else was said."""
 MIXED_MIDDLEWARES = Cause(
     "secured, some pairs of them never finish the handshake, and are silent",
     "use one middleware for all (RMW_IMPLEMENTATION)",
     "",
 )
-_COMPILED = tuple((re.compile(pattern), what, remedy) for pattern, what, remedy in _CAUSES)
+NOT_AS_PLANNED = Cause(
+    "the permissions in its enclave are not those of the plan, or are for another DDS domain than the one it talks in",
+    "compare ROS_DOMAIN_ID with the domain that was provisioned; secure-keystore verify; " + _PROVISION,
+    "",
+)
+_COMPILED, _COMPILED_AT_LAST = (
+    tuple((re.compile(pattern), what, remedy) for pattern, what, remedy in causes)
+    for causes in (_CAUSES, _AT_LAST)
+)
 HARMLESS = re.compile(r"Remote secure participant .* not allowed")
 """Printed while a peer is met before it is authenticated; ends with the handshake."""
 
 
 def cause_of(texts: Iterable[str]) -> Cause | None:
     """The first cause that one of ``texts`` tells."""
+    said = tuple(texts)
+    return _told(said, _COMPILED) or _told(said, _COMPILED_AT_LAST)
+
+
+def _told(texts: Iterable[str], causes: Iterable[tuple[re.Pattern[str], str, str]]) -> Cause | None:
     for text in texts:
-        for pattern, what, remedy in _COMPILED:
+        for pattern, what, remedy in causes:
             match = pattern.search(text)
             if match is not None and not HARMLESS.search(text):
                 return Cause(what.format(*match.groups()), remedy.format(*match.groups()), match[0])

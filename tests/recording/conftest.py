@@ -12,6 +12,7 @@ import pytest
 from enclave_launch.recording.build import recorder_library
 from enclave_launch.recording.environment import RECORD_VARIABLE
 from nodl.record.assembly import Record, read_record
+from tests.dds.conftest import domain_id as domain_id
 from tests.recording.stand_in_launch import build_stand_in
 
 ROOT = Path(__file__).parent.parent.parent

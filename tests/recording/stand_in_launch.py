@@ -9,6 +9,9 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.dds.conftest import build as build_once
+from tests.dds.conftest import missing
+
 ROOT = Path(__file__).parent.parent.parent
 SOURCES = Path(__file__).parent / "stand_in"
 PACKAGE = "stand_in_nodes"
@@ -73,13 +76,31 @@ def build_stand_in(folder: Path) -> Path:
         subprocess.run(command, check=True)
 
     build("librcutils.so", "rcl.c", "-shared", "-DPART=1")
-    build("librcl.so", "rcl.c", "-shared", "-DPART=2", "-lrcutils")
+    build("librcl.so", "rcl.c", "-shared", "-DPART=2", "-lrcutils", "-ldl")
     build("librcl_action.so", "rcl.c", "-shared", "-DPART=3", "-lrcl", "-lrcutils")
     build("librcl_lifecycle.so", "rcl.c", "-shared", "-DPART=4", "-lrcl", "-lrcutils")
     libraries = ("-lrcl", "-lrcl_action", "-lrcl_lifecycle", "-lrcutils")
     build("librclcpp.so", "rclcpp.c", "-shared", "-pthread", *libraries)
     build("program", "program.c", "-lrclcpp")
     return folder
+
+
+def build_dds(name: str) -> Path:
+    """The library by which the stand-in asks a real DDS, ``cyclonedds`` or ``fastdds``; fails in CI without it."""
+    if name == "fastdds":
+        if not Path("/usr/include/fastdds/dds").is_dir():
+            missing("Fast DDS", "apt-get install g++ libfastrtps-dev")
+        probe = ROOT / "tests" / "dds" / "fastdds_probe"
+        sources = [SOURCES / "fastdds.cpp", *sorted(probe.glob("participant.*")), probe / "string_type.hpp"]
+        compiler = ["g++", "-std=c++17", "-shared", "-fPIC", f"-I{probe}"]
+        return build_once(sources, compiler, ["-lfastrtps", "-lfastcdr"])
+    home = Path(os.environ.get("CYCLONEDDS_HOME", "/usr"))
+    folders = [home / "lib", *home.glob("lib/*-linux-gnu")]
+    plugins = [found.parent for each in folders for found in each.glob("**/libdds_security_auth.so")]
+    if not plugins:
+        missing("Cyclone DDS with security", "apt-get install cyclonedds-dev")
+    compiler = ["cc", "-shared", "-fPIC", f'-DPLUGINS="{plugins[0]}"', f"-I{home}/include", f"-L{home}/lib"]
+    return build_once([SOURCES / "cyclonedds.c"], compiler, ["-lddsc"])
 
 
 def asks(endpoints: Iterable[tuple[str, str]]) -> str:

@@ -6,6 +6,7 @@ The stand-in for rcl reads the permissions that were really signed for its encla
 from __future__ import annotations
 
 import re
+import shutil
 from pathlib import Path
 
 import pytest
@@ -22,6 +23,7 @@ from tests.recording.stand_in_launch import (
     Program,
     Workspace,
     asks,
+    build_dds,
     make_workspace,
     manifest_text,
 )
@@ -48,11 +50,14 @@ def secured(workspace: Workspace, *arguments: str, **variables: str) -> str:
     return ran.stdout + ran.stderr
 
 
-def denied_program(number: int) -> Program:
-    """One that asks for six names that its manifest has and six that it lacks; renamed, pushed, remapped; some as
-    lifecycle nodes."""
+def denied_program(number: int, times: int = 1) -> Program:
+    """One that asks for six names that its manifest has and ``times`` six that it lacks; renamed, pushed, remapped;
+    some as lifecycle nodes."""
     name = f"node_{number}"
-    wanted = tuple((kind, f"{'~/' if number % 3 == 0 else ''}secret_{number}") for kind in LISTS)
+    private = "~/" if number % 3 == 0 else ""
+    wanted = tuple(
+        (kind, f"{private}secret_{number}{_ending(time)}") for time in range(times) for kind in LISTS
+    )
     begin = "lifecycle" if number % 4 == 0 else "node"
     lifecycle = ", lifecycle: true" if begin == "lifecycle" else ""
     attributes = f'name="renamed_{number}" namespace="/ns_{number % 5}"' if number % 2 else ""
@@ -67,16 +72,22 @@ def denied_program(number: int) -> Program:
     )
 
 
-def expected(number: int) -> set[tuple[str, str, str]]:
+def _ending(time: int) -> str:
+    return f"_{time}" if time else ""
+
+
+def expected(number: int, times: int = 1) -> set[tuple[str, str, str]]:
     """Node, words and final name of what is refused to it."""
     namespace = f"/ns_{number % 5}" if number % 2 else ""
     node = f"{namespace}/{'renamed' if number % 2 else 'node'}_{number}"
     private, moved = number % 3 == 0, number % 5 == 0
     found = set()
-    for kind, words in WORDS.items():
-        is_action = kind.startswith("action")  # jazzy does not remap actions
-        name = f"moved_{number}" if moved and not private and not is_action else f"secret_{number}"
-        found.add((node, words, f"{node if private else namespace}/{name}"))
+    for time in range(times):
+        for kind, words in WORDS.items():
+            is_action = kind.startswith("action")  # jazzy does not remap actions
+            remapped = moved and not private and not is_action and time == 0
+            name = f"moved_{number}" if remapped else f"secret_{number}{_ending(time)}"
+            found.add((node, words, f"{node if private else namespace}/{name}"))
     return found
 
 
@@ -98,9 +109,28 @@ def patches(output: str) -> list[tuple[str, str, str]]:
 
 def test_two_hundred_denials_are_explained_and_their_patches_cure(stand_in: Path, tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path, stand_in, map(denied_program, range(PROGRAMS)))
-    output = secured(workspace)
-    wanted = {each for number in range(PROGRAMS) for each in expected(number)}
-    assert len(wanted) == PROGRAMS * 6 > 200
+    all_explained_and_cured(workspace, {each for number in range(PROGRAMS) for each in expected(number)})
+
+
+@pytest.mark.dds
+@pytest.mark.parametrize("dds", ["cyclonedds", "fastdds"])
+def test_two_hundred_denials_of_a_real_dds(dds: str, stand_in: Path, tmp_path: Path, domain_id: int) -> None:
+    """Who refuses is DDS itself, by the permissions that were signed."""
+    programs, times = range(5), 7
+    workspace = make_workspace(tmp_path, stand_in, (denied_program(number, times) for number in programs))
+    wanted = {each for number in programs for each in expected(number, times)}
+    all_explained_and_cured(workspace, wanted, **on_dds(dds, domain_id))
+
+
+def on_dds(dds: str, domain_id: int) -> dict[str, str]:
+    return {"STAND_IN_DDS": str(build_dds(dds)), "ROS_DOMAIN_ID": str(domain_id)}
+
+
+def all_explained_and_cured(
+    workspace: Workspace, wanted: set[tuple[str, str, str]], **variables: str
+) -> None:
+    output = secured(workspace, **variables)
+    assert len(wanted) > 200
     assert told(output) == wanted
     assert "could not join DDS" not in output
     found = patches(output)
@@ -108,7 +138,7 @@ def test_two_hundred_denials_are_explained_and_their_patches_cure(stand_in: Path
     for file, before, added in found:
         text = Path(file).read_text()
         Path(file).write_text(text.replace(f"{before}\n", f"{before}\n{added}\n", 1))
-    assert told(secured(workspace)) == set()
+    assert told(secured(workspace, **variables)) == set()
 
 
 def test_a_program_that_ends_at_its_first_refusal_is_explained_too(stand_in: Path, tmp_path: Path) -> None:
@@ -176,6 +206,66 @@ def test_a_node_that_cannot_join_is_explained_by_what_the_middleware_says(
     for i, explanation in enumerate(WORDS_OF_MIDDLEWARES.values()):
         assert f"node n{i} of n{i}-{i + 1} (enclave /n{i}) could not join DDS: {explanation}" in output
     assert output.count("could not join DDS") == len(programs)
+
+
+DAMAGED, NOT_SAID = (
+    "its signed permissions or governance are damaged",
+    "Fast DDS does not accept the files of its enclave",
+)
+KEY = "its key or certificate cannot be read by this process"
+BROKEN = {
+    "cyclonedds": {
+        "governance.p7s": DAMAGED,
+        "permissions.p7s": DAMAGED,
+        "key.pem": KEY,
+        "identity_ca.cert.pem": "its certificate was issued by another CA",
+    },
+    "fastdds": {
+        "governance.p7s": NOT_SAID,
+        "permissions.p7s": NOT_SAID,
+        "key.pem": KEY,
+        "identity_ca.cert.pem": "its certificate was not accepted",
+    },
+}
+OTHER_DOMAIN = {
+    "cyclonedds": r"node domain of .* could not join DDS: its permissions are not for DDS domain {}",
+    "fastdds": r"(?s)node /domain may not publish topic /rosout.*are for another DDS domain",
+}
+
+
+@pytest.mark.dds
+@pytest.mark.parametrize("dds", ["cyclonedds", "fastdds"])
+def test_a_real_dds_that_lets_a_node_not_join_is_explained(
+    dds: str, stand_in: Path, tmp_path: Path, domain_id: int
+) -> None:
+    """Broken enclaves, each with one fault, and another domain, in which Fast DDS refuses endpoint by endpoint."""
+    whole = make_workspace(tmp_path / "whole", stand_in, [Program("n", "node n\n", ())])
+    secured(whole, **on_dds(dds, domain_id))
+    enclave = whole.folder / "ks" / "enclaves" / "n"
+    other = f'<env name="STAND_IN_DOMAIN" value="{domain_id + 100}"/>'
+    programs = [Program("domain", "node domain\n", (), inside=other)]
+    for file in BROKEN[dds]:
+        name = file.partition(".")[0]
+        folder = shutil.copytree(enclave, tmp_path / "broken" / name)
+        (folder / file).unlink()
+        (folder / file).write_bytes(broken(enclave, file))
+        inside = f'<env name="STAND_IN_FOLDER" value="{folder}"/>'
+        programs.append(Program(name, f"node {name}\n", (), inside=inside))
+    output = secured(make_workspace(tmp_path / "ws", stand_in, programs), **on_dds(dds, domain_id))
+    for file, explanation in BROKEN[dds].items():
+        name = file.partition(".")[0]
+        assert re.search(rf"node {name} of .* could not join DDS: {explanation}", output), output
+    assert re.search(OTHER_DOMAIN[dds].format(domain_id + 100), output), output
+
+
+def broken(enclave: Path, file: str) -> bytes:
+    """The file with one fault: text that was signed is changed, a key is cut, a CA is another one."""
+    data = (enclave / file).read_bytes()
+    if file.endswith(".p7s"):
+        return data.replace(b"<", b"< ", 1)
+    if file == "key.pem":
+        return data[: len(data) // 2]
+    return (enclave / "permissions_ca.cert.pem").read_bytes()
 
 
 def test_a_missing_enclave_is_explained_by_rcl_itself(stand_in: Path, tmp_path: Path) -> None:

@@ -1,10 +1,11 @@
 /* A stand-in for librcl, librcl_action, librcl_lifecycle and librcutils: the same symbols and the same calls between
  * them, for tests of the recorder where ROS is not installed. It expands and remaps names, enforces the permissions
- * of its enclave as DDS would, and says what rcl of jazzy on Cyclone DDS says when an endpoint is refused.
+ * of its enclave as DDS would (or lets a real DDS do it, by the library in STAND_IN_DDS), and says what rcl of jazzy on Cyclone DDS says when an endpoint is refused.
  *
  * Built four times: PART 1 librcutils, 2 librcl, 3 librcl_action, 4 librcl_lifecycle.
  */
 #define _GNU_SOURCE
+#include <dlfcn.h>
 #include <fnmatch.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -104,6 +105,27 @@ static void resolve(const node_t * node, const char * name, char * out)
   }
 }
 
+static bool (*dds_join)(const char * folder, unsigned domain);
+static bool (*dds_endpoint)(const char * topic, bool writes);
+
+/* With a real DDS: one participant for the process, as rmw has it. */
+static bool joins(void)
+{
+  const char * library = getenv("STAND_IN_DDS"), * other = getenv("STAND_IN_FOLDER"), * domain = getenv("STAND_IN_DOMAIN");
+  char folder[1024];
+  if (library == NULL || dds_join != NULL)
+    return true;
+  void * loaded = dlopen(library, RTLD_NOW | RTLD_LOCAL);
+  if (loaded == NULL) {
+    fprintf(stderr, "%s\n", dlerror());
+    abort();
+  }
+  dds_join = (bool (*)(const char *, unsigned))dlsym(loaded, "stand_in_join");
+  dds_endpoint = (bool (*)(const char *, bool))dlsym(loaded, "stand_in_endpoint");
+  snprintf(folder, sizeof folder, "%s/enclaves%s", getenv("ROS_SECURITY_KEYSTORE"), enclave);
+  return dds_join(other ? other : folder, atoi(domain ? domain : getenv("ROS_DOMAIN_ID")));
+}
+
 /* Whether the permissions of our enclave have a rule of this element that fits the topic. */
 static bool granted(const char * element, const char * topic)
 {
@@ -112,6 +134,8 @@ static bool granted(const char * element, const char * topic)
   static char text[1 << 20];
   if (keystore == NULL || on == NULL || strcmp(on, "true"))
     return true;
+  if (dds_endpoint != NULL)
+    return dds_endpoint(topic, !strcmp(element, "publish"));
   snprintf(path, sizeof path, "%s/enclaves%s/permissions.xml", keystore, enclave);
   FILE * file = fopen(path, "r");
   if (file == NULL)
@@ -162,6 +186,8 @@ rcl_ret_t rcl_node_init(node_t * node, const char * name, const char * space, vo
     fprintf(stderr, "1795291119.263579 [7] x: %s\n", getenv("STAND_IN_NODE_FAILS"));
     return 1;
   }
+  if (!joins())
+    return 1; /* jazzy: without a text; DDS has printed its own */
   const char * given = rule_for("__node"), * pushed = rule_for("__ns");
   snprintf(node->name, sizeof node->name, "%s", given ? given : name);
   snprintf(node->space, sizeof node->space, "%s%s", space[0] == '/' || pushed ? "" : "/", pushed ? pushed : space);
