@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from nodl.errors import NoDLError
 from nodl.library.document import SUFFIX, LibraryDocument, read_library_document, stem_of
 
 INDEX = "index.json"
@@ -50,8 +51,13 @@ def read_index(folder: str) -> tuple[IndexEntry, ...]:
 
 
 def scanned(folder: str) -> tuple[IndexEntry, ...]:
-    """The entries of all documents below ``folder``. Raises ``InvalidNoDLError`` for a broken one."""
-    return tuple(_entry(folder, read_library_document(folder, file)) for file in _files(folder))
+    """The entries of all documents below ``folder``. Raises ``InvalidNoDLError`` for a broken one, ``NoDLError`` for
+    one that would never be found."""
+    found = {file: read_library_document(folder, file) for file in _files(folder)}
+    for file, document in found.items():
+        if "/" not in document.stem and not document.recorded:  # a program without a package can be recorded
+            raise _misplaced(folder, file)
+    return tuple(_entry(folder, document) for document in found.values())
 
 
 def index_text(folder: str) -> str:
@@ -76,13 +82,27 @@ def _entry(folder: str, document: LibraryDocument) -> IndexEntry:
 
 
 def _files(folder: str) -> Iterator[str]:
-    """``PACKAGE/NAME.nodl.yaml``, and ``PACKAGE__NAME.nodl.yaml`` as ``--learn`` writes them."""
+    """``PACKAGE/NAME.nodl.yaml``, and ``PACKAGE__NAME.nodl.yaml`` as ``--learn`` writes them. Raises ``NoDLError`` for
+    other documents: to pass over them would look as if they said nothing."""
     for name in sorted(os.listdir(folder)):
-        inside = os.path.join(folder, name)
-        if os.path.isdir(inside):
-            yield from (f"{name}/{each}" for each in sorted(os.listdir(inside)) if each.endswith(SUFFIX))
-        elif name.endswith(SUFFIX) and "__" in name:
+        if os.path.isdir(os.path.join(folder, name)):
+            inside = sorted(os.listdir(os.path.join(folder, name)))
+            yield from (f"{name}/{each}" for each in inside if _is_document(folder, f"{name}/{each}"))
+        elif _is_document(folder, name):
             yield name
+
+
+def _is_document(folder: str, file: str) -> bool:
+    if ".nodl." in file and not file.endswith(SUFFIX):
+        raise _misplaced(folder, file)
+    return file.endswith(SUFFIX)
+
+
+def _misplaced(folder: str, file: str) -> NoDLError:
+    return NoDLError(
+        f"{os.path.join(folder, file)}: a library has documents of NoDL v2 as PACKAGE/NAME{SUFFIX}, "
+        f"or PACKAGE__NAME{SUFFIX} as --learn writes them; name any other file with --nodl"
+    )
 
 
 def write_index(folder: str) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import ManifestError, UsageError
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
@@ -135,6 +135,18 @@ def test_a_folder_that_learn_wrote_is_a_library_too(
     assert allowed(plan, "publish") == ["/from_one", "/from_two"]
     assert [node.fqn for node in plan.nodes] == ["/one", "/two"]
     assert str(plan.processes[0].origin) == "recorded"
+
+
+@pytest.mark.parametrize("file", ["prog.nodl.yaml", "pkg/prog.nodl.xml", "pkg/prog.nodl.json"])
+def test_a_document_that_a_library_cannot_have_is_told(
+    launch: Launch, install: Callable[..., Path], tmp_path: Path, file: str
+) -> None:
+    install("pkg", "prog")
+    path = tmp_path / "own" / file
+    path.parent.mkdir(parents=True)
+    path.write_text("nodl_version: 2\n")
+    with pytest.raises(ManifestError, match=r"PACKAGE/NAME\.nodl\.yaml"):
+        launch(NODE, library_folders=(tmp_path / "own",))
 
 
 def test_the_library_answers_where_an_analysis_leaves_something_open(
