@@ -63,6 +63,7 @@ if TYPE_CHECKING:
     from keystore.steps.report import EnclaveReport as EnclaveReport
     from keystore.steps.report import ProvisionReport as ProvisionReport
     from keystore.steps.request_signing import SigningOptions as SigningOptions
+    from keystore.steps.request_signing import accept_certificates as accept_certificates
     from keystore.steps.request_signing import sign_requests as sign_requests
     from keystore.steps.rollover import Step as Step
     from keystore.steps.rollover import roll_over as roll_over
@@ -119,6 +120,7 @@ _HOMES = {
     "RequestOptions": "steps.host_keys",
     "request": "steps.host_keys",
     "SigningOptions": "steps.request_signing",
+    "accept_certificates": "steps.request_signing",
     "sign_requests": "steps.request_signing",
     "FleetReport": "steps.fleet",
     "fleet_status": "steps.fleet",

@@ -24,7 +24,7 @@ from keystore.disk.store import Content, Store
 from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, NotAKeystoreError, printable
-from keystore.formats.certificate import read_certificate
+from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.register import AuthorityState
@@ -40,10 +40,11 @@ from keystore.steps.opening import opened_for_change
 
 @dataclass(frozen=True, slots=True)
 class ImportedCa:
-    """An existing CA: its PEM certificate and its PEM key, or a file with the key's ``pkcs11:`` URI."""
+    """An existing CA: its PEM certificate and its PEM key, or a file with the key's ``pkcs11:`` URI. Without ``key`` an
+    identity CA of somebody else (Vault, step-ca, cert-manager), which issues certificates for requests."""
 
     certificate: Path
-    key: Path
+    key: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,8 +107,11 @@ def refuse_unusable(options: CreateOptions) -> None:
     passphrase = passphrase_for_new_keys(options.encrypt_ca_keys, options.access)
     if passphrase is not None:
         passphrase.value()
-    for role in options.imported:
-        _import_ca(role, options, [])
+    for role, given in options.imported.items():
+        if given.key is None:
+            _external_ca(role, options)
+        else:
+            _import_ca(role, options, [])
 
 
 def _refuse_foreign(root: Path) -> None:
@@ -155,6 +159,15 @@ def _complete_ca(
         _record_present_ca(opened, view, role)
         return  # a key may be missing: the CA may be kept elsewhere
     _refuse_foreign_enclaves(view, role)
+    if role in options.imported and options.imported[role].key is None:
+        facts = _external_ca(role, options)
+        with opened.batch() as batch:
+            batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
+            batch.file(layout.ca_cert(role), authority.pem_certificate(facts.der))
+        actions.append(
+            f"{role.value.replace('_ca', ' CA')} of somebody else imported; it signs what hosts request"
+        )
+        return
     if role in options.imported:
         made, key_name, key_bytes = _import_ca(role, options, warnings)
         verb = "imported"
@@ -232,6 +245,8 @@ def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
 
 def _import_ca(role: Role, options: CreateOptions, warnings: list[str]) -> tuple[Authority, str, bytes]:
     source = options.imported[role]
+    if source.key is None:
+        raise InvalidInputError("a CA that is to sign here needs its key, too")
     reference = _read_given(source.key)
     signer = open_signer(reference, printable(source.key), options.access)
     bound = authority.authority_of(_read_given(source.certificate), signer, printable(source.certificate))
@@ -243,6 +258,16 @@ def _import_ca(role: Role, options: CreateOptions, warnings: list[str]) -> tuple
             "that Cyclone DDS before 11.0 and Fast DDS before 2.6.5 accept (CVE-2023-24010, CVE-2023-24011)"
         )
     return bound, (layout.KEY if isinstance(signer, FileSigner) else "key.p11"), reference
+
+
+def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
+    """Raises InvalidInputError for one that cannot serve, and for the permissions CA, which signs here."""
+    place = options.imported[role].certificate
+    if role is not Role.IDENTITY:
+        raise InvalidInputError("only the identity CA can be somebody else's: permissions are signed here")
+    facts = read_certificate(_read_given(place), printable(place))
+    check_can_serve(facts.der, role, options.now or utc_now(), printable(place))
+    return facts
 
 
 def _read_given(path: Path) -> bytes:

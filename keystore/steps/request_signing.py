@@ -1,23 +1,34 @@
-"""Where the CA is: certificates for keys that were made on their hosts."""
+"""Where the CA is: certificates for keys that were made on their hosts.
+
+``sign_requests`` issues them; ``accept_certificates`` takes those that somebody else's identity CA issued for them.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.store import PRIVATE_MODE
+from keystore.disk.store import PRIVATE_MODE, Batch, Content, Link
 from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInputError, printable
+from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.register import Register
-from keystore.formats.subject import names_enclave
+from keystore.formats.role import Role
+from keystore.formats.subject import common_name, names_enclave, subject_name
 from keystore.formats.validity import utc_now
+from keystore.signing.authority import Authority, pem_certificate
+from keystore.signing.public_key import fingerprint, issued_by
+from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.requests import request_key
+from keystore.steps.creation import sign_document
 from keystore.steps.host_keys import Request
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
+from keystore.steps.past_permissions import kept_permissions
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.report import ProvisionReport
 
@@ -60,6 +71,88 @@ def sign_requests(
     return renew(root, names, options=asked)
 
 
+def accept_certificates(
+    keystore: Path | str,
+    requests: Iterable[Request],
+    issued: bytes,
+    *,
+    options: ProvisionOptions | None = None,
+) -> tuple[str, ...]:
+    """Take the certificates in ``issued`` (PEM) for these requests, matched by their keys; returns the enclaves.
+
+    The enclaves are created where missing and keep their permissions; a new one may do nothing until ``apply-policy``
+    or a launch says what. Raises InvalidInputError for a request without its certificate, another issuer or subject, or
+    one that is not valid now; SigningUnavailableError without the permissions CA's key.
+    """
+    chosen = options or ProvisionOptions()
+    root, now = resolve_root(keystore), chosen.now or utc_now()
+    KeystoreView(root).require_complete()
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        view = KeystoreView(root)
+        by_key = {
+            fingerprint(one.public_key): one for one in read_certificates(issued, "the issued certificates")
+        }
+        found = [(one, _fitting(view, opened.register, one, by_key.get(one.key), now)) for one in requests]
+        signer = view.authority(Role.PERMISSIONS, chosen.access)
+        register = opened.register
+        with opened.batch() as batch:
+            for one, facts in found:
+                register = _accept(batch, view, register, signer, one, facts, now)
+            batch.record(register.without_ended(now))
+        for one, _ in found:
+            opened.remove(f"{layout.enclave_directory(one.enclave)}/{layout.KEY}")
+    return tuple(one.enclave for one, _ in found)
+
+
+def _fitting(
+    view: KeystoreView, register: Register, one: Request, facts: CertificateFacts | None, now: datetime
+) -> CertificateFacts:
+    what = f"the certificate for {one.enclave}"
+    _refuse_taken_key(register, one)
+    if facts is None:
+        raise InvalidInputError(f"{what} is not among those issued: none is for the requested key")
+    if not names_enclave(facts.common_name, one.enclave) or facts.name_parts != 1:
+        raise InvalidInputError(
+            f"{what} has another subject than CN={common_name(one.enclave)} alone, which permissions are signed for; "
+            "have the CA take the subject of the request"
+        )
+    if not issued_by(facts, view.ca(Role.IDENTITY)):
+        raise InvalidInputError(f"{what} is not signed by the identity CA of this keystore itself")
+    if not facts.validity.covers(now):
+        raise InvalidInputError(f"{what} is not valid now")
+    known = register.certificates.get(facts.serial)
+    if known is not None and (known.enclave != one.enclave or known.revoked is not None):
+        raise InvalidInputError(f"{what} has the serial number of another enclave's, or of a revoked one")
+    return facts
+
+
+def _accept(
+    batch: Batch,
+    view: KeystoreView,
+    register: Register,
+    signer: Authority,
+    one: Request,
+    facts: CertificateFacts,
+    now: datetime,
+) -> Register:
+    """The enclave's files; its permissions again, for the dates of this certificate."""
+    name = facts.common_name or ""
+    document = kept_permissions(view, register, one.enclave, subject_name(name), facts.validity, None)
+    entries: dict[str, Content | Link] = {
+        layout.CERT: Content(pem_certificate(facts.der)),
+        layout.PERMISSIONS_XML: Content(document),
+        layout.PERMISSIONS: Content(sign_document(document, signer, now)),
+    }
+    for link, target in layout.enclave_links(one.enclave, crl=view.has_crl).items():
+        entries[link] = Link(target, layout.link_source(link))
+    batch.file(layout.request(one.enclave), one.pem, PRIVATE_MODE)
+    batch.directory(layout.enclave_directory(one.enclave), entries)
+    record = certificate_record(one.enclave, facts, view.ca(Role.IDENTITY))
+    return register.with_certificates([record]).with_documents(
+        [permissions_record(one.enclave, name, document)]
+    )
+
+
 def _is_signed(view: KeystoreView, register: Register, one: Request) -> bool:
     present = register.in_force(one.enclave)
     return view.has_request(one.enclave) and present is not None and present.key == one.key
@@ -76,6 +169,10 @@ def _refuse_unfit(view: KeystoreView, register: Register, one: Request) -> None:
         raise InvalidInputError(
             f"the request of {one.enclave} names {printable(asked.common_name)}, another enclave's subject"
         )
+    _refuse_taken_key(register, one)
+
+
+def _refuse_taken_key(register: Register, one: Request) -> None:
     for issued in register.certificates.values():
         if issued.key == one.key and issued.enclave != one.enclave:
             raise InvalidInputError(

@@ -31,6 +31,10 @@ def describe(parser: argparse.ArgumentParser) -> None:
             help="import an existing CA; KEY is a PEM file, or a file with a pkcs11: URI",
         )  # fmt: skip
     parser.add_argument(
+        "--external-identity-ca", metavar="CERT", type=Path,
+        help="certificates come from this CA (Vault, step-ca ...), by secure-keystore request and sign --issued",
+    )  # fmt: skip
+    parser.add_argument(
         "--encrypt-ca-keys", action="store_true", help="encrypt new CA keys with the passphrase"
     )
     common.add_subjects(parser)
@@ -53,6 +57,9 @@ def run(arguments: argparse.Namespace) -> int:
     if lifetime is None:
         lifetime = validity.until - now if validity.until else DEFAULT_LIFETIME
     given = vars(arguments)
+    imported = {role: ImportedCa(*given[role.value]) for role in Role if given[role.value]}
+    if arguments.external_identity_ca:
+        imported[Role.IDENTITY] = ImportedCa(arguments.external_identity_ca)
     options = CreateOptions(
         domains=Domains.parse(arguments.domain_id),
         governance=load_governance_yaml(arguments.governance) if arguments.governance else None,
@@ -62,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
         lifetime=lifetime,
         backdate=validity.backdate,
         names={role: given[f"{role.value}_name"] for role in Role if given[f"{role.value}_name"]},
-        imported={role: ImportedCa(*given[role.value]) for role in Role if given[role.value]},
+        imported=imported,
         encrypt_ca_keys=arguments.encrypt_ca_keys,
         access=common.access(arguments),
         lock_timeout=arguments.lock_timeout,

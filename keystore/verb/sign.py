@@ -18,6 +18,10 @@ def describe(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--revoke-old", action="store_true", help="also revoke the certificates these enclaves had before"
     )
+    parser.add_argument(
+        "--issued", metavar="FILE", type=Path,
+        help="PEM certificates that somebody else's identity CA issued for the requests: take these, issue none",
+    )  # fmt: skip
     common.add_validity(parser)
     common.add_revocation(parser)
     common.add_subjects(parser)
@@ -28,10 +32,16 @@ def describe(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     from keystore.formats.strict_yaml import read_given
     from keystore.steps.host_keys import parse_requests
-    from keystore.steps.request_signing import SigningOptions, sign_requests
+    from keystore.steps.request_signing import SigningOptions, accept_certificates, sign_requests
 
     requests = parse_requests(read_given(arguments.requests), str(arguments.requests))
-    options = SigningOptions(arguments.revoke_old, common.provision_options(arguments))
+    provisioning = common.provision_options(arguments)
+    if arguments.issued is not None:
+        issued = read_given(arguments.issued)
+        accept_certificates(arguments.keystore, requests, issued, options=provisioning)
+        common.print_lines(f"{one.enclave}: certificate taken, key SHA-256 {one.key}" for one in requests)
+        return 0
+    options = SigningOptions(arguments.revoke_old, provisioning)
     report = sign_requests(arguments.keystore, requests, options=options)
     common.print_lines(f"{one.enclave}: key SHA-256 {one.key}" for one in requests)
     common.print_report(report, arguments)
