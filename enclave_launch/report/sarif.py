@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 from collections.abc import Iterable, Mapping
 from urllib.parse import quote
@@ -22,7 +23,7 @@ def sarif_document(
         "semanticVersion": version,
         "rules": [{"id": code, "shortDescription": {"text": rules.get(code, code)}} for code in used],
     }
-    base = {"SRCROOT": {"uri": f"file://{quote(root.rstrip('/'))}/"}}
+    base = {"SRCROOT": {"uri": f"file://{quote(os.fsencode(root.rstrip('/')))}/"}}
     run = {"tool": {"driver": driver}, "originalUriBaseIds": base, "results": results}
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
 
@@ -33,6 +34,7 @@ def _result(told: Told, accepted: str | None, root: str) -> dict[str, object]:
         "ruleId": told.code,
         "level": told.severity,
         "message": {"text": text},
+        "partialFingerprints": {"codeSubjectAndFile/v1": _fingerprint(told, root)},
     }
     if told.file:
         result["locations"] = [_location(told.file, told.line, root)]
@@ -41,13 +43,21 @@ def _result(told: Told, accepted: str | None, root: str) -> dict[str, object]:
     return result
 
 
+def _fingerprint(told: Told, root: str) -> str:
+    """The same while a finding stays, wherever its line moves: code hosts tell old findings from new ones by it."""
+    file = os.path.relpath(told.file, root) if told.file else ""
+    return hashlib.sha256(
+        "\0".join((told.code, told.subject, file)).encode("utf-8", "backslashreplace")
+    ).hexdigest()
+
+
 def _location(file: str, line: int, root: str) -> dict[str, object]:
     path = os.path.abspath(file)
     inside = path.startswith(os.path.join(root, ""))
     place: dict[str, object] = (
-        {"uri": quote(os.path.relpath(path, root)), "uriBaseId": "SRCROOT"}
+        {"uri": quote(os.fsencode(os.path.relpath(path, root))), "uriBaseId": "SRCROOT"}
         if inside
-        else {"uri": f"file://{quote(path)}"}
+        else {"uri": f"file://{quote(os.fsencode(path))}"}
     )
     physical: dict[str, object] = {"artifactLocation": place}
     if line > 0:

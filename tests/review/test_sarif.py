@@ -1,0 +1,71 @@
+"""SARIF as its schema wants it, for findings of every kind and with any text."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from jsonschema import Draft4Validator
+
+from enclave_launch.boundary.terminal import json_text
+from enclave_launch.report.sarif import sarif_document
+from enclave_launch.review.checks import RULES, check_plan
+from enclave_launch.review.document import Told
+from tests.report.conftest import hostile, robot
+
+SCHEMA = Path(__file__).parent / "sarif" / "sarif-2.1.0-rtm.5.json"
+VALIDATOR = Draft4Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
+ROOT = "/work/my robot"
+
+
+def errors(findings: list[tuple[Told, str | None]]) -> list[str]:
+    document = json.loads(json_text(sarif_document(findings, RULES, "0.1.0", ROOT)))
+    return [f"{list(error.absolute_path)}: {error.message}" for error in VALIDATOR.iter_errors(document)]
+
+
+@pytest.mark.parametrize("plan", [robot(), hostile()], ids=["robot", "hostile names"])
+def test_findings_of_plans_are_valid(plan: dict[str, Any]) -> None:
+    found = check_plan(plan)
+    assert found
+    assert errors([(told, None if number % 2 else "accepted") for number, told in enumerate(found)]) == []
+
+
+text = st.text(max_size=20)
+told = st.builds(
+    Told,
+    severity=st.sampled_from(["error", "warning"]),
+    code=st.sampled_from(sorted(RULES)),
+    subject=text,
+    file=st.none()
+    | st.text(st.characters(exclude_characters="\0"), min_size=1, max_size=20).map(
+        lambda name: f"{ROOT}/{name}"
+    ),
+    line=st.integers(0, 10**6),
+    text=text,
+    remedy=text,
+)
+
+
+@given(st.lists(st.tuples(told, st.none() | text), max_size=4))
+def test_any_finding_is_valid(findings: list[tuple[Told, str | None]]) -> None:
+    assert errors(findings) == []
+
+
+def test_the_schema_refuses_what_is_not_sarif() -> None:
+    document: dict[str, Any] = sarif_document([], RULES, "0.1.0", ROOT)
+    assert not list(VALIDATOR.iter_errors(document))
+    assert list(VALIDATOR.iter_errors({**document, "version": "2.0.0"}))
+    assert list(VALIDATOR.iter_errors({**document, "runs": [{"results": []}]}))
+
+
+def test_a_finding_keeps_its_fingerprint_when_its_line_moves() -> None:
+    one = Told("warning", "no-publisher", "/x", f"{ROOT}/a.xml", 3, "text", "")
+    prints = [
+        sarif_document([(each, None)], RULES, "0.1.0", ROOT)["runs"][0]["results"][0]["partialFingerprints"]  # type: ignore[index]
+        for each in (one, one._replace(line=9), one._replace(subject="/y"))
+    ]
+    assert prints[0] == prints[1] != prints[2]
