@@ -15,7 +15,7 @@ from enclave_launch.report.flows import step_text
 from enclave_launch.report.graph import Graph, Use
 from enclave_launch.report.reasons import evidence_text
 
-_SPECIAL = re.compile(r"([\\`*_{}\[\]()<>#+\-.!|~&])")
+_SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~&])")
 MOST_DRAWN = 60
 """Elements up to which the graph is part of the report: code hosts refuse to draw large ones."""
 
@@ -114,7 +114,7 @@ def _table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[s
 
 
 def escaped(text: str) -> str:
-    """Text without a meaning in Markdown (CommonMark 2.4: any ASCII punctuation may be escaped)."""
+    """Text without a meaning within a line of Markdown (CommonMark 2.4: any ASCII punctuation may be escaped)."""
     return _SPECIAL.sub(r"\\\1", printable(text))
 
 

@@ -91,7 +91,7 @@ def test_markdown_has_a_section_for_each_question() -> None:
     text = markdown_report(contents(robot()))
     headings = [line for line in text.splitlines() if line.startswith("## ")]
     assert headings == ["## Findings", "## Permissions", "## Flows", "## Statistics"]
-    assert "| publish | `/image` | `/camera/driver` | ws/n\\.nodl\\.xml:4; written /image |" in text
+    assert "| publish | `/image` | `/camera/driver` | ws/n.nodl.xml:4; written /image |" in text
     assert "| publish | `/of_policy` | a policy file |  |" in text
     assert "2 more that every node has." in text
 

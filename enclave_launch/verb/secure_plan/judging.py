@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN, endings, signed_grants
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from enclave_launch.review.document import Told
     from enclave_launch.review.expectations import Expectations
 
@@ -21,6 +23,7 @@ def judged(
     expect: Path | None,
     keystore: Path | str | None = None,
     within: str = DEFAULT_MARGIN,
+    now: datetime | None = None,
 ) -> list[tuple[Told, str | None]]:
     """Findings of the dry run's JSON ``document``, of the rules in ``expect`` (default: ``EXPECTATIONS`` in the
     working directory, if it is there), and of ``keystore``, where one is given; what ends ``within`` that time is one.
@@ -33,15 +36,19 @@ def judged(
     expected = expectations(expect)
     findings = [*check_plan(document), *rule_findings(document, expected.never)]
     if keystore is not None:
-        findings += _of_keystore(document, keystore, within)
+        findings += _of_keystore(document, keystore, within, now)
     return [(told, expected.reason_to_accept(told)) for told in findings]
 
 
-def _of_keystore(document: Mapping[str, Any], keystore: Path | str, within: str) -> list[Told]:
+def _of_keystore(
+    document: Mapping[str, Any], keystore: Path | str, within: str, now: datetime | None
+) -> list[Told]:
     from enclave_launch.review.checks.keystore import against_keystore
     from enclave_launch.review.document import plan_from_document
 
-    return against_keystore(plan_from_document(document), signed_grants(keystore), endings(keystore, within))
+    return against_keystore(
+        plan_from_document(document), signed_grants(keystore), endings(keystore, within, now)
+    )
 
 
 def expectations(file: Path | None) -> Expectations:

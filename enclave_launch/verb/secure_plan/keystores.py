@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from enclave_launch.review.checks.keystore import Ending
     from enclave_launch.review.document import Grant
 
@@ -35,14 +37,16 @@ def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[Grant]]:
         return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}
 
 
-def endings(keystore: Path | str, within: str | None = None) -> tuple[Ending, ...]:
+def endings(
+    keystore: Path | str, within: str | None = None, now: datetime | None = None
+) -> tuple[Ending, ...]:
     """All that ends, or what ends ``within`` a time such as ``30d``; the earliest first."""
     from enclave_launch.review.checks.keystore import Ending
     from keystore.formats.validity import iso, parse_duration
     from keystore.steps.expiry import status
 
     with keystore_errors():
-        report = status(keystore)
+        report = status(keystore, now=now)
         chosen = report.expiries if within is None else report.due(parse_duration(within))
     return tuple(
         Ending(one.subject, one.enclave, iso(one.not_after), (one.not_after - report.now).days)

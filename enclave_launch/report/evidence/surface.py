@@ -1,0 +1,74 @@
+"""What can be reached: from other enclaves, from outside of the launch, and by programs that nothing confines. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, Graph, Use, plan_graph
+from enclave_launch.review.document import plan_from_document
+from enclave_launch.review.information_flow import flow_graph, opened_by_sharing, reached_from
+from keystore.formats.permissions_patterns import can_meet
+
+
+def surface_document(document: Mapping[str, Any]) -> dict[str, Any]:
+    """Of the dry run's JSON; what every node has is left out, as it is the same for all."""
+    graph, plan = plan_graph(document), plan_from_document(document)
+    flows = flow_graph(plan)
+    return {
+        "version": 1,
+        "enclaves": {path: _enclave(graph, path) for path in graph.enclaves},
+        "influences": {path: sorted(reached_from(flows, path)) for path in graph.enclaves},
+        "only_by_sharing": [
+            {"enclave": enclave, "from": one, "to": two} for enclave, one, two in opened_by_sharing(plan)
+        ],
+        "without_an_enclave": [
+            {"program": member.name, "place": member.launched_at}
+            for member in graph.members
+            if member.enclave == NO_ENCLAVE
+        ],
+        "interfaces_unknown": [
+            {"program": member.name, "enclave": member.enclave, "place": member.launched_at}
+            for member in graph.members
+            if not member.known and member.enclave != NO_ENCLAVE
+        ],
+        "domains": sorted(
+            {process["domain_id"] for process in document["processes"] if "domain_id" in process}
+        ),
+    }
+
+
+def _enclave(graph: Graph, enclave: str) -> dict[str, Any]:
+    held = [use for use in graph.uses if use.enclave == enclave and not use.built_in]
+    patterns = {graph.channels[use.channel].name for use in held if graph.channels[use.channel].is_pattern}
+    return {"accepts": _accepted(graph, enclave, held), "wildcards": sorted(patterns)}
+
+
+def _accepted(graph: Graph, enclave: str, held: list[Use]) -> list[dict[str, Any]]:
+    """What comes in: messages of subscriptions, requests to servers. ``sent_by``: enclaves of this launch that may
+    send it; with none, only somebody outside of the launch could."""
+    coming_in = sorted({(use.operation, use.channel) for use in held if use.operation not in OUTWARD})
+    return [
+        {
+            "operation": operation,
+            "name": graph.channels[channel].name,
+            "types": list(graph.channels[channel].types),
+            "sent_by": sorted(_senders(graph, operation, graph.channels[channel].name) - {enclave}),
+        }
+        for operation, channel in coming_in
+    ]
+
+
+def _senders(graph: Graph, operation: str, name: str) -> set[str]:
+    return {
+        use.enclave
+        for use in graph.uses
+        if use.operation == _SENT_BY[operation] and can_meet(graph.channels[use.channel].name, name)
+    }
+
+
+_SENT_BY: Mapping[str, str] = {
+    "subscribe": "publish",
+    "serve_services": "call_services",
+    "serve_actions": "call_actions",
+}

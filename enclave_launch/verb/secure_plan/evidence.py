@@ -1,0 +1,200 @@
+"""Write a folder of evidence for those who must sign: permissions with reasons, attack surface, keys, findings.
+
+  secure-plan evidence PACKAGE LAUNCH_FILE -o evidence --keystore ks --sbom robot.cdx.json --sign-key release.pem
+
+Each part names the requirements that it supports; it claims no conformity. What was not checked is told as well. The
+same input and time (--at, or SOURCE_DATE_EPOCH) give the same bytes, but for a signature.
+A key file may hold the pkcs11: URI of a token, as those of a keystore. Exit status as of check.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Mapping
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from enclave_launch.errors import UsageError
+from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
+from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN, endings, keystore_errors
+from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+
+if TYPE_CHECKING:
+    from enclave_launch.report.evidence.documents import Examined
+
+SIGNED = "statement.dsse.json"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    add_plan_arguments(parser)
+    parser.add_argument(
+        "-o", "--output", type=Path, metavar="DIR", required=True, help="a new or empty folder"
+    )
+    parser.add_argument("--keystore", metavar="DIR", type=Path, help="look at its keys, governance and files")
+    parser.add_argument("--sbom", metavar="FILE", type=Path, help="the product's CycloneDX document (JSON)")
+    parser.add_argument(
+        "--sign-key", metavar="FILE", type=Path, help="sign the statement with this EC or RSA key"
+    )
+    parser.add_argument("--passphrase-env", metavar="NAME", help="the variable with the key's passphrase")
+    parser.add_argument("--pin-env", metavar="NAME", help="the variable with the token's PIN")
+    parser.add_argument(
+        "--at", metavar="TIME", help="of the examination, as 2026-11-22T10:00:00Z (default: now)"
+    )
+    parser.add_argument("--within", metavar="TIME", default=DEFAULT_MARGIN, help="what ends soon (30d)")
+    parser.add_argument("--expect", type=Path, metavar="FILE", help=f"default: {EXPECTATIONS}, if it exists")
+
+
+def run(options: argparse.Namespace) -> int:
+    from enclave_launch.report.evidence.documents import evidence_files
+    from enclave_launch.report.evidence.statement import statement
+
+    folder = _new_folder(options.output)
+    examined = _examine(options)
+    files = evidence_files(examined)
+    found = examined.contents.judged
+    scope = json.loads(files["scope.json"])
+    said = statement(files, found, [check["code"] for check in scope["checked"]])
+    signed = _signed(said, options) if options.sign_key is not None else {}
+    _write(folder, {**files, "statement.json": said, **signed})
+    return 1 if any(told.severity == "error" for told, accepted in found if accepted is None) else 0
+
+
+def _new_folder(folder: Path) -> Path:
+    """Raises ``UsageError`` for one that holds something: what is old must not pass for evidence."""
+    try:
+        if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+            raise UsageError(
+                f"{folder} is not empty: name a new folder, so that nothing old is among the evidence"
+            )
+    except OSError as error:
+        raise UsageError(f"{folder}: {error.strerror}") from error
+    return folder
+
+
+def _examine(options: argparse.Namespace) -> Examined:
+    from enclave_launch.diagnostics import Code
+    from enclave_launch.report.contents import report_contents
+    from enclave_launch.report.evidence.documents import Examined
+    from enclave_launch.review.checks import RULES
+    from keystore.formats.validity import iso
+
+    now, keystore = _moment(options.at), options.keystore
+    document = read_plan(options.words, options)
+    components = _bill_of_materials(options.sbom) if options.sbom is not None else None
+    found = judged(document, options.expect, keystore, options.within, now)
+    ends = endings(keystore, now=now) if keystore is not None else None
+    root = os.getcwd()
+    contents = report_contents(document, found, title=" ".join(options.words), root=root, endings=ends)
+    rules = {**{code.value: code.meaning for code in Code}, **RULES}
+    examined = Examined(document, contents, rules, iso(now), root, components=components)
+    if keystore is None:
+        return examined
+    return examined._replace(keys=_keys(keystore), defaults=_defaults(keystore, now))
+
+
+def _moment(text: str | None) -> datetime:
+    """``--at``, else ``SOURCE_DATE_EPOCH`` (reproducible-builds.org), else now."""
+    from keystore.errors import InvalidInputError
+    from keystore.formats.validity import parse_moment, utc_now
+
+    epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
+    try:
+        if text is not None:
+            return parse_moment(text)
+        return datetime.fromtimestamp(int(epoch), timezone.utc) if epoch else utc_now()
+    except InvalidInputError as error:
+        raise UsageError(f"--at {text}: {error}") from error
+    except (ValueError, OverflowError, OSError) as error:
+        raise UsageError(f"SOURCE_DATE_EPOCH={epoch} is no time: {error}") from error
+
+
+def _keys(keystore: Path) -> list[dict[str, Any]]:
+    from keystore.steps.inventory import inventory
+
+    with keystore_errors():
+        return [entry._asdict() for entry in inventory(keystore)]
+
+
+def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
+    from keystore.steps.defaults import governance_facts
+    from keystore.verification import verify
+
+    with keystore_errors():
+        facts = governance_facts(keystore)
+        report = verify(keystore, now=now)
+    return {
+        "governance": facts.rules,
+        "weaker_than_default": list(facts.weaknesses),
+        "strategy": "Enforce, unless secure-launch is told otherwise (--strategy)",
+        "verify": {
+            "good": report.is_good,
+            "findings": [
+                {
+                    "severity": each.severity.value,
+                    "code": each.code,
+                    "place": each.place,
+                    "message": each.message,
+                }
+                for each in report.findings
+            ],
+        },
+    }
+
+
+def _bill_of_materials(file: Path) -> dict[str, Any]:
+    """Its BOM-Link (CycloneDX specification, "BOM-Link") and hash. Raises ``UsageError`` for anything else."""
+    import hashlib
+
+    from enclave_launch.boundary.files import read_bytes
+
+    try:
+        data = read_bytes(file)
+        content = json.loads(data)
+    except OSError as error:
+        raise UsageError(f"--sbom {file}: {error.strerror}") from error
+    except ValueError as error:
+        raise UsageError(f"--sbom {file} is not JSON: {error}") from error
+    if not isinstance(content, Mapping) or content.get("bomFormat") != "CycloneDX":
+        raise UsageError(f'--sbom {file} is not a CycloneDX document ("bomFormat": "CycloneDX")')
+    serial = str(content.get("serialNumber", "")).removeprefix("urn:uuid:")
+    return {
+        "file": file.name,
+        "sha256": hashlib.sha256(data).hexdigest(),
+        "spec_version": content.get("specVersion"),
+        "bom_link": f"urn:cdx:{serial}/{content.get('version', 1)}" if serial else None,
+        "components": len(content.get("components") or ()),
+    }
+
+
+def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
+    from enclave_launch.boundary.files import read_bytes
+    from enclave_launch.report.evidence.statement import PAYLOAD_TYPE
+    from keystore.signing.ca_access import CaAccess, Secret
+    from keystore.signing.dsse import envelope, envelope_text
+    from keystore.signing.signer import open_signer
+
+    def secret(variable: str | None) -> Secret | None:
+        return Secret(variable=variable) if variable else None
+
+    try:
+        reference = read_bytes(options.sign_key)
+    except OSError as error:
+        raise UsageError(f"--sign-key {options.sign_key}: {error.strerror}") from error
+    access = CaAccess(passphrase=secret(options.passphrase_env), pin=secret(options.pin_env))
+    with keystore_errors():
+        signer = open_signer(reference, str(options.sign_key), access)
+        return {SIGNED: envelope_text(envelope(said, PAYLOAD_TYPE, signer)).encode()}
+
+
+def _write(folder: Path, files: Mapping[str, bytes]) -> None:
+    from enclave_launch.boundary.new_file import write_bytes
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, data in files.items():
+            write_bytes(folder / name, data)
+    except OSError as error:
+        raise UsageError(f"{folder}: {error.strerror}") from error
