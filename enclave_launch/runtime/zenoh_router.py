@@ -97,6 +97,7 @@ class ZenohRouter:
         self._say = say
         self._printed: deque[str] = deque(maxlen=_LINES_KEPT)
         self._stop = threading.Event()
+        self._answered = threading.Event()
         self._failed = threading.Event()
         self._thread: threading.Thread | None = None
 
@@ -126,6 +127,7 @@ class ZenohRouter:
                 raise RuntimeFailure(self._failure(answer))
             time.sleep(_LOOK)
             answer = who_answers(self._place)
+        self._answered.set()
 
     def _failure(self, answer: Answer) -> str:
         host, port = self._place.address
@@ -169,6 +171,9 @@ class ZenohRouter:
             self._follow(process, seen)
             _end(process)
             reader.join(timeout=_PAUSE)
+            if not self._answered.is_set():
+                self._failed.set()
+                return
 
     def _popen(self) -> subprocess.Popen[bytes]:
         assert self._program is not None, "looked for before"
@@ -181,6 +186,8 @@ class ZenohRouter:
         """Until it has to be started again, or all is over."""
         refused = ""
         while not self._stop.wait(_LOOK):
+            if process.poll() is not None and not self._answered.is_set():
+                return
             if process.poll() is not None:
                 self._say(f"the Zenoh router ended (exit status {process.returncode}); it is started again")
                 self._stop.wait(_PAUSE)
