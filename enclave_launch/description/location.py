@@ -28,7 +28,7 @@ def location_of(entity: object, context: LaunchContext) -> SourceLocation:
 
 
 def includes_below(include: LaunchDescriptionEntity, context: LaunchContext) -> tuple[str, ...]:
-    """The chain for what ``include`` brings in. The include that stands for the command line is no step of it."""
+    """The chain for what ``include`` brings in. The include that stands for the command line does not count."""
     if include.source_location is None:
         return context.includes
     return (*context.includes, str(include.source_location))

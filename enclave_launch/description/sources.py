@@ -99,7 +99,7 @@ class LaunchDescriptionSource:
 
 
 class InvalidPythonLaunchFileError(Exception):
-    """A Python file that is no launch file."""
+    """A Python file that is not a launch file."""
 
 
 def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleType:

@@ -37,7 +37,7 @@ class Call:
 
 
 class TemplateSyntaxError(ValueError):
-    """A text is no template. ``template`` is that text."""
+    """A text is not a template. ``template`` is that text."""
 
     def __init__(self, message: str, template: str):
         super().__init__(message)

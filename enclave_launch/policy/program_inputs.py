@@ -43,7 +43,7 @@ class ProgramInputs(NamedTuple):
 
 def program_inputs(process: ResolvedProcess) -> ProgramInputs:
     """The inputs of ``process``; an option's value follows ``=`` or is the next word without dash, and where there
-    are no options each word is also known by its place (``<1>``, as learnt manifests have it)."""
+    are not any options each word is also known by its place (``<1>``, as learnt manifests have it)."""
     values = {f"${name}": value for name, value in process.environment.items()}
     words = own_words(process)
     for word, following in zip(words, (*words[1:], ""), strict=False):

@@ -54,7 +54,7 @@ class QuietWatch:
             self._last = time.monotonic()
 
     def happened(self, event: RunEvent) -> None:
-        """What processes print, and that they end, is no news."""
+        """What processes print, and that they end, counts as nothing new."""
 
     def looked(self) -> None:
         if self._patience is None or self._launch is None or self._recording is None or self._over:

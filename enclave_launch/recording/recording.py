@@ -321,7 +321,7 @@ def _component(component: ResolvedComponent) -> LoadedComponent:
 
 
 def _plain(parameters: Mapping[str, object]) -> dict[str, object]:
-    """As JSON has them; byte strings, which are no names, are left out."""
+    """As JSON has them; byte strings, which are not names, are left out."""
     return {name: value for name, value in parameters.items() if not _has_bytes(value)}
 
 

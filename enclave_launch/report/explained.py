@@ -48,6 +48,6 @@ def _unknown(item: PlannedProcess | PlannedComponent) -> Iterator[str]:
     why = (
         f"no NoDL manifest for {item.missing.subject}: {item.missing.why}"
         if item.missing
-        else "it is no node"
+        else "it is not a node"
     )
     yield f"{label(item)}: {UNKNOWN}: {why}"

@@ -64,7 +64,7 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
 
 
 def observe_executable(action: Any, context: Any) -> ResolvedProcess:
-    """``action``: an ``ExecuteProcess`` that is no node, being prepared: its command and name are final."""
+    """``action``: an ``ExecuteProcess`` that is not a node, being prepared: its command and name are final."""
     description = action.process_description
     cmd = tuple(description.final_cmd)
     prefix = cmd[: len(cmd) - len(description.cmd)]

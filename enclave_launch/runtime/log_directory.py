@@ -40,8 +40,8 @@ def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
 
 
 def _renew_latest(link: Path, directory: Path) -> None:
-    """Atomically, since other launches do the same; what is no link is left alone, a failure is no
-    reason to stop.
+    """Atomically, since other launches do the same; what is not a link is left alone, a failure is
+    passed over.
     """
     if link.exists() and not link.is_symlink():
         return

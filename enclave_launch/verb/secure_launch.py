@@ -170,7 +170,9 @@ def _check_pattern(pattern: str | None) -> None:
     try:
         re.compile(pattern or "")
     except re.error as error:
-        raise UsageError(f"--launch-prefix-filter {pattern!r} is no regular expression: {error}") from error
+        raise UsageError(
+            f"--launch-prefix-filter {pattern!r} is not a regular expression: {error}"
+        ) from error
 
 
 def _show_file(target: Target, options: argparse.Namespace) -> int:

@@ -27,7 +27,7 @@ _WRITABLE_BY_OTHERS = 0o022
 
 
 def resolve_root(keystore: Path | str) -> Path:
-    """Raises NotAKeystoreError for what can be no path."""
+    """Raises NotAKeystoreError for what cannot be a path."""
     try:
         return Path(os.path.realpath(keystore))
     except ValueError:

@@ -98,7 +98,7 @@ def ros_rules(
     """The reverse: rules that explain the topics of one permissions rule, and what no ROS rule explains.
 
     Services and actions appear only where both directions of a role are complete; all else stays a
-    topic (``rt/...``) or is returned as it is. ``ros_discovery_info`` is no rule of a policy.
+    topic (``rt/...``) or is returned as it is. No rule of a policy is about ``ros_discovery_info``.
     """
     remaining = (set(publish) - {DISCOVERY_TOPIC}, set(subscribe) - {DISCOVERY_TOPIC})
     rules: list[Rule] = []

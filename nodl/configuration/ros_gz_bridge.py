@@ -55,7 +55,7 @@ def _entry(entry: YamlValue) -> Iterator[Endpoint | Gap]:
     name = fields.get("topic_name") or fields.get("ros_topic_name") or fields.get("gz_topic_name") or ""
     direction = fields.get("direction", "BIDIRECTIONAL")
     if direction not in _DIRECTIONS:
-        yield Gap(entry.source, f"{shown(direction)} is no direction of a bridge")
+        yield Gap(entry.source, f"{shown(direction)} is not a direction of a bridge")
         return
     yield from _endpoints(
         name, fields.get("ros_type_name", ""), direction, entry.source, "bridge configuration"
@@ -70,7 +70,9 @@ def _word(word: str, place: SourceRef) -> Iterator[Endpoint | Gap]:
     if at and "/srv/" in type_name:
         yield from _named(EndpointKind.SERVICE_SERVER, name, type_name, place, note)
     elif not at or position == len(rest):
-        yield Gap(place, f"{shown(word)} is no bridge: it is not TOPIC@ROS_TYPE{{@,[,]}}GZ_TYPE")
+        yield Gap(
+            place, f"{shown(word)} does not describe a bridge: it is not TOPIC@ROS_TYPE{{@,[,]}}GZ_TYPE"
+        )
     else:
         yield from _endpoints(name, type_name, _SEPARATORS[rest[position]], place, note)
 

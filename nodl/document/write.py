@@ -130,7 +130,8 @@ def _v2_name(endpoint: Endpoint) -> str:
 def _v2_endpoint_type(endpoint: Endpoint) -> str:
     if not re.search(TYPE_PATTERN, endpoint.type):
         raise InvalidNoDLDocumentError.at(
-            endpoint.source, f"type {shown(endpoint.type)} is no interface type such as std_msgs/msg/String"
+            endpoint.source,
+            f"type {shown(endpoint.type)} is not an interface type such as std_msgs/msg/String",
         )
     return endpoint.type
 

@@ -71,7 +71,7 @@ def part_of(topic: str, type_name: str, *, writes: bool) -> Part | None:
 
 def ros_type(type_name: str) -> str:
     """``std_msgs::msg::dds_::String_`` → ``std_msgs/msg/String``; requests and the like as their service or action.
-    What is no name of rosidl stays as it is."""
+    What is not a name of rosidl stays as it is."""
     match = _TYPE.match(type_name)
     if not match:
         return type_name

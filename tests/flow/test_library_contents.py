@@ -151,7 +151,7 @@ def test_a_gazebo_bridge_bridges_its_arguments_and_its_file(launch: Launch, tmp_
     assert allowed(plan, "publish") == ["/clock", "/odom"]
     assert allowed(plan, "subscribe") == ["/cmd_vel"]
     file.write_text("- {ros_topic_name: odom, direction: SIDEWAYS}\n")
-    assert "'SIDEWAYS' is no direction of a bridge" in problems(launch(node.format(words, file)))
+    assert "'SIDEWAYS' is not a direction of a bridge" in problems(launch(node.format(words, file)))
 
 
 @pytest.mark.parametrize(

@@ -139,7 +139,10 @@ def test_one_node_goes_to_standard_output(folder: Path, capsys: pytest.CaptureFi
 FAILURES = {
     "a folder is needed": (V1, "name a folder with -o"),
     "an unknown parameter type": (V1.replace("double", "matrix"), "parameter type 'matrix' is unknown in v2"),
-    "a type that is none": (V1.replace("std_srvs/srv/Empty", "Empty"), "type 'Empty' is no interface type"),
+    "a type that is none": (
+        V1.replace("std_srvs/srv/Empty", "Empty"),
+        "type 'Empty' is not an interface type",
+    ),
     "a name that v2 cannot hold": (V1.replace("chatter", "_x"), "name '_x' cannot be written in NoDL v2"),
     "a broken document": ("<interface>", "not well-formed"),
 }

@@ -79,7 +79,7 @@ Arguments = Iterable[tuple["SomeSubstitutionsType", "SomeSubstitutionsType"]]
 class IncludeLaunchDescription(Action):
     """Loads another description and gives its entities, after setting the arguments one by one.
 
-    This is no scope: whatever the included file sets stays set.
+    This opens no scope: whatever the included file sets stays set.
     """
 
     def __init__(

@@ -130,7 +130,7 @@ _TRANSITIONS = (
 class OnStateTransition(EventHandler):
     """Fires when everything that is given equals what the event says; ``matcher`` replaces all of it.
 
-    Raises ``RuntimeError`` for a target that is no lifecycle node.
+    Raises ``RuntimeError`` for a target that is not a lifecycle node.
     """
 
     def __init__(
@@ -227,7 +227,7 @@ class LifecycleTransition(Action):
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         """Handlers for every reached goal state, then the first request to every node.
 
-        Raises ``ValueError`` for an id that is no number, ``KeyError`` for one without a goal state.
+        Raises ``ValueError`` for an id that is not a number, ``KeyError`` for one without a goal state.
         """
         names = [perform_substitutions(context, name) for name in self.__names]
         ids = [_transition_id(perform_substitutions(context, item)) for item in self.__ids]

@@ -158,7 +158,7 @@ class SetUseSimTime(Action):
     def execute(self, context: LaunchContext) -> None:
         """Older releases pass the text of the front ends on unevaluated, and refuse to switch it off.
 
-        Raises ``ValueError`` for what is no bool, ``RuntimeError`` for ``False``.
+        Raises ``ValueError`` for what is not a bool, ``RuntimeError`` for ``False``.
         """
         value = self.__value
         if context.host.release.has(Feature.SIM_TIME_IN_FRONTENDS):

@@ -163,7 +163,7 @@ class Parser(BaseParser):
         """Root entity and parser of a YAML file.
 
         Raises ``yaml.YAMLError``, ``RefusedYaml``, ``OSError``, and ``RuntimeError`` or a Python exception
-        for a document that is no mapping with one key.
+        for a document that is not a mapping with one key.
         """
         return cls.load_source(launch_file.read(file))
 

@@ -38,7 +38,7 @@ def domain_chunks(domains: Domains) -> tuple[str, ...]:
 
 
 def type_chunk(ros_type: str) -> str | None:
-    """``std_msgs/msg/String`` -> ``std_msgs::msg::dds_::String_``; None for what is no such name."""
+    """``std_msgs/msg/String`` -> ``std_msgs::msg::dds_::String_``; None for what is not such a name."""
     match = _TYPE.match(ros_type)
     return f"{match[1]}::{match[2]}::dds_::{match[3]}_" if match else None
 

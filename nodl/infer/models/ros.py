@@ -168,7 +168,7 @@ def create_node(run: Run, path: str, call: Call) -> Value:
 
 
 def records_of(run: Run, value: Value | None, call: Call) -> list[NodeRecord]:
-    """The nodes that ``value`` may be; what is no known node is a gap."""
+    """The nodes that ``value`` may be; what is not a known node becomes a gap."""
     records: list[NodeRecord] = []
     for atom in value or ANY:
         if isinstance(atom, Instance):
