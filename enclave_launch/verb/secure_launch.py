@@ -183,7 +183,8 @@ def _show_file(target: Target, options: argparse.Namespace) -> int:
     text = arguments_text if options.show_args else description_text
     host = PlanHost(resolve_options(options).host_options())
     with read_description(target.launch_file, host) as description:
-        sys.stdout.write(text(description))
+        shown = text(description)
+    sys.stdout.write(shown)
     return 0
 
 

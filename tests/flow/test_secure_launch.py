@@ -170,7 +170,7 @@ BAD_WORDS = {
     "a bad domain": (["--secure", "--keystore", "{tmp}/ks", "--domain-id", "7;8"], 2, "domain ids"),
     "a bad duration": (["--secure", "--keystore", "{tmp}/ks", "--valid-for", "soon"], 2, "soon"),
     "a bad margin": (["--secure", "--keystore", "{tmp}/ks", "--warn-expiry", "soon"], 2, "not a duration"),
-    "a bad filter": (["--launch-prefix", "gdb", "--launch-prefix-filter", "("], 2, "no regular expression"),
+    "a bad filter": (["--launch-prefix", "gdb", "--launch-prefix-filter", "("], 2, "not a regular expression"),
     "a policy that is not there": (["--dry-run", "--policy", "{tmp}/nosuch.xml"], 2, "nosuch.xml"),
     "a manifest that is not there": (["--dry-run", "--nodl", "{tmp}/nosuch.nodl.xml"], 1, "nosuch.nodl.xml"),
     "an unknown subject to explain": (["--explain", "/nosuch"], 2, "'/nosuch' is not an enclave"),
