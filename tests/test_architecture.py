@@ -34,6 +34,7 @@ FLOORS = (
     {"interfaces"},
     {"review"},
     {"deployment"},
+    {"drift"},
     {"report", "runtime"},
     {"recording", "secured"},
     {"expiry_watch"},
@@ -55,6 +56,7 @@ PURE = {
     "enclave_launch/enclave": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/policy": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/deployment": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
+    "enclave_launch/drift": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/report": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
 }
 

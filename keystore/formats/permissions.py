@@ -110,7 +110,8 @@ def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
     except PolicyError as error:
         raise PolicyError(f"enclave {printable(policy.path)}: {error}") from None
     if rmw not in RMW_WITHOUT_DISCOVERY_TOPIC:
-        allowed[0].add(DISCOVERY_TOPIC)
+        if policy.publishes_discovery:
+            allowed[0].add(DISCOVERY_TOPIC)
         allowed[1].add(DISCOVERY_TOPIC)
     if not denied[0] and not denied[1]:
         return DdsRules(TopicSets(), TopicSets(), _sorted(allowed))

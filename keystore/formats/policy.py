@@ -55,10 +55,15 @@ class Profile(NamedTuple):
 
 
 class EnclavePolicy(NamedTuple):
-    """All that one enclave may do: the union of its profiles; DENY of any beats ALLOW of any."""
+    """All that one enclave may do: the union of its profiles; DENY of any beats ALLOW of any.
+
+    ``publishes_discovery``: it holds ROS nodes, whose rmw publishes which endpoints are theirs; a mere observer does
+    not.
+    """
 
     path: str
     profiles: tuple[Profile, ...]
+    publishes_discovery: bool = True
 
 
 class Policy(NamedTuple):

@@ -23,7 +23,7 @@ from keystore.errors import KeystoreError
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
-    "import", "request", "sign", "fleet", "governance", "shares", "zenoh",
+    "import", "request", "sign", "fleet", "governance", "shares", "tool-enclave", "zenoh",
 )  # fmt: skip
 
 

@@ -22,6 +22,8 @@ from nodl.graph.wire_names import DISCOVERY_TOPIC
 
 _MOST_AT_ONCE = 4096
 _MOST_PARTICIPANTS = 119  # of one domain on one host: what its ports have room for (DDSI-RTPS 9.6.1)
+_LOOPBACK = '<NetworkInterface name="lo"/>'
+_BOTH = f'<NetworkInterface autodetermine="true"/>{_LOOPBACK}'
 _FILES = {
     "dds.sec.auth.identity_ca": "identity_ca.cert.pem",
     "dds.sec.auth.identity_certificate": "cert.pem",
@@ -55,13 +57,13 @@ class CycloneObserver:
             BuiltinTopicDcpsSubscription,
         )
         from cyclonedds.core import DDSException
-        from cyclonedds.domain import Domain, DomainParticipant
+        from cyclonedds.domain import DomainParticipant
         from cyclonedds.qos import Policy, Qos
 
         properties = security_properties(enclave_directory) if enclave_directory else {}
         policies = [Policy.Property(name, value) for name, value in properties.items()]
         try:
-            self._domain = Domain(domain_id, configuration(environment))
+            self._domain = _domain(domain_id, environment)
             self._participant = DomainParticipant(domain_id, Qos(*policies))
             self._lists = _list_reader(self._participant)
         except DDSException as error:
@@ -134,17 +136,33 @@ class CycloneObserver:
         )
 
 
+def _domain(domain_id: int, environment: Mapping[str, str]) -> Any:
+    """A machine that has no other interface than ``lo`` cannot name it beside the one that is determined by itself."""
+    from cyclonedds.core import DDSException
+    from cyclonedds.domain import Domain
+
+    text = configuration(environment)
+    try:
+        return Domain(domain_id, text)
+    except DDSException:
+        if _BOTH not in text:
+            raise
+        return Domain(domain_id, text.replace(_BOTH, _LOOPBACK))
+
+
 def configuration(environment: Mapping[str, str]) -> str:
     """What Cyclone DDS is told: ROS's variables for how far to look, as rmw_cyclonedds reads them, then the user's
     ``CYCLONEDDS_URI``, which wins.
 
-    ``LOCALHOST`` keeps the machine's own address: newer Fast DDS does not answer a peer that is on 127.0.0.1 alone.
+    On this machine only, both of its addresses are used: nodes on Cyclone DDS up to Humble are at 127.0.0.1 alone,
+    later ones at the machine's own address, and newer Fast DDS does not answer a peer that is at 127.0.0.1 alone.
     """
-    loopback = environment.get("ROS_LOCALHOST_ONLY") == "1"  # of releases up to Humble
-    local = loopback or environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+    local = (
+        environment.get("ROS_AUTOMATIC_DISCOVERY_RANGE", "").upper() == "LOCALHOST"
+        or environment.get("ROS_LOCALHOST_ONLY") == "1"
+    )
     peers = [each for each in environment.get("ROS_STATIC_PEERS", "").split(";") if each]
-    general = '<Interfaces><NetworkInterface name="lo"/></Interfaces>' if loopback else ""
-    general += "<AllowMulticast>false</AllowMulticast>" if local else ""
+    general = f"<Interfaces>{_BOTH}</Interfaces><AllowMulticast>false</AllowMulticast>" if local else ""
     addresses = (["127.0.0.1"] if local else []) + peers
     found = "".join(f"<Peer Address={quoteattr(each)}/>" for each in addresses)
     own = (

@@ -1,0 +1,324 @@
+"""Plan and graph → findings. Pure.
+
+A node is known by its final name, its process by what DDS-Security proves: the GUID of a secured participant begins
+with a hash of its certificate's subject, so a table of the keystore's certificates says which enclave it is in.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from itertools import product
+from types import MappingProxyType
+from typing import NamedTuple
+
+from enclave_launch.drift.expected import Expected, ExpectedNode
+from enclave_launch.drift.finding import Finding, Kind, Level, finding
+from enclave_launch.review.document import Grant, Operation
+from keystore.formats.permissions_patterns import covers
+from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, Interface
+from nodl.graph.quality import unmet
+from nodl.graph.seen import SeenEndpoint
+from nodl.graph.text import participant_text
+from nodl.graph.wire_names import ros_type
+from nodl.node_interface import EndpointKind
+
+OPERATIONS: Mapping[EndpointKind, Operation] = {
+    EndpointKind.PUBLISHER: "publish",
+    EndpointKind.SUBSCRIPTION: "subscribe",
+    EndpointKind.SERVICE_SERVER: "serve_services",
+    EndpointKind.SERVICE_CLIENT: "call_services",
+    EndpointKind.ACTION_SERVER: "serve_actions",
+    EndpointKind.ACTION_CLIENT: "call_actions",
+}
+_OR_PLAN_IT = "or plan it: the launch file, its manifests, or --accept"
+
+
+class Security(NamedTuple):
+    """Of a secured system. ``enclaves``: first bytes of GUIDs → enclave of this keystore; ``authenticated``: the
+    observer is in an enclave, so that what it cannot see is not what it should be."""
+
+    enclaves: Mapping[int, str] = MappingProxyType({})
+    authenticated: bool = True
+
+
+class Circumstances(NamedTuple):
+    """``security`` ``None``: the system runs unsecured. ``accepted``: names of nodes, with wildcards, that may run
+    beside the plan. ``strangers``: pids on this machine that the launch did not start; empty where nobody knows.
+    ``forged``: lists of nodes that somebody published for others."""
+
+    security: Security | None = None
+    accepted: tuple[str, ...] = ()
+    strangers: frozenset[int] = frozenset()
+    forged: tuple[str, ...] = ()
+
+
+def compare(expected: Expected, graph: Graph, circumstances: Circumstances | None = None) -> list[Finding]:
+    """Every difference, in the order of processes and names."""
+    circumstances = circumstances or Circumstances()
+    return list(_Comparison(expected, graph, circumstances).findings())
+
+
+class _Comparison:
+    def __init__(self, expected: Expected, graph: Graph, circumstances: Circumstances) -> None:
+        self._expected = expected
+        self._security = circumstances.security
+        self._accepted = circumstances.accepted
+        self._strangers = circumstances.strangers
+        self._forged = circumstances.forged
+        self._processes = [each for each in graph.processes if not self._all_accepted(each)]
+
+    def findings(self) -> Iterator[Finding]:
+        for text in self._forged:
+            yield finding(Kind.FORGED_LIST, text.split()[1], text)
+        for process in self._processes:
+            yield from self._of_process(process)
+        yield from self._counts()
+        yield from self._meeting()
+
+    def _all_accepted(self, process: GraphProcess) -> bool:
+        return bool(process.nodes) and all(self._is_accepted(node) for node in process.nodes)
+
+    def _is_accepted(self, node: GraphNode) -> bool:
+        return any(covers(pattern, node.fqn) for pattern in self._accepted)
+
+    # one participant
+
+    def _of_process(self, process: GraphProcess) -> Iterator[Finding]:
+        unproved = list(self._unproved(process)) if self._security else []
+        yield from unproved
+        if unproved:
+            return  # what it says of itself is worth nothing
+        enclave = self._enclave(process)
+        known = [node for node in process.nodes if self._planned(node) is not None]
+        if not known and not self._is_opaque(process, enclave):
+            yield self._unplanned(process, enclave)
+            return
+        if known and process.participant.pid in self._strangers:
+            names = ", ".join(node.fqn for node in known)
+            yield self._about(
+                Kind.STRANGER, process, f"{names} runs in a process that this launch did not start"
+            )
+        for node in process.nodes:
+            yield from self._of_node(node, process, enclave)
+
+    def _unproved(self, process: GraphProcess) -> Iterator[Finding]:
+        assert self._security is not None
+        seen = process.participant
+        if not seen.claims_security:
+            text = "a participant without security is in this domain"
+            yield self._about(Kind.NOT_SECURED, process, text)
+        elif seen.subject_hash not in self._security.enclaves:
+            text = f"its certificate is of no enclave of this keystore; it calls itself {seen.enclave or 'nothing'}"
+            yield self._about(Kind.OTHER_CA, process, text)
+        elif self._security.authenticated and next(process.endpoints, None) is None and not process.listed:
+            enclave = self._security.enclaves[seen.subject_hash]
+            text = (
+                f"it claims the subject of enclave {enclave}, and shows nothing to this observer: its certificate is "
+                "of another CA or revoked, its governance differs, or two DDS implementations fail to shake hands"
+            )
+            yield self._about(Kind.NOT_AUTHENTICATED, process, text, enclave=enclave)
+
+    def _enclave(self, process: GraphProcess) -> str:
+        """By proof; empty where nothing proves one."""
+        if self._security is None or not process.participant.claims_security:
+            return ""
+        return self._security.enclaves.get(process.participant.subject_hash, "")
+
+    def _is_opaque(self, process: GraphProcess, enclave: str) -> bool:
+        """A program that the plan starts without knowing its nodes, or a node whose name it does not know."""
+        namespaces = {node.fqn.rpartition("/")[0] or "/" for node in process.nodes}
+        unnamed = bool(namespaces) and namespaces <= self._expected.unnamed
+        return unnamed or (enclave in self._expected.opaque)
+
+    def _unplanned(self, process: GraphProcess, enclave: str) -> Finding:
+        names = ", ".join(sorted(node.fqn for node in process.nodes))
+        if not names:
+            return self._nameless(process, enclave)
+        kind, text = Kind.UNPLANNED_NODE, f"{names} is not planned"
+        if enclave in self._expected.enclaves:
+            kind, text = (
+                Kind.ENCLAVE_OF_ANOTHER,
+                f"{names} uses enclave {enclave}, which the plan gives to others",
+            )
+        return self._about(
+            kind, process, text, subject=names, enclave=enclave, remedy=f"stop it, {_OR_PLAN_IT}"
+        )
+
+    def _nameless(self, process: GraphProcess, enclave: str) -> Finding:
+        """Without endpoints it can do nothing: an observer, or what is just starting."""
+        topics = sorted({endpoint.topic for endpoint in process.endpoints})
+        has = f"with {', '.join(topics[:5])}" if topics else "without endpoints"
+        level = Level.ALARM if topics or enclave in self._expected.enclaves else Level.NOTE
+        text = f"a participant {has} is not planned"
+        return self._about(Kind.UNPLANNED_PROCESS, process, text, level=level, enclave=enclave)
+
+    # one node
+
+    def _planned(self, node: GraphNode) -> ExpectedNode | None:
+        found = self._expected.nodes.get(node.fqn)
+        if found is None:
+            patterns = (each for fqn, each in self._expected.nodes.items() if "*" in fqn)
+            found = next((each for each in patterns if covers(each.fqn, node.fqn)), None)
+        return found
+
+    def _of_node(self, node: GraphNode, process: GraphProcess, enclave: str) -> Iterator[Finding]:
+        planned = self._planned(node)
+        if planned is None:
+            if (
+                not self._is_accepted(node)
+                and not self._is_helper(node, process)
+                and not self._is_unnamed(node)
+            ):
+                text = f"{node.fqn} is not planned, in a process that is"
+                yield self._about(Kind.UNPLANNED_NODE, process, text, subject=node.fqn, enclave=enclave)
+            return
+        if self._security is not None and enclave != planned.enclave:
+            text = f"{node.fqn} runs in enclave {enclave}, the plan has it in {planned.enclave or 'none'}"
+            yield self._about(Kind.ENCLAVE_OF_ANOTHER, process, text, subject=node.fqn, enclave=enclave)
+        if planned.described:
+            yield from self._beyond(node, planned, process)
+            yield from self._absent(node, planned, process)
+
+    def _is_unnamed(self, node: GraphNode) -> bool:
+        return (node.fqn.rpartition("/")[0] or "/") in self._expected.unnamed
+
+    def _is_helper(self, node: GraphNode, process: GraphProcess) -> bool:
+        """A node that a library makes under a name of its own, and the plan grants by pattern: all that it has is
+        granted to a planned node of its process."""
+        granted = [
+            each.grant
+            for other in process.nodes
+            if (planned := self._planned(other)) is not None
+            for each in planned.interfaces
+        ]
+        return bool(node.interfaces) and all(_granted(_grant(each), granted) for each in node.interfaces)
+
+    def _beyond(self, node: GraphNode, planned: ExpectedNode, process: GraphProcess) -> Iterator[Finding]:
+        grants = [each.grant for each in planned.interfaces]
+        types = {each.grant: each.type for each in planned.interfaces if each.type}
+        for interface in node.interfaces:
+            if not interface.complete:
+                continue
+            grant = _grant(interface)
+            if not _granted(grant, grants):
+                yield self._about(
+                    Kind.UNPLANNED_ENDPOINT,
+                    process,
+                    f"{node.fqn}: {grant} is not planned",
+                    subject=node.fqn,
+                    name=interface.name,
+                    enclave=planned.enclave,
+                    remedy=f"add it to the description of {planned.program}",
+                )
+            elif grant in types and interface.type and types[grant] != interface.type:
+                text = f"{node.fqn}: {grant} has the type {interface.type}, planned is {types[grant]}"
+                yield self._about(Kind.TYPE_DIFFERS, process, text, subject=node.fqn, name=interface.name)
+
+    def _absent(self, node: GraphNode, planned: ExpectedNode, process: GraphProcess) -> Iterator[Finding]:
+        if any(each.by is not Attribution.LIST for each in node.interfaces) and len(process.nodes) > 1:
+            return  # what is whose is not known
+        there = {_grant(each) for each in node.interfaces if each.complete}
+        for each in planned.interfaces:
+            if each.certain and each.grant not in there:
+                text = f"{node.fqn}: {each.grant} is planned and not there"
+                yield self._about(
+                    Kind.MISSING_ENDPOINT,
+                    process,
+                    text,
+                    subject=node.fqn,
+                    name=each.grant.name,
+                    level=Level.ALARM,
+                )
+
+    # all together
+
+    def _counts(self) -> Iterator[Finding]:
+        if self._security is not None and not self._security.authenticated:
+            return  # nobody's nodes are seen
+        running = Counter(node.fqn for process in self._processes for node in process.nodes)
+        for fqn, planned in sorted(self._expected.nodes.items()):
+            count = sum(times for name, times in running.items() if covers(fqn, name))
+            if count == 0 and planned.always:
+                text = f"{fqn} ({planned.program}) is planned and does not run"
+                yield finding(Kind.MISSING_NODE, fqn, text, enclave=planned.enclave)
+            elif count > planned.times and "*" not in fqn:
+                text = f"{fqn} runs {count} times, planned is {planned.times}"
+                where = "; ".join(
+                    participant_text(process)
+                    for process in self._processes
+                    if any(node.fqn == fqn for node in process.nodes)
+                )
+                yield finding(Kind.REPEATED_NODE, fqn, text, enclave=planned.enclave, who=where)
+
+    def _meeting(self) -> Iterator[Finding]:
+        by_topic: dict[str, tuple[list[_End], list[_End]]] = {}
+        for end in self._ends():
+            by_topic.setdefault(end.endpoint.topic, ([], []))[end.endpoint.writes].append(end)
+        for topic, (readers, writers) in sorted(by_topic.items()):
+            told: set[tuple[str, str, str]] = set()
+            for writer, reader in product(writers, readers):
+                for found in _between(topic, writer, reader):
+                    if found.key[1:] not in told:
+                        told.add(found.key[1:])
+                        yield found
+
+    def _ends(self) -> Iterator[_End]:
+        for process in self._processes:
+            who = participant_text(process)
+            for node in process.nodes:
+                for interface in node.interfaces:
+                    yield from (_End(node.fqn, who, endpoint) for endpoint in interface.endpoints)
+            for endpoint in (*(e for each in process.unowned for e in each.endpoints), *process.foreign):
+                yield _End(who, who, endpoint)
+
+    def _about(
+        self,
+        kind: Kind,
+        process: GraphProcess,
+        text: str,
+        *,
+        subject: str = "",
+        name: str = "",
+        level: Level = Level.ALARM,
+        enclave: str = "",
+        remedy: str = "",
+    ) -> Finding:
+        who = participant_text(process)
+        return finding(
+            kind, subject or who, text, name=name, level=level, enclave=enclave, who=who, remedy=remedy
+        )
+
+
+class _End(NamedTuple):
+    owner: str
+    who: str
+    endpoint: SeenEndpoint
+
+
+def _between(topic: str, writer: _End, reader: _End) -> Iterator[Finding]:
+    """Why data does not go from one to the other, though both are on one topic."""
+    types = ros_type(writer.endpoint.type), ros_type(reader.endpoint.type)
+    subject = f"{writer.owner} -> {reader.owner}"
+    who = f"{writer.who}; {reader.who}"
+    if writer.endpoint.type != reader.endpoint.type:
+        text = f"{topic}: {writer.owner} writes {types[0]}, {reader.owner} reads {types[1]}: they do not meet"
+        yield finding(Kind.TYPES_DO_NOT_MEET, subject, text, name=topic, who=who)
+        return
+    for why in unmet(writer.endpoint.quality, reader.endpoint.quality):
+        text = f"{topic}: {writer.owner} and {reader.owner} do not meet: {why}"
+        yield finding(Kind.QOS_DOES_NOT_MEET, subject, text, name=topic, who=who)
+
+
+def _grant(interface: Interface) -> Grant:
+    return Grant(OPERATIONS[interface.kind], interface.name)
+
+
+def _granted(grant: Grant, grants: Iterable[Grant]) -> bool:
+    return any(
+        each.operation == grant.operation and (each.name == grant.name or _covers(each.name, grant.name))
+        for each in grants
+    )
+
+
+_covers: Callable[[str, str], bool] = covers

@@ -1,0 +1,117 @@
+"""The dry run's JSON → what the plan expects to run in one DDS domain. Pure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from typing import Any, NamedTuple
+
+from enclave_launch.review.document import Grant
+
+_UNSPECIFIED = "<node_name_unspecified>"
+_STATED = ("--nodl", "manifest of the package")
+"""Origins that say what a node has; the others may name what it has only now and then."""
+_LIFECYCLE = "/change_state"
+
+
+class ExpectedInterface(NamedTuple):
+    """``certain``: a node that runs has it."""
+
+    grant: Grant
+    type: str
+    certain: bool
+
+
+class ExpectedNode(NamedTuple):
+    """``described``: its interfaces are known; ``always``: it starts with the launch, not on an event; ``times``: how
+    many of this name."""
+
+    fqn: str
+    enclave: str
+    program: str
+    interfaces: tuple[ExpectedInterface, ...] = ()
+    described: bool = True
+    always: bool = True
+    times: int = 1
+
+
+class Expected(NamedTuple):
+    """``opaque``: enclaves, and places without one, in which programs run of which no node is known; ``unnamed``:
+    namespaces in which nodes run whose names are not."""
+
+    nodes: Mapping[str, ExpectedNode]
+    opaque: frozenset[str]
+    unnamed: frozenset[str]
+    enclaves: frozenset[str]
+
+    def nodes_of(self, enclave: str) -> Iterable[ExpectedNode]:
+        return (node for node in self.nodes.values() if node.enclave == enclave)
+
+
+def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected:
+    """Of all launches that run in the domain, as documents that ``report.contract.DryRun`` accepts; processes of other
+    domains are left out."""
+    plans = tuple(documents)
+    document = {
+        part: [each for plan in plans for each in plan[part]] for part in ("processes", "components", "nodes")
+    }
+    here = [each for each in document["processes"] if each["domain_id"] == domain]
+    elsewhere = {_enclave(each) for each in document["processes"] if each["domain_id"] != domain}
+    enclaves = {_enclave(each) for each in here}
+    components = [
+        each for each in document["components"] if (each["enclave"] or "") not in elsewhere - enclaves
+    ]
+    started = [*here, *components]
+    nodes = {
+        node.fqn: node
+        for node in _described(document["nodes"], started)
+        if node.enclave in enclaves or node.enclave not in elsewhere
+    }
+    for fqn, count in Counter(each["fqn"] for each in started if each["fqn"]).items():
+        starter = next(each for each in started if each["fqn"] == fqn)
+        if fqn not in nodes and _UNSPECIFIED not in fqn:
+            program = f"{starter['package']}/{starter.get('executable') or starter.get('plugin')}"
+            nodes[fqn] = ExpectedNode(
+                fqn, _enclave(starter), program, described=False, always=starter["on_event"] is None
+            )
+        if fqn in nodes:
+            nodes[fqn] = nodes[fqn]._replace(times=count)
+    unnamed = frozenset(
+        each["fqn"].rpartition("/")[0] or "/"
+        for each in started
+        if each["fqn"] and _UNSPECIFIED in each["fqn"]
+    )
+    opaque = frozenset(_enclave(each) for each in here if not each["fqn"])
+    return Expected(nodes, opaque, unnamed, frozenset(path for path in enclaves if path))
+
+
+def _enclave(started: Mapping[str, Any]) -> str:
+    return started["enclave"] or ""
+
+
+def _described(
+    nodes: Iterable[Mapping[str, Any]], started: Iterable[Mapping[str, Any]]
+) -> Iterable[ExpectedNode]:
+    origins: dict[str, str] = {}
+    on_event: dict[str, bool] = {}
+    for each in started:
+        program = f"{each['package']}/{each.get('executable') or each.get('plugin')}"
+        origins[program] = each["interfaces"] or ""
+        on_event[program] = on_event.get(program, True) and each["on_event"] is not None
+    for node in nodes:
+        program = node["program"]
+        lifecycle = any(each["built_in"] and each["name"].endswith(_LIFECYCLE) for each in node["interfaces"])
+        stated = origins.get(program, "") in _STATED and not lifecycle
+        yield ExpectedNode(
+            node["fqn"],
+            node["enclave"],
+            program,
+            tuple(_interface(each, stated) for each in node["interfaces"]),
+            always=not on_event.get(program, False),
+        )
+
+
+def _interface(fields: Mapping[str, Any], stated: bool) -> ExpectedInterface:
+    wildcard = any(character in fields["name"] for character in "*?[")
+    certain = stated and not fields["built_in"] and not fields["note"] and not wildcard
+    return ExpectedInterface(Grant(fields["operation"], fields["name"]), fields["type"], certain)

@@ -1,0 +1,92 @@
+"""One difference between a plan and what runs."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+
+class Kind(str, Enum):
+    """What is different; the value is stable, for programs."""
+
+    UNPLANNED_PROCESS = "unplanned-process"
+    UNPLANNED_NODE = "unplanned-node"
+    UNPLANNED_ENDPOINT = "unplanned-endpoint"
+    MISSING_NODE = "missing-node"
+    MISSING_ENDPOINT = "missing-endpoint"
+    REPEATED_NODE = "repeated-node"
+    TYPE_DIFFERS = "type-differs"
+    TYPES_DO_NOT_MEET = "types-do-not-meet"
+    QOS_DOES_NOT_MEET = "qos-does-not-meet"
+    NOT_SECURED = "not-secured"
+    OTHER_CA = "other-ca"
+    NOT_AUTHENTICATED = "not-authenticated"
+    ENCLAVE_OF_ANOTHER = "enclave-of-another"
+    STRANGER = "stranger"
+    FORGED_LIST = "forged-list"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class Level(str, Enum):
+    """``NOTE``: what descriptions leave open, so that it may be as it should be."""
+
+    ALARM = "alarm"
+    NOTE = "note"
+
+    def __str__(self) -> str:
+        return self.value
+
+
+class Certainty(Enum):
+    """When a finding may be told: discovery comes in pieces."""
+
+    FACT = "what was announced says so"
+    WHEN_SETTLED = "unless more is discovered"
+    ABSENCE = "unless it comes later"
+
+
+class Finding(NamedTuple):
+    """``subject``: the node or participant it is about, ``name`` the topic, service or action; ``who``: where it was
+    seen, for a person (a pid, a host). Two findings with one ``key`` are the same at two moments."""
+
+    kind: Kind
+    subject: str
+    name: str
+    text: str
+    certainty: Certainty = Certainty.FACT
+    level: Level = Level.ALARM
+    enclave: str = ""
+    who: str = ""
+    remedy: str = ""
+
+    @property
+    def key(self) -> tuple[str, str, str, str]:
+        return (self.kind.value, self.subject, self.name, self.text)
+
+
+_CERTAINTY = {
+    Kind.UNPLANNED_PROCESS: Certainty.WHEN_SETTLED,
+    Kind.NOT_AUTHENTICATED: Certainty.WHEN_SETTLED,
+    Kind.REPEATED_NODE: Certainty.WHEN_SETTLED,
+    Kind.MISSING_NODE: Certainty.ABSENCE,
+    Kind.MISSING_ENDPOINT: Certainty.ABSENCE,
+}
+"""Of the kinds that discovery could still take back; a respawned process overlaps with the one before."""
+
+
+def finding(
+    kind: Kind,
+    subject: str,
+    text: str,
+    *,
+    name: str = "",
+    level: Level = Level.ALARM,
+    enclave: str = "",
+    who: str = "",
+    remedy: str = "",
+) -> Finding:
+    """With the certainty that its kind has."""
+    certainty = _CERTAINTY.get(kind, Certainty.FACT)
+    return Finding(kind, subject, name, text, certainty, level, enclave, who, remedy)

@@ -1,0 +1,63 @@
+"""Findings over time → those that stand, each told once. Pure: moments are handed in.
+
+What was announced is a fact at once. What discovery could still take back has to stand for ``settle`` seconds. What is
+missing may still come: it is told after ``patience``, counted from when it could have come.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from enclave_launch.drift.finding import Certainty, Finding
+
+Key = tuple[str, str, str, str]
+
+
+class Patience(NamedTuple):
+    """Seconds."""
+
+    settle: float = 5.0
+    absence: float = 60.0
+
+    def of(self, certainty: Certainty) -> float:
+        if certainty is Certainty.FACT:
+            return 0.0
+        return self.settle if certainty is Certainty.WHEN_SETTLED else self.absence
+
+
+class Change(NamedTuple):
+    """``over``: what was told before and is no longer so."""
+
+    new: tuple[Finding, ...] = ()
+    over: tuple[Finding, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.new or self.over)
+
+
+class Steady:
+    """Told of all findings of each moment, in order."""
+
+    def __init__(self, patience: Patience | None = None) -> None:
+        self._patience = patience or Patience()
+        self._since: dict[Key, float] = {}
+        self._told: dict[Key, Finding] = {}
+
+    @property
+    def standing(self) -> tuple[Finding, ...]:
+        """What was told and is so."""
+        return tuple(self._told.values())
+
+    def at(self, now: float, findings: Iterable[Finding]) -> Change:
+        """What is to be told at ``now``."""
+        found = {each.key: each for each in findings}
+        self._since = {key: self._since.get(key, now) for key in found}
+        new = {
+            key: each
+            for key, each in found.items()
+            if key not in self._told and now - self._since[key] >= self._patience.of(each.certainty)
+        }
+        over = [self._told.pop(key) for key in list(self._told) if key not in found]
+        self._told.update(new)
+        return Change(tuple(new.values()), tuple(over))

@@ -1,0 +1,156 @@
+"""What each ROS tool needs to work on a secured robot: the one table of it. Pure; docs/running-systems.md shows it.
+
+Seen on real ROS 2 jazzy: every ``ros2`` command is a node ``/_ros2cli_<pid>`` that publishes ``/rosout`` and
+``/parameter_events`` and serves ``get_type_description`` below its own name (the pid is in it, so a wildcard stands
+there); ``param``, even ``get``, is a client of all six parameter services of its target. rosbag2 and rviz2: from their
+sources (ros2/rosbag2 ``recorder.cpp``, ros2/rviz ``visualizer_app.cpp``), not run. ``ros_discovery_info`` is granted to
+all, and must not be published only by ``observe``, which is not an rmw.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from keystore.errors import InvalidInputError, printable
+from keystore.formats.permissions_names import full_name, has_wildcard
+from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+
+FOLDER = "/tools"
+"""All enclaves of tools are below it: a person finds them, and no robot's enclave is overwritten."""
+
+Need = tuple[Operation, str]
+
+
+class Target(Enum):
+    """What a tool works on; the value is the word for a person."""
+
+    NOTHING = ""
+    TOPIC = "TOPIC"
+    SERVICE = "SERVICE"
+    ACTION = "ACTION"
+    NODE = "NODE"
+
+
+class Tool(NamedTuple):
+    """``node``: the name of the tool's own node, empty where it is none. ``own``: what it needs whatever its target,
+    ``each``: for each target, which stands for ``{}``. ``example``: a command line that works with it."""
+
+    name: str
+    what: str
+    target: Target
+    node: str
+    own: tuple[Need, ...]
+    each: tuple[Need, ...]
+    example: str
+    optional_target: bool = False
+
+
+_P, _S, _R, _Q, _C = (
+    Operation.PUBLISH,
+    Operation.SUBSCRIBE,
+    Operation.REPLY,
+    Operation.REQUEST,
+    Operation.CALL,
+)
+PARAMETER_SERVICES = (
+    "describe_parameters",
+    "get_parameter_types",
+    "get_parameters",
+    "list_parameters",
+    "set_parameters",
+    "set_parameters_atomically",
+)
+_LIFECYCLE_SERVICES = (
+    "change_state",
+    "get_state",
+    "get_available_states",
+    "get_available_transitions",
+    "get_transition_graph",
+)
+_CONTAINER_SERVICES = ("_container/load_node", "_container/unload_node", "_container/list_nodes")
+_RECORDER_SERVICES = ("is_paused", "pause", "resume", "record", "stop", "snapshot", "split_bagfile")
+_RVIZ_TOOLS = ("/clicked_point", "/goal_pose", "/initialpose")
+
+_CLI_NODE = "/_ros2cli_*"
+_ANY_NODE: tuple[Need, ...] = ((_P, "/rosout"), (_P, "/parameter_events"), (_R, "~/get_type_description"))
+_RCLCPP_NODE: tuple[Need, ...] = (
+    *_ANY_NODE,
+    (_S, "/parameter_events"),
+    *((_R, f"~/{name}") for name in PARAMETER_SERVICES),
+)
+_TF_LISTENER: tuple[Need, ...] = (
+    (_S, "/tf"),
+    (_S, "/tf_static"),
+    (_R, "/transform_listener_impl_*/get_type_description"),
+)
+_RVIZ: tuple[Need, ...] = (*_RCLCPP_NODE, *_TF_LISTENER, (_R, "~/reset_time"))
+
+
+def _below(operation: Operation, names: tuple[str, ...]) -> tuple[Need, ...]:
+    return tuple((operation, f"{{}}/{name}") for name in names)
+
+
+TABLE: tuple[Tool, ...] = (
+    Tool("observe", "secure-nodl observe, secure-plan drift: discovery is read, nothing else", Target.NOTHING, "", (),
+         (), "secure-nodl observe --keystore {keystore} --enclave {enclave}"),
+    Tool("list", "ros2 node list|info, topic list|info, service list, action list", Target.NOTHING, _CLI_NODE,
+         _ANY_NODE, (), "ros2 node list --no-daemon"),
+    Tool("daemon", "the ROS daemon, which answers the commands of list", Target.NOTHING, _CLI_NODE, _ANY_NODE, (),
+         "ros2 daemon start"),
+    Tool("echo", "ros2 topic echo, hz, bw, delay", Target.TOPIC, _CLI_NODE, _ANY_NODE, ((_S, "{}"),),
+         "ros2 topic echo --no-daemon {target}"),
+    Tool("pub", "ros2 topic pub", Target.TOPIC, _CLI_NODE, _ANY_NODE, ((_P, "{}"),),
+         "ros2 topic pub --once {target} TYPE VALUES"),
+    Tool("param", "ros2 param list, get, set, describe, dump", Target.NODE, _CLI_NODE, _ANY_NODE,
+         _below(_Q, PARAMETER_SERVICES), "ros2 param list --no-daemon {target}"),
+    Tool("call", "ros2 service call", Target.SERVICE, _CLI_NODE, _ANY_NODE, ((_Q, "{}"),),
+         "ros2 service call {target} TYPE VALUES"),
+    Tool("action", "ros2 action send_goal", Target.ACTION, _CLI_NODE, _ANY_NODE, ((_C, "{}"),),
+         "ros2 action send_goal {target} TYPE GOAL"),
+    Tool("lifecycle", "ros2 lifecycle get, set, list", Target.NODE, _CLI_NODE, _ANY_NODE,
+         _below(_Q, _LIFECYCLE_SERVICES), "ros2 lifecycle get --no-daemon {target}"),
+    Tool("component", "ros2 component list, load, unload", Target.NODE, _CLI_NODE, _ANY_NODE,
+         _below(_Q, _CONTAINER_SERVICES), "ros2 component list --no-daemon {target}"),
+    Tool("record", "ros2 bag record", Target.TOPIC, "/rosbag2_recorder",
+         (*_RCLCPP_NODE, (_P, "/events/write_split"), *((_R, f"~/{name}") for name in _RECORDER_SERVICES)),
+         ((_S, "{}"),), "ros2 bag record {target}"),
+    Tool("rviz", "rviz2 that shows topics, without tools that publish", Target.TOPIC, "/rviz", _RVIZ, ((_S, "{}"),),
+         "rviz2 -d CONFIG", True),
+    Tool("rviz-control", "rviz2 with its tools for goals, poses and points: it can move the robot", Target.TOPIC,
+         "/rviz", (*_RVIZ, *((_P, name) for name in _RVIZ_TOOLS)), ((_S, "{}"),), "rviz2 -d CONFIG", True),
+)  # fmt: skip
+TOOLS = {tool.name: tool for tool in TABLE}
+
+
+def tool_enclave_name(tool: Tool, targets: tuple[str, ...]) -> str:
+    """Where the enclave is kept: ``/tools/echo/front/scan``; of several targets the first, and how many more."""
+    rest = f"_and_{len(targets) - 1}_more" if len(targets) > 1 else ""
+    kind = tool.name.replace("-", "_")
+    return f"{FOLDER}/{kind}{targets[0] if targets else ''}{rest}"
+
+
+def tool_targets(tool: Tool, words: tuple[str, ...]) -> tuple[str, ...]:
+    """Absolute names of what the tool works on, as its command line would take them. Raises ``InvalidInputError`` for
+    too few or too many, and ``PolicyError`` for what is not a name."""
+    if tool.target is Target.NOTHING and words:
+        raise InvalidInputError(f"--for {tool.name} works on the whole graph: it takes no target")
+    if tool.target is not Target.NOTHING and not words and not tool.optional_target:
+        raise InvalidInputError(f"--for {tool.name} needs the {tool.target.value} that it works on")
+    targets = tuple(dict.fromkeys(word if word.startswith("/") else f"/{word}" for word in words))
+    for target in targets:
+        if has_wildcard(target) or "~" in target:
+            raise InvalidInputError(
+                f"{printable(target)}: a tool is given its targets one by one, without wildcards"
+            )
+        full_name(target, Profile("/", "tool", ()))
+    return targets
+
+
+def tool_policy(tool: Tool, targets: tuple[str, ...], enclave: str) -> EnclavePolicy:
+    """Exactly what the table says, for these targets."""
+    needs = [(operation, name.replace("~", tool.node, 1)) for operation, name in tool.own]
+    needs += [(operation, name.format(target)) for target in targets for operation, name in tool.each]
+    rules = tuple(Rule(operation, Qualifier.ALLOW, name) for operation, name in sorted(set(needs)))
+    profiles = (Profile("/", "tool", rules),) if rules else ()
+    return EnclavePolicy(enclave, profiles, publishes_discovery=bool(tool.node))

@@ -1,0 +1,109 @@
+"""An enclave for a tool: what it needs on its target, for a short time, below ``/tools``."""
+
+from __future__ import annotations
+
+import os
+import shlex
+from collections.abc import Mapping, Sequence
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import NamedTuple
+
+from keystore.disk import layout, safe_files
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
+from keystore.errors import InvalidInputError, printable
+from keystore.formats.certificate import read_certificate
+from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.guid_prefix import Half
+from keystore.formats.policy import EnclavePolicy, Policy
+from keystore.formats.tool_needs import FOLDER, TOOLS, tool_enclave_name, tool_policy, tool_targets
+from keystore.steps.enclaves import apply_policy
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.report import ProvisionReport
+
+DEFAULT_LIFETIME = timedelta(hours=8)
+"""A working day: what is forgotten on a laptop ends by itself."""
+
+
+class ToolEnclave(NamedTuple):
+    """``environment``: what rcl reads, so that any command uses it; ``command``: an example of one."""
+
+    enclave: str
+    policy: EnclavePolicy
+    ends: datetime
+    environment: Mapping[str, str]
+    command: str
+    remove: str
+    report: ProvisionReport
+
+
+def create_tool_enclave(
+    keystore: Path | str,
+    tool: str,
+    targets: Sequence[str] = (),
+    *,
+    name: str | None = None,
+    options: ProvisionOptions | None = None,
+) -> ToolEnclave:
+    """Make it, or make it anew with a full life. ``name`` must be below ``/tools``. The keystore must exist.
+
+    Raises InvalidInputError for a tool or target that cannot be, and what provisioning raises.
+    """
+    if tool not in TOOLS:
+        raise InvalidInputError(f"{printable(tool)} is not a tool we know; choose from {', '.join(TOOLS)}")
+    kind = TOOLS[tool]
+    chosen = tool_targets(kind, tuple(targets))
+    enclave = validate_enclave_name(name or tool_enclave_name(kind, chosen))
+    if not enclave.startswith(f"{FOLDER}/"):
+        raise InvalidInputError(f"{printable(enclave)}: enclaves of tools are below {FOLDER}/")
+    given = options or ProvisionOptions()
+    if given.lifetime is None and given.valid_until is None:
+        given = given._replace(lifetime=DEFAULT_LIFETIME)
+    if (
+        not kind.node
+    ):  # of two implementations the one with the smaller GUID begins, which Cyclone DDS must be
+        given = given._replace(guid_halves={enclave: Half.LOW})
+    policy = tool_policy(kind, chosen, enclave)
+    report = apply_policy(keystore, Policy((policy,)), options=given)
+    root = resolve_root(keystore)
+    example = kind.example.format(
+        keystore=shlex.quote(str(root)), enclave=enclave, target=chosen[0] if chosen else kind.target.value
+    )
+    environment = tool_environment(root, enclave)
+    words = " ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items())
+    return ToolEnclave(
+        enclave,
+        policy,
+        _end(root, enclave),
+        environment,
+        f"{words} {example}" if kind.node else example,
+        f"secure-keystore remove {shlex.quote(str(root))} {enclave}",
+        report,
+    )
+
+
+def tool_environment(root: Path | str, enclave: str) -> dict[str, str]:
+    """Source: rcl ``security.c``; the override wins over what a command line says."""
+    return {
+        "ROS_SECURITY_ENABLE": "true",
+        "ROS_SECURITY_STRATEGY": "Enforce",
+        "ROS_SECURITY_KEYSTORE": os.path.abspath(root),
+        "ROS_SECURITY_ENCLAVE_OVERRIDE": enclave,
+    }
+
+
+def _end(root: Path, enclave: str) -> datetime:
+    relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
+    return read_certificate(safe_files.read(root, relative), printable(relative)).validity.not_after
+
+
+def enclaves_by_guid(keystore: Path | str) -> dict[int, str]:
+    """The first 48 bits of the GUIDs of its participants → enclave, for every enclave of the keystore. No key is
+    read. Source: DDS-Security 9.3.3."""
+    from keystore.formats.guid_prefix import guid_prefix
+
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    names = {enclave: view.common_name(enclave) for enclave in view.enclaves()}
+    return {guid_prefix(name): enclave for enclave, name in names.items() if name}

@@ -1,0 +1,67 @@
+"""Make an enclave for a ROS tool: what it needs on its target, for 8 hours, and how to use it.
+
+Tools: see docs/running-systems.md. Run it again for another 8 hours; secure-keystore remove takes it back at once.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    from keystore.formats.tool_needs import TABLE
+
+    parser.usage = "secure-keystore tool-enclave KEYSTORE --for TOOL [TARGET ...] [options]"
+    parser.formatter_class = argparse.RawDescriptionHelpFormatter
+    parser.epilog = "tools:\n" + "".join(
+        f"  {f'{tool.name} {tool.target.value}':20}  {tool.what}\n" for tool in TABLE
+    )
+    common.add_keystore(parser)
+    parser.add_argument("targets", metavar="TARGET", nargs="*", help=argparse.SUPPRESS)
+    parser.add_argument(
+        "--for", dest="tool", required=True, nargs="+", metavar=("TOOL", "TARGET"),
+        help="the tool, and the topics, nodes or services that it works on",
+    )  # fmt: skip
+    parser.add_argument("--name", metavar="ENCLAVE", help="default: /tools/TOOL/TARGET")
+    common.add_domains(parser)
+    common.add_validity(parser)
+    common.add_revocation(parser)
+    common.add_subjects(parser)
+    common.add_signing(parser)
+    common.add_lock(parser)
+    common.add_format(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.formats.validity import iso
+    from keystore.steps.tool_enclaves import create_tool_enclave
+
+    options = common.provision_options(arguments, domains=common.domains(arguments))
+    tool, *targets = arguments.tool
+    made = create_tool_enclave(
+        arguments.keystore, tool, [*arguments.targets, *targets], name=arguments.name, options=options
+    )
+    rules = [rule for profile in made.policy.profiles for rule in profile.rules]
+    if arguments.format == "json":
+        common.print_json(
+            {
+                "enclave": made.enclave,
+                "ends": iso(made.ends),
+                "environment": dict(made.environment),
+                "command": made.command,
+                "remove": made.remove,
+                "permissions": [f"{rule.operation.value} {rule.expression}" for rule in rules],
+            }
+        )
+    else:
+        common.print_lines(
+            (
+                f"{made.enclave}: until {iso(made.ends)}, {len(rules)} permissions",
+                f"use it:       {made.command}",
+                f"take it back: {made.remove}",
+            )
+        )
+    common.warn(made.report.warnings)
+    return 0
