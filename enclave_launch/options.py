@@ -104,7 +104,8 @@ class RunSettings:
     ``expiry_watch.renewal_deadline`` gives it.
 
     ``record``: every endpoint that a node makes, or is refused, is an event of the launch. ``None``: of secured
-    launches, whose refusals are explained, where that is possible. A ``companion`` of one's own takes its place."""
+    launches, whose refusals are explained, where that is possible. A ``companion`` of one's own takes its place.
+    ``watch``: a further one, which goes along beside either."""
 
     noninteractive: bool = False
     debug: bool = False
@@ -112,5 +113,6 @@ class RunSettings:
     secrets: frozenset[str] = frozenset()
     companion: LaunchCompanion | None = None
     record: bool | None = None
+    watch: LaunchCompanion | None = None
     log_limit: int | None = None
     deadline: Deadline | None = None

@@ -145,8 +145,17 @@ def _options(launch: Launch, settings: RunSettings) -> RunOptions:
         launch_configurations=source.launch_configurations,
         host_options=source.host_options,
         outcomes=source.outcomes,
-        companion=settings.companion or _recording(launch, settings),
+        companion=_companion(launch, settings),
     )
+
+
+def _companion(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
+    companion = settings.companion or _recording(launch, settings)
+    if companion is None or settings.watch is None:
+        return companion or settings.watch
+    from enclave_launch.runtime.companion import Together
+
+    return Together(companion, settings.watch)
 
 
 def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:

@@ -37,7 +37,7 @@ FLOORS = (
     {"drift"},
     {"report", "runtime"},
     {"recording", "secured"},
-    {"expiry_watch"},
+    {"expiry_watch", "drift_watch"},
     {"running"},
     {"flow"},
     {"verb"},

@@ -111,7 +111,7 @@ class _Comparison:
         elif seen.subject_hash not in self._security.enclaves:
             text = f"its certificate is of no enclave of this keystore; it calls itself {seen.enclave or 'nothing'}"
             yield self._about(Kind.OTHER_CA, process, text)
-        elif self._security.authenticated and next(process.endpoints, None) is None and not process.listed:
+        elif self._security.authenticated and not process.announced and not process.listed:
             enclave = self._security.enclaves[seen.subject_hash]
             text = (
                 f"it claims the subject of enclave {enclave}, and shows nothing to this observer: its certificate is "

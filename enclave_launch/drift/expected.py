@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from enclave_launch.review.document import Grant
 
 _UNSPECIFIED = "<node_name_unspecified>"
+_NO_NAMESPACE = "<node_namespace_unspecified>"
 _STATED = ("--nodl", "manifest of the package")
 """Origins that say what a node has; the others may name what it has only now and then."""
 _LIFECYCLE = "/change_state"
@@ -67,8 +68,8 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
         for node in _described(document["nodes"], started)
         if node.enclave in enclaves or node.enclave not in elsewhere
     }
-    for fqn, count in Counter(each["fqn"] for each in started if each["fqn"]).items():
-        starter = next(each for each in started if each["fqn"] == fqn)
+    for fqn, count in Counter(_fqn(each) for each in started if each["fqn"]).items():
+        starter = next(each for each in started if each["fqn"] and _fqn(each) == fqn)
         if fqn not in nodes and _UNSPECIFIED not in fqn:
             program = f"{starter['package']}/{starter.get('executable') or starter.get('plugin')}"
             nodes[fqn] = ExpectedNode(
@@ -77,12 +78,17 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
         if fqn in nodes:
             nodes[fqn] = nodes[fqn]._replace(times=count)
     unnamed = frozenset(
-        each["fqn"].rpartition("/")[0] or "/"
+        _fqn(each).rpartition("/")[0] or "/"
         for each in started
         if each["fqn"] and _UNSPECIFIED in each["fqn"]
     )
     opaque = frozenset(_enclave(each) for each in here if not each["fqn"])
     return Expected(nodes, opaque, unnamed, frozenset(path for path in enclaves if path))
+
+
+def _fqn(started: Mapping[str, Any]) -> str:
+    """As rcl has it: where launch gives no namespace, the root one."""
+    return str(started["fqn"]).replace(_NO_NAMESPACE, "")
 
 
 def _enclave(started: Mapping[str, Any]) -> str:

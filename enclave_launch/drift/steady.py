@@ -18,12 +18,16 @@ class Patience(NamedTuple):
     """Seconds."""
 
     settle: float = 5.0
+    lease: float = 30.0
     absence: float = 60.0
 
     def of(self, certainty: Certainty) -> float:
-        if certainty is Certainty.FACT:
-            return 0.0
-        return self.settle if certainty is Certainty.WHEN_SETTLED else self.absence
+        return {
+            Certainty.FACT: 0.0,
+            Certainty.WHEN_SETTLED: self.settle,
+            Certainty.WHEN_LEFT: self.lease,
+            Certainty.ABSENCE: self.absence,
+        }[certainty]
 
 
 class Change(NamedTuple):

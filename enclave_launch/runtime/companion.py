@@ -47,3 +47,37 @@ class LaunchCompanion(Protocol):
         """Components are about to be loaded into a container that runs."""
 
     async def closed(self) -> None: ...
+
+
+class Together:
+    """Several companions as one: asked and told in their order."""
+
+    def __init__(self, *companions: LaunchCompanion) -> None:
+        self._companions = companions
+
+    @property
+    def records(self) -> bool:
+        """Whether one of them does."""
+        return any(each.records for each in self._companions)
+
+    def opened(self, launch: LaunchControl) -> None:
+        """:raises EnclaveLaunchError: one of them cannot go along."""
+        for each in self._companions:
+            each.opened(launch)
+
+    def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
+        for each in self._companions:
+            spec = each.prepared(process, spec)
+        return spec
+
+    def happened(self, event: RunEvent) -> None:
+        for each in self._companions:
+            each.happened(event)
+
+    def loading(self, components: Sequence[ResolvedComponent]) -> None:
+        for each in self._companions:
+            each.loading(components)
+
+    async def closed(self) -> None:
+        for each in self._companions:
+            await each.closed()

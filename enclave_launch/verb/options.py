@@ -260,6 +260,21 @@ def _add_running(group: argparse._ArgumentGroup) -> None:
         help="shortly before a certificate or permissions end: end the launch in order, renew them, start it anew",
     )
     group.add_argument(
+        "--watch",
+        action="store_true",
+        help="observe the DDS domain beside the launch, and tell what runs otherwise than planned",
+    )
+    group.add_argument(
+        "--watch-report", metavar="FILE", type=Path, help="what --watch tells, as JSON lines, beside the text"
+    )
+    group.add_argument(
+        "--accept",
+        metavar="NODE",
+        action="append",
+        default=[],
+        help="with --watch: may run beside the plan, such as '/_ros2cli*' (repeatable)",
+    )
+    group.add_argument(
         "--log-limit",
         metavar="SIZE",
         type=size_in_bytes,

@@ -91,6 +91,13 @@ def _start(
     companion: LaunchCompanion | None = None,
 ) -> int:
     if keystore is None:
+        if options.watch:
+            from enclave_launch.verb.watch import watch_plain_launch
+
+            plan = _resolve(target, options)
+            _warn((*plan.problems, *plan.warnings))
+            print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
+            return watch_plain_launch(plan, options, lambda watch: _run_settings(options, watch=watch))
         return _launch_plainly(target, options, companion)
     while (status := _launch(_planned(target, options, keystore), options, keystore, companion)) is None:
         pass  # what it used was about to end: planned, renewed and started once more
@@ -299,7 +306,14 @@ def _launch(
     gaps = launch.zenoh.gaps if launch.zenoh is not None else ()
     _warn((*repaired, *gaps, *expiry_notices(launch, options.warn_expiry)))
     deadline = _deadline(launch) if options.restart_expiring else None
-    status = run(launch, options=_run_settings(options, companion, deadline))
+    watch = None
+    if options.watch:
+        from enclave_launch.verb.watch import watch_of_secured_launch
+
+        watch = watch_of_secured_launch(launch, options)
+    status = run(launch, options=_run_settings(options, companion, deadline, watch))
+    if watch is not None:
+        status = watch.status(status)
     return None if deadline is not None and deadline.reached else status
 
 
@@ -330,7 +344,10 @@ def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
 
 
 def _run_settings(
-    options: argparse.Namespace, companion: LaunchCompanion | None = None, deadline: Deadline | None = None
+    options: argparse.Namespace,
+    companion: LaunchCompanion | None = None,
+    deadline: Deadline | None = None,
+    watch: LaunchCompanion | None = None,
 ) -> RunSettings:
     from enclave_launch.options import RunSettings
 
@@ -343,6 +360,7 @@ def _run_settings(
         allow_late=options.allow_late,
         secrets=secrets,
         companion=companion,
+        watch=watch,
         record=False if options.no_explain_denials else None,
         log_limit=options.log_limit,
         deadline=deadline,

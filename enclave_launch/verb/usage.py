@@ -90,10 +90,16 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
         raise UsageError(
             "--audit runs the launch unsecured and tells what --secure would refuse: give it alone"
         )
+    if not options.watch:
+        check_needs_secure(parser._actions, given & {"watch_report", "accept"}, "--watch")
+    elif views or options.dry_run or options.audit or options.learn is not None:
+        raise UsageError(
+            "--watch is for a launch that runs as planned: it is not for --dry-run, --audit or --learn"
+        )
     if not options.secure:
         check_needs_secure(parser._actions, given & FOR_SECURE)
-        if not views and not options.dry_run and not options.audit:
-            check_needs_secure(parser._actions, given & FOR_PLAN, "--secure (or --dry-run, --audit)")
+        if not views and not options.dry_run and not options.audit and not options.watch:
+            check_needs_secure(parser._actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
 
 
 def check_needs_secure(

@@ -20,6 +20,7 @@ from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.tool_needs import FOLDER, TOOLS, tool_enclave_name, tool_policy, tool_targets
 from keystore.steps.enclaves import apply_policy
 from keystore.steps.options import ProvisionOptions
+from keystore.steps.provisioning import provision
 from keystore.steps.report import ProvisionReport
 
 DEFAULT_LIFETIME = timedelta(hours=8)
@@ -81,6 +82,18 @@ def create_tool_enclave(
         f"secure-keystore remove {shlex.quote(str(root))} {enclave}",
         report,
     )
+
+
+WATCHER = f"{FOLDER}/watch"
+
+
+def provide_watcher(keystore: Path | str, options: ProvisionOptions) -> str:
+    """The enclave of ``secure-launch --watch``, which lives as long as those of the launch: made once for a keystore,
+    renewed like the others. It reads discovery and nothing else."""
+    policy = tool_policy(TOOLS["observe"], (), WATCHER)
+    chosen = options._replace(launch=None, enclave_domains={}, guid_halves={WATCHER: Half.LOW}, create=False)
+    provision(keystore, [policy], options=chosen)
+    return WATCHER
 
 
 def tool_environment(root: Path | str, enclave: str) -> dict[str, str]:

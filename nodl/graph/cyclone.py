@@ -95,6 +95,11 @@ class CycloneObserver:
     def graph(self, *, past: bool = False) -> Graph:
         return self.state.graph(past=past)
 
+    @property
+    def forged(self) -> tuple[str, ...]:
+        """Lists that were not believed, in words."""
+        return tuple(self.state.forged)
+
     def close(self) -> None:
         """Deletes the entities while the interpreter still works: DDS threads may be calling it until then."""
         for entity in (

@@ -42,6 +42,7 @@ def _process(process: GraphProcess) -> dict[str, Any]:
         **process.participant._asdict(),
         "listed": process.listed,
         "gid_size": process.gid_size,
+        "announced": process.announced,
         "nodes": [
             {"fqn": node.fqn, "ordinal": node.ordinal, "interfaces": [_interface(i) for i in node.interfaces]}
             for node in process.nodes
@@ -79,6 +80,7 @@ def _read_process(fields: Mapping[str, Any]) -> GraphProcess:
         tuple(map(_read_endpoint, fields["foreign"])),
         bool(fields["listed"]),
         int(fields["gid_size"]),
+        bool(fields["announced"]),
     )
 
 

@@ -68,7 +68,8 @@ class GraphNode(NamedTuple):
 
 class GraphProcess(NamedTuple):
     """One participant. ``unowned``: ROS endpoints that no node of it is known to have; ``foreign``: what is not ROS;
-    ``listed``: it published a list of its nodes, which this observer could read."""
+    ``listed``: it published a list of its nodes, which this observer could read; ``announced``: any endpoint of it is
+    known, be it only the middleware's own."""
 
     participant: SeenParticipant
     nodes: tuple[GraphNode, ...] = ()
@@ -76,6 +77,7 @@ class GraphProcess(NamedTuple):
     foreign: tuple[SeenEndpoint, ...] = ()
     listed: bool = False
     gid_size: int = 0
+    announced: bool = False
 
     @property
     def interfaces(self) -> Iterator[Interface]:
@@ -105,8 +107,7 @@ class Graph(NamedTuple):
         """Whether discovery is under way somewhere: an interface lacks a part, or a participant has nothing at all
         (what secured ones have is told only to those that they authenticate)."""
         return any(not each.complete for process in self.processes for each in process.interfaces) or any(
-            not process.participant.claims_security and next(process.endpoints, None) is None
-            for process in self.processes
+            not process.participant.claims_security and not process.announced for process in self.processes
         )
 
 
@@ -123,7 +124,8 @@ def process_of(
     """``endpoints`` are the participant's; ``listed`` the newest list that it published itself."""
     parts: list[tuple[SeenEndpoint, Part]] = []
     foreign = []
-    for endpoint in sorted(endpoints):
+    ordered = sorted(endpoints)
+    for endpoint in ordered:
         part = part_of(endpoint.topic, endpoint.type, writes=endpoint.writes)
         if part is not None:
             parts.append((endpoint, part))
@@ -143,7 +145,9 @@ def process_of(
     )
     unowned = _interfaces(groups.get(None, ()), by)
     size = listed.gid_size if listed else 0
-    return GraphProcess(participant, nodes, unowned, tuple(foreign), listed is not None, size)
+    return GraphProcess(
+        participant, nodes, unowned, tuple(foreign), listed is not None, size, announced=bool(ordered)
+    )
 
 
 def owners_in(listed: ParticipantList) -> dict[str, Owner]:

@@ -23,6 +23,9 @@ class Observer(Protocol):
 
     def graph(self, *, past: bool = False) -> Graph: ...
 
+    @property
+    def forged(self) -> tuple[str, ...]: ...
+
     def close(self) -> None: ...
 
 

@@ -57,6 +57,11 @@ class RclpyObserver:
         found = self._seen.values() if past else self._now
         return Graph(tuple(sorted(found, key=lambda each: each.participant.guid)))
 
+    @property
+    def forged(self) -> tuple[str, ...]:
+        """rclpy does not tell who wrote a list."""
+        return ()
+
     def close(self) -> None:
         self._node.destroy_node()
         self._context.shutdown()
@@ -74,7 +79,9 @@ class RclpyObserver:
             node = GraphNode(fqn, interfaces, ordinal)
             nodes.setdefault(SeenParticipant(guid, enclave), []).append(node)
         for participant, members in sorted(nodes.items()):
-            yield GraphProcess(participant, tuple(sorted(members)), listed=True, gid_size=_GUID)
+            yield GraphProcess(
+                participant, tuple(sorted(members)), listed=True, gid_size=_GUID, announced=True
+            )
 
     def _interfaces(self, name: str, namespace: str, fqn: str) -> Iterator[Interface]:
         for kind, ask in self._questions().items():

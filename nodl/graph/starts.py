@@ -14,6 +14,7 @@ from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
 
 _IN_PREFIX = re.compile(r"(?:.*/)?lib/([^/]+)/([^/]+)\Z")  # an executable of an ament package
 _UNSPECIFIED = "<node_name_unspecified>"
+_NO_NAMESPACE = "<node_namespace_unspecified>"
 
 
 class Start(NamedTuple):
@@ -92,12 +93,12 @@ def _of_process(fields: Mapping[str, Any]) -> Start:
     command = tuple(map(str, fields["cmd"]))
     program = next((i for i, word in enumerate(command) if word.endswith(str(fields["executable"]))), 0)
     rules, _, arguments = _ros_words(command[program + 1 :])
-    fqn = str(fields["fqn"] or "")
+    fqn = str(fields["fqn"] or "").replace(_NO_NAMESPACE, "")
     return Start(
         str(fields["package"] or ""),
         str(fields["executable"]).rpartition("/")[2],
         fqn="" if _UNSPECIFIED in fqn else fqn,
-        namespace=str(fields["namespace"] or "/"),
+        namespace=str(fields["namespace"] or "").replace(_NO_NAMESPACE, "") or "/",
         command=command,
         rule_texts=rules,
         parameters=dict(fields["parameters"]),
@@ -106,7 +107,7 @@ def _of_process(fields: Mapping[str, Any]) -> Start:
 
 
 def _of_component(fields: Mapping[str, Any]) -> Start:
-    fqn = str(fields["fqn"])
+    fqn = str(fields["fqn"]).replace(_NO_NAMESPACE, "")
     named = _UNSPECIFIED not in fqn
     namespace, _, name = fqn.rpartition("/")
     rules = [f"{source}:={target}" for source, target in fields["remaps"]]

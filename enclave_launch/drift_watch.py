@@ -1,0 +1,236 @@
+"""Watches, beside a launch, whether what runs in its DDS domains is what was planned (``secure-launch --watch``).
+
+The domain is observed by a process of its own (``nodl.graph.follow``): DDS stays out of the supervisor. Its graphs come
+as lines; once a second they are held against the plan (``enclave_launch.drift``).
+"""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from enclave_launch.drift.compare import Circumstances, Security, compare
+from enclave_launch.drift.expected import expected_in
+from enclave_launch.drift.finding import Finding, Level
+from enclave_launch.drift.steady import Patience, Steady
+from enclave_launch.drift.text import finding_document, finding_text
+from enclave_launch.errors import RuntimeFailure
+from enclave_launch.runtime.run_events import ProcessStarted
+from nodl.graph.json_form import graph_from_document
+from nodl.graph.model import Graph
+
+if TYPE_CHECKING:
+    from enclave_launch.process import ResolvedComponent, ResolvedProcess
+    from enclave_launch.runtime.companion import LaunchControl
+    from enclave_launch.runtime.process_tree import ProcessSpec
+    from enclave_launch.runtime.run_events import RunEvent
+
+_INTERVAL = 1.0  # seconds between two comparisons
+_LONGEST_START = 60.0  # of an observer, on a machine that does much else
+_MOST_PARENTS = 64
+
+
+class WatchOptions(NamedTuple):
+    """``security`` and ``enclave_directory``: of a secured launch. ``report``: where findings go as JSON lines."""
+
+    security: Security | None = None
+    enclave_directory: Path | None = None
+    accepted: tuple[str, ...] = ()
+    report: Path | None = None
+    patience: Patience = Patience()
+
+
+class DriftWatch:
+    """A ``LaunchCompanion``. ``alarms``: how many there were."""
+
+    def __init__(self, document: Mapping[str, Any], options: WatchOptions) -> None:
+        self._document, self._options = document, options
+        self._domains = sorted({each["domain_id"] for each in document["processes"]})
+        self._observers: dict[int, _Observer] = {}
+        self._steady = {domain: Steady(options.patience) for domain in self._domains}
+        self._launch: LaunchControl | None = None
+        self._task: asyncio.Task[None] | None = None
+        self._started: set[int] = set()
+        self.alarms = 0
+
+    @property
+    def records(self) -> bool:
+        """What it sees are graphs, later than endpoints are made."""
+        return False
+
+    def status(self, of_launch: int) -> int:
+        """The exit status of the whole: the launch's, or 1 where that is 0 and there were alarms."""
+        return of_launch or int(self.alarms > 0)
+
+    def opened(self, launch: LaunchControl) -> None:
+        """:raises RuntimeFailure: the domain cannot be observed, so nothing is started."""
+        self._launch = launch
+        try:
+            for domain in self._domains:
+                self._observers[domain] = _Observer(domain, self._options.enclave_directory)
+        except RuntimeFailure:
+            self._end_observers()
+            raise
+        self._task = asyncio.get_running_loop().create_task(self._watch())
+
+    def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
+        return spec
+
+    def happened(self, event: RunEvent) -> None:
+        if isinstance(event, ProcessStarted):
+            self._started.add(event.pid)
+
+    def loading(self, components: Sequence[ResolvedComponent]) -> None:
+        """What is loaded was planned."""
+
+    async def closed(self) -> None:
+        if self._task is not None:
+            self._task.cancel()
+            await asyncio.gather(self._task, return_exceptions=True)
+        self._end_observers()
+
+    async def _watch(self) -> None:
+        while True:
+            await asyncio.sleep(_INTERVAL)
+            for domain in list(self._observers):
+                self._look(domain)
+
+    def _look(self, domain: int) -> None:
+        observer = self._observers[domain]
+        if observer.ended:
+            del self._observers[domain]
+            self._say(
+                f"the observer of domain {domain} has ended, so drift is not seen any more: {observer.why}"
+            )
+            return
+        graph, forged = observer.latest
+        circumstances = Circumstances(
+            self._options.security, self._options.accepted, _strangers(graph, self._started), forged
+        )
+        expected = expected_in([self._document], domain)
+        change = self._steady[domain].at(time.monotonic(), compare(expected, graph, circumstances))
+        for each in change.new:
+            self.alarms += each.level is Level.ALARM
+            self._tell("new", each)
+        for each in change.over:
+            self._tell("over", each)
+
+    def _tell(self, event: str, finding: Finding) -> None:
+        self._say(f"drift{' is over' if event == 'over' else ''}: {finding_text(finding)}")
+        if self._options.report is not None:
+            row = {"time": f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}", "event": event}
+            try:
+                with self._options.report.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps({**row, **finding_document(finding)}) + "\n")
+            except OSError as error:
+                self._say(f"--watch-report {self._options.report}: {error.strerror}")
+
+    def _say(self, text: str) -> None:
+        if self._launch is not None:
+            self._launch.say("WARNING", text)
+
+    def _end_observers(self) -> None:
+        for observer in self._observers.values():
+            observer.end()
+        self._observers.clear()
+
+
+class _Observer:
+    """The process that looks, and the newest graph that it told. :raises RuntimeFailure: it cannot look."""
+
+    def __init__(self, domain: int, enclave_directory: Path | None) -> None:
+        directory = [f"--enclave-directory={enclave_directory}"] if enclave_directory else []
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "nodl.graph.follow", str(domain), *directory],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            start_new_session=True,  # Ctrl-C is for the launch; it ends when we close its input
+            env=_environment(),
+        )
+        self.latest: tuple[Graph, tuple[str, ...]] = (Graph(), ())
+        self.ended = False
+        self.why = ""
+        self._first = threading.Event()
+        self._errors: list[bytes] = []
+        for work in (self._read, self._read_errors):
+            threading.Thread(target=work, name="drift-watch", daemon=True).start()
+        if not self._first.wait(_LONGEST_START) or self.ended:
+            self.end()
+            raise RuntimeFailure(f"--watch: domain {domain} cannot be observed: {self.why or 'no answer'}")
+
+    def end(self) -> None:
+        """It ends when its input does."""
+        with contextlib.suppress(OSError):
+            if self._process.stdin is not None:
+                self._process.stdin.close()
+        try:
+            self._process.wait(5)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
+
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            fields = json.loads(line)
+            self.latest = graph_from_document(fields["graph"]), tuple(fields["forged"])
+            self._first.set()
+        self._process.wait()
+        self.why = b"".join(self._errors).decode(errors="replace").strip()
+        self.ended = True
+        self._first.set()
+
+    def _read_errors(self) -> None:
+        assert self._process.stderr is not None
+        for line in self._process.stderr:
+            self._errors = [*self._errors[-20:], line]
+
+
+def _environment() -> dict[str, str]:
+    """Of the observer, which is told its enclave by its arguments: no override may reach it."""
+    return {name: value for name, value in os.environ.items() if not name.startswith("ROS_SECURITY_")}
+
+
+def _strangers(graph: Graph, started: set[int]) -> frozenset[int]:
+    """Processes of this machine that are neither of the launch nor of a process that it started."""
+    host = socket.gethostname()
+    seen = {
+        each.participant.pid
+        for each in graph.processes
+        if each.participant.pid is not None and each.participant.host == host
+    }
+    ours = started | {os.getpid()}
+    return frozenset(pid for pid in seen if _is_foreign(pid, ours))
+
+
+def _is_foreign(pid: int, ours: set[int]) -> bool:
+    """One that has ended is nobody's; one of the launch has one of its processes as parent, or is in its session."""
+    lineage = list(_lineage(pid))
+    return bool(lineage) and not ours.intersection(lineage)
+
+
+def _lineage(pid: int) -> Iterator[int]:
+    """The process, its session and its parents (``/proc/<pid>/stat``, proc(5))."""
+    for _ in range(_MOST_PARENTS):
+        try:
+            fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()
+        except OSError:
+            return
+        parent, session = int(fields[1]), int(fields[3])
+        yield pid
+        yield session
+        if parent <= 1:
+            return
+        pid = parent

@@ -1,0 +1,49 @@
+"""``secure-launch --watch``: a launch, and beside it a look at whether what runs is what was planned."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from enclave_launch.drift.compare import Security
+from enclave_launch.drift_watch import DriftWatch, WatchOptions
+from enclave_launch.errors import ProvisionError
+from enclave_launch.report.plan_json import plan_document
+
+if TYPE_CHECKING:
+    from enclave_launch.options import RunSettings
+    from enclave_launch.plan import LaunchPlan
+    from enclave_launch.secured import ProvisionedLaunch
+
+
+def watch_plain_launch(
+    plan: LaunchPlan, options: argparse.Namespace, settings: Callable[[DriftWatch], RunSettings]
+) -> int:
+    """Of an unsecured launch. Gives its status; 1 for alarms."""
+    from enclave_launch.flow import run
+
+    watch = DriftWatch(plan_document(plan), _options(options))
+    return watch.status(run(plan, options=settings(watch)))
+
+
+def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespace) -> DriftWatch:
+    """With an enclave of its own in the launch's keystore. Raises ``ProvisionError`` where it cannot be made."""
+    from keystore.errors import KeystoreError
+    from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
+
+    root = launch.settings.keystore
+    try:
+        enclave = provide_watcher(root, launch.options)
+        security = Security(enclaves_by_guid(root))
+    except KeystoreError as error:
+        raise ProvisionError(f"--watch: {error}") from error
+    directory = Path(root) / "enclaves" / enclave.lstrip("/")
+    return DriftWatch(plan_document(launch.plan), _options(options, security, directory))
+
+
+def _options(
+    options: argparse.Namespace, security: Security | None = None, directory: Path | None = None
+) -> WatchOptions:
+    return WatchOptions(security, directory, tuple(options.accept), options.watch_report)

@@ -1,0 +1,60 @@
+"""``python -m nodl.graph.follow``: watch a domain and tell its graph, as a JSON line after each change, until standard
+input ends. For a program that watches and must not be disturbed by DDS in its own process. Acts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import select
+import sys
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from nodl.errors import NoDLError
+
+if TYPE_CHECKING:
+    from nodl.graph.observing import Observer
+
+_BETWEEN = 1.0  # seconds between two lines at least; looks come oftener
+_LOOK = 0.2
+
+
+def main() -> int:
+    """Exit status 0 when the reader has gone, 1 with a message where the domain cannot be observed."""
+    from nodl.graph.observing import SOURCES, Where, observer
+
+    parser = argparse.ArgumentParser(prog="nodl.graph.follow")
+    parser.add_argument("domain", type=int)
+    parser.add_argument("--with", dest="source", choices=SOURCES, default="auto")
+    parser.add_argument("--enclave-directory", type=Path)
+    given = parser.parse_args()
+    try:
+        with observer(Where(given.domain, given.source, given.enclave_directory), os.environ) as up:
+            return _follow(up)
+    except (NoDLError, ImportError) as error:
+        print(error, file=sys.stderr)
+        return 1
+
+
+def _follow(up: Observer) -> int:
+    from nodl.graph.json_form import graph_document
+
+    told, last = -1, 0.0
+    while not select.select([sys.stdin], [], [], _LOOK)[0]:
+        changes = up.look()
+        if changes != told and time.monotonic() - last >= _BETWEEN:
+            told, last = changes, time.monotonic()
+            line = {"graph": graph_document(up.graph()), "forged": up.forged}
+            try:
+                print(json.dumps(line), flush=True)
+            except BrokenPipeError:
+                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                return 0
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
