@@ -31,7 +31,7 @@ OPERATIONS: Mapping[EndpointKind, Operation] = {
     EndpointKind.ACTION_SERVER: "serve_actions",
     EndpointKind.ACTION_CLIENT: "call_actions",
 }
-_OR_PLAN_IT = "or plan it: the launch file, its manifests, or --accept"
+_OR_PLAN_IT = "or plan it: in the launch file or its manifests; or accept it"
 
 
 class Security(NamedTuple):

@@ -268,7 +268,7 @@ def _add_running(group: argparse._ArgumentGroup) -> None:
         "--watch-report", metavar="FILE", type=Path, help="what --watch tells, as JSON lines, beside the text"
     )
     group.add_argument(
-        "--accept",
+        "--watch-accept",
         metavar="NODE",
         action="append",
         default=[],

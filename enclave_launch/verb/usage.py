@@ -91,7 +91,7 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
             "--audit runs the launch unsecured and tells what --secure would refuse: give it alone"
         )
     if not options.watch:
-        check_needs_secure(parser._actions, given & {"watch_report", "accept"}, "--watch")
+        check_needs_secure(parser._actions, given & {"watch_report", "watch_accept"}, "--watch")
     elif views or options.dry_run or options.audit or options.learn is not None:
         raise UsageError(
             "--watch is for a launch that runs as planned: it is not for --dry-run, --audit or --learn"

@@ -46,4 +46,4 @@ def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespa
 def _options(
     options: argparse.Namespace, security: Security | None = None, directory: Path | None = None
 ) -> WatchOptions:
-    return WatchOptions(security, directory, tuple(options.accept), options.watch_report)
+    return WatchOptions(security, directory, tuple(options.watch_accept), options.watch_report)

@@ -63,5 +63,5 @@ def run(arguments: argparse.Namespace) -> int:
                 f"take it back: {made.remove}",
             )
         )
-    common.warn(made.report.warnings)
+    common.warn(made.report.warnings, arguments)
     return 0

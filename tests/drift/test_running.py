@@ -171,7 +171,9 @@ def test_where_nothing_runs_everything_is_missing_and_what_cannot_be_observed_ha
     assert drift(environment, "--enclave", "/tools/observe")[0] == 2
 
 
-@pytest.mark.parametrize("words", [["--watch-report", "x"], ["--accept", "/x"], ["--watch", "--dry-run"]])
+@pytest.mark.parametrize(
+    "words", [["--watch-report", "x"], ["--watch-accept", "/x"], ["--watch", "--dry-run"]]
+)
 def test_options_of_watch_that_would_have_no_effect_are_refused(words: list[str]) -> None:
     ran = subprocess.run(
         [sys.executable, "-m", "enclave_launch", "--prefix", str(DEMO_WS), *words, *LAUNCH],

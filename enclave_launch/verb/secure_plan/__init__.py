@@ -9,9 +9,20 @@ from enclave_launch.boundary.command_line import CommandParser, add_verbosity, a
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.completion import offer_launches
-from enclave_launch.verb.secure_plan import check, diff, evidence, export, flow, hosts, report, show, suggest
+from enclave_launch.verb.secure_plan import (
+    check,
+    diff,
+    drift,
+    evidence,
+    export,
+    flow,
+    hosts,
+    report,
+    show,
+    suggest,
+)
 
-VERBS = (show, check, diff, flow, hosts, export, suggest, report, evidence)
+VERBS = (show, check, diff, drift, flow, hosts, export, suggest, report, evidence)
 DESCRIPTION = """\
 Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
 revisions, ask which enclave can influence which, place it on hosts, export it to systemd, Compose or Kubernetes.
