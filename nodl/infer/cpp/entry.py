@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from nodl.node_interface import Gap, NodeInterface
 
@@ -38,3 +39,10 @@ class Solved:
     dead: tuple[Gap, ...] = ()
     classes: tuple[str, ...] = ()
     consulted: bool = False
+
+
+class FixedMapping(dict[Any, Any]):
+    """A mapping that nobody changes, so that what holds it has a hash."""
+
+    def __hash__(self) -> int:  # type: ignore[override]
+        return hash(frozenset(self.items()))

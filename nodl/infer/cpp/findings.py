@@ -16,12 +16,26 @@ Condition = tuple[str, int, str]  # file, line of the #if, symbol: what the prep
 
 
 @dataclass(frozen=True)
+class Follows:
+    """A name that a library makes of the final name of another topic, as remapped: ``how`` is ``remapped`` (``ending``
+    stands behind it) or ``camera_info``. With ``parameter``, of this ``default``, only where it has this ``value``."""
+
+    how: str
+    topic: Text
+    ending: str = ""
+    parameter: str = ""
+    value: str = ""
+    default: str = ""
+
+
+@dataclass(frozen=True)
 class FoundEndpoint:
     kind: EndpointKind
     name: Text
     type: str
     source: SourceRef
     exact: bool = True
+    follows: Follows | None = None
 
 
 @dataclass(eq=False)

@@ -5,13 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
-from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
+from nodl.dependence import Dependence, Test, Variation, When
+from nodl.infer.cpp.entry import FixedMapping
+from nodl.infer.cpp.findings import Condition, Follows, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.program import Findings
 from nodl.infer.cpp.running.values import NodePart, Text, Value, concatenated, plain
 from nodl.infer.results import certainty_of
 from nodl.infer.start import Start
-from nodl.name_template import NameTemplate, Part, UnknownPart
-from nodl.node_interface import RANDOM_ENDING, Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
+from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
+from nodl.node_interface import (
+    RANDOM_ENDING,
+    Certainty,
+    ClientLibrary,
+    Endpoint,
+    EndpointKind,
+    Gap,
+    NodeInterface,
+)
 from nodl.remap import InvalidRemapRuleError, parse_rule
 
 
@@ -79,6 +89,7 @@ def _of_node(
     namespaces: list[str | None] = ["/" + text.lstrip("/") for text in _texts(record.namespaces, record)]
     if record.namespaces and len(namespaces) < len(record.namespaces):
         gaps.append(Gap(record.source, "the namespace of this node is made at run time"))
+    depends = _dependence(record, gaps)
     interfaces = []
     for name in dict.fromkeys(names):
         for namespace in dict.fromkeys(namespaces or ["/"]):
@@ -86,7 +97,7 @@ def _of_node(
                 package=package, executable=executable, plugin=plugin, name=name, namespace=namespace,
                 endpoints=endpoints, source=record.source, library=ClientLibrary.RCLCPP, lifecycle=record.lifecycle,
                 parameters=tuple(sorted(record.parameters)), gaps=tuple(dict.fromkeys(gaps)),
-                own_rules=rules, global_arguments=record.use_global_arguments,
+                own_rules=rules, global_arguments=record.use_global_arguments, depends=depends,
             )  # fmt: skip
             interfaces.append(interface)
     return interfaces
@@ -107,6 +118,43 @@ def _endpoint(found: FoundEndpoint, record: NodeRecord) -> list[Endpoint]:
         Endpoint(found.kind, template, found.type, found.source, _certainty(template, found))
         for template in _templates(found.name, record)
     ]
+
+
+def _dependence(record: NodeRecord, gaps: list[Gap]) -> Dependence | None:
+    """The names that follow the final name of another topic, for launch to fill in."""
+    variations: dict[tuple[EndpointKind, str], Variation] = {}
+    for found in record.endpoints:
+        if found.follows is None:
+            continue
+        for template in _templates(found.name, record):
+            key, variation = (found.kind, template.text), _variation(found.follows, record)
+            if variation is None:
+                continue
+            if variations.setdefault(key, variation) != variation:
+                gaps.append(Gap(found.source, f"{template} follows the names of several topics, as remapped"))
+    if not variations:
+        return None
+    asked = {f.follows.parameter: f.follows.default for f in record.endpoints if f.follows is not None}
+    defaults = FixedMapping((name, default) for name, default in asked.items() if name)
+    return Dependence(variations=FixedMapping(variations), defaults=defaults, options=FixedMapping())
+
+
+def _variation(follows: Follows, record: NodeRecord) -> Variation | None:
+    """``None`` where the topic's name has parts that launch does not fill in; they are told with the endpoint."""
+    (template, *others) = _templates(follows.topic, record)
+    parts = [_reference(part) for part in template.parts]
+    if others or None in parts:
+        return None
+    tests = ((Test(follows.parameter, (follows.value,)),),) if follows.parameter else ()
+    name = f"$({follows.how} {''.join(part or '' for part in parts)}){follows.ending}"
+    return Variation(name, when=When(tests))
+
+
+def _reference(part: Part) -> str | None:
+    """A part in the words of descriptions (docs/library.md)."""
+    if isinstance(part, ParameterPart) and not part.edits and part.item is None:
+        return f"$(param {part.name} {part.default})" if part.default is not None else f"$(param {part.name})"
+    return part if isinstance(part, str) and "{" not in part else None
 
 
 def _certainty(template: NameTemplate, found: FoundEndpoint) -> Certainty:

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from nodl.dependence import Dependence
 from nodl.document.v2_schema import NAME_PATTERN, TYPE_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.name_template import NameTemplate, ParameterPart
@@ -22,13 +23,15 @@ _QOS = ", qos: {history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
 
 
 class _Entry(NamedTuple):
-    """``name``: as listed, the default; ``template``: how it varies, empty if it does not; ``each``: a list."""
+    """``name``: as listed, the default; ``template``: how it varies, empty if it does not; ``each``: a list; ``when``:
+    a parameter and the value with which there is such an endpoint."""
 
     kind: EndpointKind
     name: str
     type: str
     template: str = ""
     each: str = ""
+    when: tuple[str, str] = ("", "")
 
 
 def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
@@ -62,7 +65,7 @@ def open_questions(node: NodeInterface) -> list[str]:
     """What a document cannot say of ``node``, with the place: its gaps, and names or types that are not known."""
     questions = [f"{gap.source}: {gap.why}" for gap in node.gaps]
     for endpoint in node.endpoints:
-        if _entry(endpoint) is None:
+        if _entry(endpoint, node.depends) is None:
             what = f"{endpoint.kind.value.replace('_', ' ')} {endpoint.name}"
             questions.append(f"{endpoint.source}: {what} [{endpoint.type or 'type not known'}]")
     questions += [f"{node.source}: the program gives its node the rule {rule}" for rule in node.own_rules]
@@ -72,7 +75,9 @@ def open_questions(node: NodeInterface) -> list[str]:
 
 
 def _document(node: NodeInterface, *, listener: bool) -> str:
-    entries = list(dict.fromkeys(entry for e in node.endpoints if (entry := _entry(e)) is not None))
+    entries = list(
+        dict.fromkeys(entry for e in node.endpoints if (entry := _entry(e, node.depends)) is not None)
+    )
     lines = [f"# Node {node.name or '(name not known)'}, inferred from {node.source}."]
     lines += ["# Quality of service is not inferred; put in what the code asks for.", "nodl_version: 2"]
     lines += [
@@ -80,6 +85,12 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
         f"  {IDENTITY_KEY}:",
         *(f"    {line}" for line in _section(node, entries, listener)),
     ]
+    if node.depends is not None and node.depends.defaults:
+        lines.append("parameters:")
+        lines += [
+            f"  {name}: {{type: string, default_value: {_quoted(str(default))}}}"
+            for name, default in sorted(node.depends.defaults.items())
+        ]
     for kind, category in _CATEGORY.items():
         listed = {(entry.name, entry.type): None for entry in entries if entry.kind is kind}
         if listed:
@@ -115,11 +126,13 @@ def _names(entries: Iterable[_Entry]) -> list[str]:
             lines.append(f"  {category}:")
         for name, entry in sorted(listed.items()):
             each = f"each: {_quoted(entry.each)}, " if entry.each else ""
-            lines.append(f"    {_quoted(name)}: {{{each}name: {_quoted(entry.template)}}}")
+            parameter, value = entry.when
+            when = f", when: {{{_quoted(parameter)}: {_quoted(value)}}}" if parameter else ""
+            lines.append(f"    {_quoted(name)}: {{{each}name: {_quoted(entry.template)}{when}}}")
     return ["names:", *lines] if lines else []
 
 
-def _entry(endpoint: Endpoint) -> _Entry | None:
+def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | None:
     """``None`` for what NoDL v2 cannot say."""
     template = endpoint.name.unconditional
     filled = template.fill({})
@@ -130,6 +143,11 @@ def _entry(endpoint: Endpoint) -> _Entry | None:
         or not re.search(TYPE_PATTERN, endpoint.type)
     ):
         return None
+    variation = depends.variations.get((endpoint.kind, endpoint.name.text)) if depends is not None else None
+    if variation is not None:
+        tests = [test for group in variation.when.any_of for test in group]
+        when = (tests[0].parameter, tests[0].values[0]) if tests else ("", "")
+        return _Entry(endpoint.kind, name, endpoint.type, variation.name, "", when)
     if template.is_literal:
         return _Entry(endpoint.kind, name, endpoint.type)
     written = _written(template)

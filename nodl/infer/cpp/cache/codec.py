@@ -6,18 +6,22 @@ Not ``pickle``: what is read must never be able to run code.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import Any
 
-from nodl.infer.cpp.entry import Entry, Key, Solved
+from nodl.dependence import Dependence, Test, Variation, When
+from nodl.infer.cpp.entry import Entry, FixedMapping, Key, Solved
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
 _RECORDS: dict[str, Callable[..., Any]] = {
     each.__name__: each
-    for each in (Endpoint, Entry, Gap, Key, NameTemplate, NodeInterface, ParameterPart, Solved, SourceRef, UnknownPart)
+    for each in (
+        Dependence, Endpoint, Entry, Gap, Key, NameTemplate, NodeInterface, ParameterPart, Solved, SourceRef, Test,
+        UnknownPart, Variation, When,
+    )
 }  # fmt: skip
 _ENUMERATIONS: dict[str, type[Enum]] = {
     each.__name__: each for each in (Certainty, ClientLibrary, EndpointKind)
@@ -33,6 +37,8 @@ def encoded(value: object) -> object:
     name = type(value).__name__
     if name in _RECORDS:
         return {"record": name, "fields": [encoded(each) for each in _fields(value)]}
+    if isinstance(value, Mapping):
+        return {"mapping": [[encoded(key), encoded(each)] for key, each in value.items()]}
     if isinstance(value, tuple | list):
         return [encoded(each) for each in value]
     raise TypeError(f"{name} is not kept")
@@ -51,8 +57,10 @@ def decoded(value: object) -> Any:
     if not isinstance(value, dict):
         return value
     try:
+        if "mapping" in value:
+            return FixedMapping((decoded(key), decoded(each)) for key, each in value["mapping"])
         if "enum" in value:
             return _ENUMERATIONS[value["enum"]](value["value"])
         return _RECORDS[value["record"]](*(decoded(each) for each in value["fields"]))
-    except (KeyError, TypeError) as error:
+    except (KeyError, TypeError, ValueError) as error:
         raise ValueError(f"not an answer of ours: {error}") from error

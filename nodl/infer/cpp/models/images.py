@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.findings import Follows
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call, library_class, library_function
 from nodl.infer.cpp.models.table import PUB, SUB, owner_in, texts_in
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.values import Obj, Param, Text, Value, concatenated, literal, unknown
+from nodl.infer.cpp.running.values import Obj, Param, Text, Value, concatenated, join, literal, plain, unknown
+from nodl.name_template import ParameterPart
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -32,11 +33,14 @@ _TRANSPORTS = {
 
 
 def _image_publisher(run: Machine, owner: Obj, base: Value, node: Node, frame: Frame) -> None:
-    """image_transport/src/publisher.cpp: one publisher for each transport plugin that is installed."""
+    """image_transport/src/publisher.cpp: one publisher for each transport plugin that is installed, below the final
+    name of the image."""
     assert owner.node is not None
     run.endpoint(owner.node, PUB, base, _IMAGE, node, frame)
-    for plugin, kind in list(_TRANSPORTS.items())[:3]:
-        run.endpoint(owner.node, PUB, _transported(base, plugin), kind, node, frame)
+    for topic in concatenated(base):
+        for plugin, kind in list(_TRANSPORTS.items())[:3]:
+            follows = Follows("remapped", topic, f"/{plugin}")
+            run.endpoint(owner.node, PUB, _transported((topic,), plugin), kind, node, frame, follows)
 
 
 def _info_topic(base: Value) -> Value:
@@ -58,7 +62,7 @@ def _info_topic(base: Value) -> Value:
     return tuple(found)
 
 
-def _image(run: Machine, call: Call, what: str) -> Value:
+def _image(run: Machine, call: Call, what: str, place: int = 3) -> Value:
     owner = owner_in(run, call.values) or (
         call.receiver if call.receiver is not None and call.receiver.node else None
     )
@@ -75,10 +79,13 @@ def _image(run: Machine, call: Call, what: str) -> Value:
     if what in ("publisher", "camera publisher"):
         _image_publisher(run, owner, base, call.node, call.frame)
     else:
-        _image_subscriber(run, owner, base, call, texts)
+        _image_subscriber(run, owner, base, call, place)
     if what.startswith("camera"):
         kind = PUB if what.endswith("publisher") else SUB
-        run.endpoint(owner.node, kind, _info_topic(base), _INFO, call.node, call.frame)
+        for topic in concatenated(base):
+            follows = Follows("camera_info", topic)
+            info = _info_topic((topic,))
+            run.endpoint(owner.node, kind, info, _INFO, call.node, call.frame, follows)
     made = run.obj(
         ("image", call.frame.file.file, call.node.start_byte, call.frame.path),
         Type(f"image_transport::{what}"),
@@ -87,32 +94,99 @@ def _image(run: Machine, call: Call, what: str) -> Value:
     return (made,)
 
 
-def _image_subscriber(run: Machine, owner: Obj, base: Value, call: Call, texts: Sequence[Value]) -> None:
-    """image_transport/src/subscriber.cpp: the transport is the argument behind the callback, a hint, or ``raw``."""
+def _image_subscriber(run: Machine, owner: Obj, base: Value, call: Call, place: int) -> None:
+    """image_transport/src/subscriber.cpp: one topic, by the transport. ``place``: of it among the arguments."""
     assert owner.node is not None
-    transports = (
-        texts[-1]
-        if len(texts) > 1 and any(isinstance(a, Text | Param) for a in texts[-1])
-        else literal("raw")
-    )
-    if call.receiver is not None and len(texts) <= 1:
-        transports = literal("raw")
+    transports = _transports_of(run, owner, call, place)
     for atom in transports:
         if isinstance(atom, Text) and atom.parts == ("raw",):
             run.endpoint(owner.node, SUB, base, _IMAGE, call.node, call.frame)
-            continue
-        run.endpoint(owner.node, SUB, base, _IMAGE, call.node, call.frame)
-        run.gap(
-            call.node,
-            call.frame,
-            f"the transport of this image subscription is chosen at run time ({_shown(atom)}); "
-            "its topic is BASE for raw, BASE/TRANSPORT else",
-            owner.node,
-        )
+        elif isinstance(atom, Text) and plain(atom) in _TRANSPORTS:
+            _transported_subscription(run, owner, base, call, str(plain(atom)), "", "")
+        elif isinstance(atom, Param) and atom.item is None and _only_text(atom) is not None:
+            _chosen_by(run, owner, base, call, atom)
+        else:
+            run.endpoint(owner.node, SUB, base, _IMAGE, call.node, call.frame)
+            run.gap(
+                call.node, call.frame,
+                "the transport of this image subscription is chosen at run time (not known); "
+                "its topic is BASE for raw, BASE/TRANSPORT else",
+                owner.node,
+            )  # fmt: skip
 
 
-def _shown(atom: object) -> str:
-    return f"parameter {atom.name}" if isinstance(atom, Param) else "not known"
+def _transports_of(run: Machine, owner: Obj, call: Call, place: int) -> Value:
+    """As given, else ``raw``; for the methods of ``ImageTransport`` the hints decide, else the parameter that they read
+    (image_transport/src/image_transport.cpp, ``getTransportOrDefault``)."""
+    if call.receiver is None:
+        return (call.values[place] or unknown("a transport")) if len(call.values) > place else literal("raw")
+    hints = [
+        a for value in call.values for a in value if isinstance(a, Obj) and a.type.last == "TransportHints"
+    ]
+    if hints:
+        return join(*(each.data.get("transport", unknown("a transport")) for each in hints))
+    if owner.node is not None and "image_transport" in owner.node.parameters:
+        return (Param(owner.node, "image_transport"),)
+    return literal("raw")
+
+
+def _only_text(atom: Param) -> str | None:
+    texts = [plain(each) for each in atom.default]
+    return texts[0] if len(texts) == 1 else None
+
+
+def _chosen_by(run: Machine, owner: Obj, base: Value, call: Call, chosen: Param) -> None:
+    """A parameter names the transport: of all its topics the one with its value is subscribed."""
+    assert owner.node is not None
+    default = _only_text(chosen) or ""
+    for topic in concatenated(base):
+        raw = Follows("remapped", topic, "", chosen.name, "raw", default)
+        name = concatenated((topic,), _only_if(chosen.name, default, "raw"))
+        run.endpoint(owner.node, SUB, name, _IMAGE, call.node, call.frame, raw)
+    for transport in _TRANSPORTS:
+        _transported_subscription(run, owner, base, call, transport, chosen.name, default)
+    given = run.given(chosen.record, chosen.name)
+    if (default if given is None else given) not in ("raw", *_TRANSPORTS):
+        why = f"the image transport {given or default} (parameter {chosen.name}) is not in the table"
+        run.gap(call.node, call.frame, why, owner.node)
+    run.from_default.pop(chosen.name, None)  # its values are all listed
+
+
+def _transported_subscription(
+    run: Machine, owner: Obj, base: Value, call: Call, transport: str, parameter: str, default: str
+) -> None:
+    assert owner.node is not None
+    for topic in concatenated(base):
+        wanted = transport if parameter else ""
+        follows = Follows("remapped", topic, f"/{transport}", parameter, wanted, default)
+        condition = _only_if(parameter, default, transport) if parameter else literal("")
+        name = concatenated((topic,), literal(f"/{transport}"), condition)
+        run.endpoint(owner.node, SUB, name, _TRANSPORTS[transport], call.node, call.frame, follows)
+
+
+def _only_if(parameter: str, default: str, value: str) -> Value:
+    return (Text((ParameterPart(parameter, default, None, (("only if equal", (value,)),)),)),)
+
+
+@library_class("image_transport::TransportHints")
+def _transport_hints(
+    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
+) -> Value | None:
+    """image_transport/transport_hints.hpp: (node, default, parameter name), read by ``get_parameter_or``."""
+    owner = owner_in(run, arguments)
+    texts = texts_in(arguments, run)
+    name = plain(texts[1][0]) if len(texts) > 1 and len(texts[1]) == 1 else "image_transport"
+    fallback = texts[0] if texts else literal("raw")
+    if owner is not None and owner.node is not None and name is not None:
+        this.data["transport"] = (Param(owner.node, name, None, owner.node.default(name) or fallback),)
+    return None
+
+
+LIBRARY_METHODS[("image_transport::TransportHints", "getTransport")] = lambda run, call: (
+    call.receiver.data.get("transport", unknown("a transport"))
+    if call.receiver is not None
+    else unknown("a transport")
+)
 
 
 for _function, _what in (
@@ -151,12 +225,12 @@ def _subscriber_filter(
 ) -> Value | None:
     """image_transport/subscriber_filter.hpp: (node, topic, transport)."""
     if arguments:
-        _image(run, Call(node, frame, arguments, []), "subscription")
+        _image(run, Call(node, frame, arguments, []), "subscription", 2)
     return None
 
 
 def _filter(run: Machine, call: Call) -> Value:
-    return _image(run, Call(call.node, call.frame, call.values, []), "subscription")
+    return _image(run, Call(call.node, call.frame, call.values, []), "subscription", 2)
 
 
 LIBRARY_METHODS[("image_transport::SubscriberFilter", "subscribe")] = _filter

@@ -194,6 +194,12 @@ def _sub_node(run: Machine, call: Call) -> Value:
     return (made,)
 
 
+@node_method("resolve_topic_name", "resolve_service_name", "resolve_topic_or_service_name")
+def _resolved(run: Machine, call: Call) -> Value:
+    """rclcpp/node_interfaces/node_topics.cpp: the final name, which launch gives to the name as written."""
+    return call.value(0)
+
+
 def _nothing(run: Machine, call: Call) -> Value:
     for value in call.values:
         for atom in value:
@@ -215,7 +221,7 @@ node_method(
     "get_clients_info_by_service", "get_servers_info_by_service", "assert_liveliness", "get_callback_groups",
     "callback_group_in_node", "get_rcl_node_handle", "get_shared_rcl_node_handle", "get_context",
     "get_default_callback_group",
-    "get_notify_guard_condition", "get_associated_with_executor_atomic", "resolve_topic_or_service_name",
+    "get_notify_guard_condition", "get_associated_with_executor_atomic",
     "get_parameter_overrides", "list_parameters", "describe_parameter", "describe_parameters", "get_parameter_types",
     "undeclare_parameter", "trigger_transition", "configure", "activate", "deactivate", "cleanup", "shutdown",
     "get_current_state",

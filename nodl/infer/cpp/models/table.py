@@ -74,10 +74,6 @@ ROWS: dict[str, tuple[Makes, ...]] = {
     "realtime_tools::RealtimeServerGoalHandle": (),
     "realtime_tools::AsyncFunctionHandler": (),
     "laser_geometry::LaserProjection": (),
-    "robot_localization::RosRobotLocalizationListener": (
-        Makes(SUB, "odom/filtered", "nav_msgs/msg/Odometry"),
-        Makes(SUB, "accel/filtered", "geometry_msgs/msg/AccelWithCovarianceStamped"),
-    ),
     "camera_info_manager::CameraInfoManager": (
         Makes(SRV, "~/set_camera_info", "sensor_msgs/srv/SetCameraInfo"),
     ),
@@ -102,7 +98,6 @@ ROWS: dict[str, tuple[Makes, ...]] = {
     "diagnostic_updater::DiagnosticStatusWrapper": (),
     "diagnostic_updater::FunctionDiagnosticTask": (),
     "diagnostic_updater::CompositeDiagnosticTask": (),
-    "image_transport::TransportHints": (),
 }
 
 

@@ -70,3 +70,16 @@ def _buffer_server(run: Machine, this: Obj, arguments: list[Value], node: Node, 
     """tf2_ros/buffer_server.h: (buffer, node, action name, ...)."""
     make(run, (Makes(ACT, "{0}", "tf2_msgs/action/LookupTransform"),), this, arguments[1:], node, frame)
     return None
+
+
+@library_class("robot_localization::RosRobotLocalizationListener")
+def _robot_localization(
+    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
+) -> Value | None:
+    """robot_localization/src/ros_robot_localization_listener.cpp: two topics, and a listener with a node of its own."""
+    row = (
+        Makes(SUB, "odom/filtered", "nav_msgs/msg/Odometry"),
+        Makes(SUB, "acceleration/filtered", "geometry_msgs/msg/AccelWithCovarianceStamped"),
+    )
+    make(run, row, this, arguments, node, frame)
+    return _listener(run, this, [], node, frame)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.findings import Condition, FoundEndpoint, NodeRecord
+from nodl.infer.cpp.findings import Condition, Follows, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
 from nodl.infer.cpp.reading.declarations import FileIndex, Function, Scope
 from nodl.infer.cpp.reading.names import Names
@@ -277,14 +277,15 @@ class Machine:
         return (*frame.conditions, *here) if here else frame.conditions
 
     def endpoint(
-        self, record: NodeRecord, kind: EndpointKind, name: Value, type_name: str, node: Node, frame: Frame
-    ) -> None:
+        self, record: NodeRecord, kind: EndpointKind, name: Value, type_name: str, node: Node, frame: Frame,
+        follows: Follows | None = None,
+    ) -> None:  # fmt: skip
         source = self.place(node, frame)
         conditions = self.conditions(node, frame)
         for atom in concatenated(name or unknown("a name that is never set")):
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
-            own = Text(parts)
-            record.endpoints.setdefault(FoundEndpoint(kind, own, type_name, source), []).append(conditions)
+            found = FoundEndpoint(kind, Text(parts), type_name, source, follows=follows)
+            record.endpoints.setdefault(found, []).append(conditions)
 
     def later(self, atom: Atom, frame: Frame) -> None:
         """A closure that somebody outside keeps: it may be called at any time."""

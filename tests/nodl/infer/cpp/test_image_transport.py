@@ -1,0 +1,91 @@
+"""image_transport takes the final name of an image and puts transports below it, the camera's settings beside it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.flow import resolve
+from enclave_launch.options import ResolveOptions
+from enclave_launch.plan import LaunchPlan
+from nodl.verb import main
+from tests.nodl.infer.cpp.test_in_a_launch import install, may, plan
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names, package, write
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+SOURCE = in_class(
+    """
+    declare_parameter<std::string>("image_transport", "raw");
+    auto topic = get_node_topics_interface()->resolve_topic_name("image_raw");
+    image_transport::TransportHints hints(this);
+    in_ = image_transport::create_camera_subscription(
+      this, topic, [](const auto &, const auto &) {}, hints.getTransport());
+    out_ = image_transport::create_publisher(this, "image_rect");
+    """,
+    before="#include <image_transport/image_transport.hpp>\n",
+)
+LAUNCH = """
+<launch>
+  <node pkg="demo" exec="filter_node" name="rectify">
+    {parameter}
+    <remap from="image_raw" to="/front/image"/>
+    <remap from="image_rect" to="/front/rect"/>
+  </node>
+</launch>
+"""
+COMPRESSED = '<param name="image_transport" value="compressed"/>'
+
+
+def live(workspace: Path, parameter: str) -> LaunchPlan:
+    package(workspace / "src/demo", {"src/main.cpp": SOURCE}, "add_executable(filter_node src/main.cpp)")
+    install(workspace)
+    return plan(workspace, LAUNCH.format(parameter=parameter))
+
+
+def documented(workspace: Path, parameter: str) -> LaunchPlan:
+    folder = package(
+        workspace / "src/demo", {"src/main.cpp": SOURCE}, "add_executable(filter_node src/main.cpp)"
+    )
+    main(["infer", "-o", str(workspace / "nodl"), str(folder)])
+    install(workspace)
+    write(workspace / "test.launch.xml", LAUNCH.format(parameter=parameter))
+    document = workspace / "nodl/filter_node.nodl.yaml"
+    options = ResolveOptions(prefixes=(workspace / "install",), manifests=(document,), infer=False)
+    return resolve(workspace / "test.launch.xml", options=options)
+
+
+@pytest.mark.parametrize("way", [live, documented])
+def test_transports_and_settings_follow_the_remapped_image(way, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    planned = way(tmp_path, "")
+    assert not planned.problems
+    assert may(planned, "/front/image")
+    assert may(planned, "/front/camera_info")
+    assert may(planned, "/front/rect/compressed")
+    assert not may(planned, "/image_rect/compressed")
+    assert not may(planned, "/camera_info")
+    assert not may(planned, "/front/image/compressed")
+
+
+@pytest.mark.parametrize("way", [live, documented])
+def test_a_parameter_chooses_the_transport(way, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
+    planned = way(tmp_path, COMPRESSED)
+    assert not planned.problems
+    assert may(planned, "/front/image/compressed")
+    assert not may(planned, "/front/image")
+
+
+def test_a_transport_that_is_not_in_the_table_is_a_gap(tmp_path: Path) -> None:
+    planned = live(tmp_path, '<param name="image_transport" value="draco"/>')
+    assert any("draco" in str(problem) for problem in planned.problems)
+
+
+def test_a_transport_that_nothing_tells_is_a_gap(tmp_path: Path) -> None:
+    source = SOURCE.replace("hints.getTransport()", 'std::string(std::getenv("T"))')
+    assert any("transport of this image subscription" in why for why in gaps(infer(tmp_path, source)))
+
+
+def test_a_resolved_name_is_the_name_as_launch_makes_it(tmp_path: Path) -> None:
+    body = 'create_publisher<std_msgs::msg::String>(get_node_topics_interface()->resolve_topic_name("a"), 1);'
+    assert names(infer(tmp_path, in_class(body))) == ["a"]
