@@ -12,6 +12,7 @@ import time
 from collections import deque
 from typing import TYPE_CHECKING, NamedTuple
 
+from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
@@ -43,6 +44,8 @@ class Denial(NamedTuple):
     granted: bool
     patch: Patch | None
     cause: Cause | None = None
+    silent: bool = False
+    """On Zenoh: the node was not told, its messages are dropped."""
 
     @property
     def text(self) -> str:
@@ -60,6 +63,8 @@ class Denial(NamedTuple):
             cause = self.cause or NOT_AS_PLANNED
             lines.append(f"  {'' if self.cause else 'it may be that '}{cause.what}; {cause.remedy}")
             return lines
+        if self.silent:
+            lines.append("  on Zenoh nothing fails: the router drops all of it without an error")
         lines.append(f"  the node is described by {self.described.text}; that does not ask for it")
         if self.patch is not None:
             lines.append(f"  this allows it, and nothing else; {self.patch.use}:")
@@ -93,6 +98,7 @@ class Explainer:
         self.denials: list[Denial] = []
         self.not_joined: list[NotJoined] = []
         self._grants = Grants(plan)
+        self._on_zenoh = {item.process.process_name for item in plan.processes if item.middleware == ZENOH}
         self._launch: LaunchControl | None = None
         self._recording: Recording | None = None
         self._printed: dict[str, deque[str]] = {}
@@ -107,6 +113,8 @@ class Explainer:
         assert self._recording is not None
         if isinstance(line, EndpointMade) and line.rc == REFUSED:
             self._endpoint(line, *self._recording.record.node_of(line))
+        elif isinstance(line, EndpointMade) and line.rc == 0 and self._on_zenoh:
+            self._silently_refused(line)
         elif isinstance(line, NodeMade) and line.rc == REFUSED:
             process, _ = self._recording.record.node_of(line)
             if not self._endpoint_was_refused(process, line):
@@ -153,6 +161,22 @@ class Explainer:
         patch = None if granted else _patch(need, asked, described)
         cause = cause_of((*asked.error, *self._printed.get(_name(process), ()))) if granted else None
         self._tell(Denial(_name(process), need, asked, described, granted, patch, cause))
+
+    def _silently_refused(self, line: EndpointMade) -> None:
+        """A Zenoh router refuses without a word to the node: what was made and is not granted is told here."""
+        assert self._recording is not None
+        process, node = self._recording.record.node_of(line)
+        if _name(process) not in self._on_zenoh or role_of(line) is Role.PART_OF_ACTION:
+            return
+        asked = asked_endpoint(process, node, line)
+        need = self._grants.need(process, node, asked) if asked is not None else None
+        if asked is None or need is None or need in self._told or self._grants.permits(need):
+            return
+        self._told.add(need)
+        described = self._grants.described(process, node)
+        self._tell(
+            Denial(_name(process), need, asked, described, False, _patch(need, asked, described), silent=True)
+        )
 
     def _endpoint_was_refused(self, process: RecordedProcess, line: NodeMade) -> bool:
         """A node that fails because one of its own endpoints was refused has been explained by that."""

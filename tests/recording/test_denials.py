@@ -13,6 +13,7 @@ import pytest
 
 from enclave_launch.recording.patches import manifest_patch, policy_patch
 from enclave_launch.recording.reasons import cause_of
+from keystore.verb import main as keystore_main
 from nodl.document import read_document
 from nodl.node_interface import EndpointKind
 from nodl.record.asked import Asked
@@ -27,6 +28,8 @@ from tests.recording.stand_in_launch import (
     make_workspace,
     manifest_text,
 )
+from tests.zenoh.kit import free_port
+from tests.zenoh.workspace import install_router
 
 CATCHES = {"STAND_IN_CATCHES": "1"}
 WORDS = {
@@ -136,6 +139,23 @@ def all_explained_and_cured(
     found = patches(output)
     assert len(found) == len(wanted)
     for file, before, added in found:
+        text = Path(file).read_text()
+        Path(file).write_text(text.replace(f"{before}\n", f"{before}\n{added}\n", 1))
+    assert told(secured(workspace, **variables)) == set()
+
+
+def test_what_a_zenoh_router_drops_without_a_word_is_explained_and_cured_too(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    workspace = make_workspace(tmp_path, stand_in, map(denied_program, range(6)))
+    install_router(workspace.folder)
+    for verb in (["create"], ["zenoh", "--router", f"localhost:{free_port()}"]):
+        assert keystore_main([verb[0], str(workspace.folder / "ks"), *verb[1:]]) == 0
+    variables = {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp"}
+    output = secured(workspace, **variables)
+    assert told(output) == {each for number in range(6) for each in expected(number)}
+    assert output.count("the router drops all of it without an error") == len(told(output))
+    for file, before, added in patches(output):
         text = Path(file).read_text()
         Path(file).write_text(text.replace(f"{before}\n", f"{before}\n{added}\n", 1))
     assert told(secured(workspace, **variables)) == set()

@@ -76,6 +76,24 @@ TALKER_AND_LISTENER = """<launch>
 """
 
 
+def install_program(prefix: Path, package: str, name: str, text: str) -> None:
+    """A Python program of a package below an ament prefix."""
+    index = prefix / "share/ament_index/resource_index/packages"
+    for folder in (index, prefix / "share" / package, prefix / "lib" / package):
+        folder.mkdir(parents=True, exist_ok=True)
+    (index / package).touch()
+    (prefix / "share" / package / "package.xml").write_text(
+        f'<package format="3"><name>{package}</name><version>0.0.0</version></package>'
+    )
+    program = prefix / "lib" / package / name
+    program.write_text(f"#!{sys.executable}\n{text}")
+    program.chmod(0o755)
+
+
+def install_router(prefix: Path) -> None:
+    install_program(prefix, "rmw_zenoh_cpp", "rmw_zenohd", ROUTER)
+
+
 class Workspace:
     """``router``: whether rmw_zenohd is installed in it."""
 
@@ -84,22 +102,10 @@ class Workspace:
         self.prefix = root / "install"
         self.keystore = root / "ks"
         if router:
-            self._program("rmw_zenoh_cpp", "rmw_zenohd", ROUTER)
-        self._program("zenoh_nodes", "talker", TALKER)
-        self._program("zenoh_nodes", "listener", LISTENER)
+            install_router(self.prefix)
+        install_program(self.prefix, "zenoh_nodes", "talker", TALKER)
+        install_program(self.prefix, "zenoh_nodes", "listener", LISTENER)
         (self.prefix / "share/zenoh_nodes/zenoh_nodes.nodl.xml").write_text(MANIFEST)
-
-    def _program(self, package: str, name: str, text: str) -> None:
-        index = self.prefix / "share/ament_index/resource_index/packages"
-        for folder in (index, self.prefix / "share" / package, self.prefix / "lib" / package):
-            folder.mkdir(parents=True, exist_ok=True)
-        (index / package).touch()
-        (self.prefix / "share" / package / "package.xml").write_text(
-            f'<package format="3"><name>{package}</name><version>0.0.0</version></package>'
-        )
-        program = self.prefix / "lib" / package / name
-        program.write_text(f"#!{sys.executable}\n{text}")
-        program.chmod(0o755)
 
     def launch_file(self, talker: str = "", text: str = TALKER_AND_LISTENER) -> Path:
         file = self.root / "test.launch.xml"

@@ -130,6 +130,9 @@ static bool joins(void)
 static bool granted(const char * element, const char * topic)
 {
   const char * keystore = getenv("ROS_SECURITY_KEYSTORE"), * on = getenv("ROS_SECURITY_ENABLE");
+  const char * rmw = getenv("RMW_IMPLEMENTATION");
+  if (rmw != NULL && !strcmp(rmw, "rmw_zenoh_cpp"))
+    return true;  /* who refuses is the router, and it says nothing */
   char path[1024], open_tag[32], close_tag[32];
   static char text[1 << 20];
   if (keystore == NULL || on == NULL || strcmp(on, "true"))
