@@ -1,0 +1,121 @@
+"""The recipes of docs/deployment.md are run as they stand there."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from keystore.formats.policy import Policy
+from keystore.formats.policy_xml import policy_xml
+from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned
+from keystore.steps.host_keys import request
+from keystore.steps.importing import ImportOptions, import_bundle
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.verification import verify
+from tests.deployment.kit import made, tool
+from tests.keystore.kit import filled, openssl, options, policy
+from tests.keystore.test_external_ca import ExternalCa
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs/deployment.md").read_text(encoding="utf-8")
+RECIPES = dict(re.findall(r"<!-- recipe: (.*?) -->\n```sh\n(.*?)```", TEXT, re.DOTALL))
+
+
+def test_the_recipes_are_found() -> None:
+    assert set(RECIPES) == {"rolling restart", "external ca", "age", "systemd-creds"}
+
+
+def follow(name: str, folder: Path, **environment: str) -> str:
+    """What the recipe prints, run in ``folder`` with our commands on PATH."""
+    programs = folder / "programs"
+    programs.mkdir()
+    (programs / "secure-keystore").write_text(f'#!/bin/sh\nexec {sys.executable} -m keystore.verb "$@"\n')
+    (programs / "secure-keystore").chmod(0o755)
+    env = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT), **environment}
+    done = subprocess.run(
+        ["sh", "-euc", RECIPES[name]], cwd=folder, env=env, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def next_bundle(folder: Path, enclaves: str = "/base*") -> None:
+    """A host ``ks`` that has imported once, and ``base.bundle``, which is newer."""
+    ca = folder / "ca"
+    if not ca.exists():
+        filled(ca, ["/base"])
+    for number in range(2):
+        bundle = export_hosts(ca, folder, {"base": [enclaves]}, options=BundleOptions(durable=False))[0]
+        if number == 0:
+            pins = ImportOptions("base", pinned(bundle.manifest))
+            import_bundle(folder / "ks", bundle.path, options=pins)
+            renew(ca, options=RenewOptions(everything=True, provisioning=options()))
+
+
+def test_an_encrypted_bundle_is_imported(tmp_path: Path) -> None:
+    tool("age", "apt-get install age")
+    next_bundle(tmp_path)
+    before = os.readlink(tmp_path / "ks")
+    follow("age", tmp_path)
+    assert os.readlink(tmp_path / "ks") != before
+    assert b"PRIVATE KEY" in (tmp_path / "base.bundle").read_bytes()
+    assert b"PRIVATE KEY" not in (tmp_path / "base.bundle.age").read_bytes()
+
+
+def test_certificates_come_from_elsewhere(tmp_path: Path) -> None:
+    external = ExternalCa(tmp_path / "company")
+    shutil.copy(external.cert, tmp_path / "company-ca.pem")
+    asked = request(tmp_path / "host-ks", ["/base"])  # made again, unchanged, by the recipe
+    (tmp_path / "company/issued").write_bytes(external.issue(asked))
+    (tmp_path / "sign-elsewhere").write_text(
+        "#!/bin/sh\nopenssl req -in $1 -noout -verify >&2\ncat company/issued\n"
+    )
+    (tmp_path / "sign-elsewhere").chmod(0o755)
+    (tmp_path / "policy.xml").write_bytes(policy_xml(Policy((policy("/base"),))))
+    follow("external ca", tmp_path)
+    assert (tmp_path / "out/base.bundle").is_file()
+    assert verify(tmp_path / "ks").is_good
+    openssl("verify", "-CAfile", external.cert, tmp_path / "ks/enclaves/base/cert.pem")
+
+
+def test_a_key_is_bound_to_the_machine(tmp_path: Path) -> None:
+    tool("systemd-analyze", "apt-get install systemd")
+    if os.geteuid() != 0:
+        pytest.skip("systemd-creds wants to be root for the host's key")
+    made("systemd", tmp_path)
+    (tmp_path / "out").rename(tmp_path / "deploy")
+    follow("systemd-creds", tmp_path, SYSTEMD_CREDENTIAL_SECRET=str(tmp_path / "secret"))
+    key = (tmp_path / "ks/enclaves/front/speaker/key.pem").read_bytes()
+    assert key not in (tmp_path / "speaker.key.cred").read_bytes()
+    shown = subprocess.run(
+        ["systemd-creds", "decrypt", "--name=key.pem", tmp_path / "speaker.key.cred", "-"],
+        env={**os.environ, "SYSTEMD_CREDENTIAL_SECRET": str(tmp_path / "secret")}, capture_output=True, check=True,
+    )  # fmt: skip
+    assert shown.stdout == key
+
+
+def test_an_import_is_followed_by_restarts_in_order(tmp_path: Path) -> None:
+    """With a systemctl that only notes what it is asked."""
+    made("systemd", tmp_path)
+    (tmp_path / "out").rename(tmp_path / "deploy")
+    (tmp_path / "ks").rename(tmp_path / "ca")
+    next_bundle(tmp_path, "*")
+    (tmp_path / "fake").mkdir()
+    (tmp_path / "fake/systemctl").write_text('#!/bin/sh\necho "$@"\n')
+    (tmp_path / "fake/sleep").write_text("#!/bin/sh\n")
+    for path in (tmp_path / "fake").iterdir():
+        path.chmod(0o755)
+    printed = follow(
+        "rolling restart", tmp_path, PATH=f"{tmp_path}/programs:{tmp_path}/fake:{os.environ['PATH']}"
+    )
+    assert "to restart: the changed enclaves, one after the other" in printed
+    assert re.findall("^restart (.*)$", printed, re.M) == [
+        "ros-robot-front-speaker.service",
+        "ros-robot-ear.service",
+    ]
