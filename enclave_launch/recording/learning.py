@@ -48,7 +48,7 @@ class QuietWatch:
         self._last = time.monotonic()
 
     def added(self, line: Line) -> None:
-        what = _news(line)
+        what = self._news(line)
         if what is not None and what not in self._known:
             self._known.add(what)
             self._last = time.monotonic()
@@ -76,18 +76,20 @@ class QuietWatch:
         record = self._recording.record
         speaking = {p.started.pid for p in record.attributed() if p.started is not None}
         return any(
-            pid not in speaking and now - since < _LONGEST_START
+            pid not in speaking and pid not in self._recording.unheard and now - since < _LONGEST_START
             for pid, since in self._recording.running.items()
         )
 
-
-def _news(line: Line) -> tuple[object, ...] | None:
-    """What a line tells that may not have been told before."""
-    if isinstance(line, EndpointMade):
-        return (line.kind, line.fqn, line.written)
-    if isinstance(line, NodeMade):
-        return (line.fqn,)
-    return (line.pid, line.node, line.state) if isinstance(line, StateEntered) else None
+    def _news(self, line: Line) -> tuple[object, ...] | None:
+        """What a line tells that may not have been told before; a process that is started again repeats itself."""
+        if isinstance(line, EndpointMade):
+            return (line.kind, line.fqn, line.written)
+        if isinstance(line, NodeMade):
+            return (line.fqn,)
+        if isinstance(line, StateEntered) and self._recording is not None:
+            process = self._recording.record.process_of(line.pid)
+            return (process.node(line.node).fqn, line.state) if process else None
+        return None
 
 
 class LearntFolder(NamedTuple):

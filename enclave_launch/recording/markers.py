@@ -6,7 +6,7 @@ follow come from it, those that do not are fixed. Reads the records of the folde
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -72,7 +72,9 @@ class MarkerRun:
         parameters = {name: self._marker(value) for name, value in given.items()}
         words = own_words(process)
         arguments = [self._next() if f"<{place}>" in wanted else word for place, word in enumerate(words, 1)]
-        marked = _with_words(cmd, dict(zip(words, arguments, strict=True)))
+        marked = _with_words(cmd, words, arguments)
+        if marked == cmd:
+            arguments = list(words)
         if parameters:
             marked += ("--ros-args",)
             for name, value in parameters.items():
@@ -91,7 +93,10 @@ def _yaml(value: object) -> str:
     return f"[{', '.join(value)}]" if isinstance(value, tuple) else str(value)
 
 
-def _with_words(cmd: tuple[str, ...], replaced: Mapping[str, str]) -> tuple[str, ...]:
-    """The words before ``--ros-args``, exchanged; launch puts a program's own arguments there."""
+def _with_words(cmd: tuple[str, ...], words: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
+    """``words`` exchanged for ``others``, one by one; launch puts a program's own arguments before ``--ros-args``."""
     end = cmd.index("--ros-args") if "--ros-args" in cmd else len(cmd)
-    return (cmd[:1] + tuple(replaced.get(word, word) for word in cmd[1:end])) + cmd[end:]
+    start = end - len(words)
+    if start < 1 or list(cmd[start:end]) != list(words):
+        return cmd
+    return (*cmd[:start], *others, *cmd[end:])

@@ -77,6 +77,7 @@ class Recording:
         self.record = Record([run])
         self.unrecorded: list[Unrecorded] = []
         self.running: dict[int, float] = {}  # pid -> when it was started
+        self.unheard: set[int] = set()  # pids of which nothing is to be expected
         self.data = b""
         self._listeners: tuple[Listener, ...] = (EndpointEvents(), *listeners)
         self._markers = markers
@@ -141,6 +142,8 @@ class Recording:
     def happened(self, event: RunEvent) -> None:
         if isinstance(event, ProcessStarted):
             self.running[event.pid] = time.monotonic()
+            if any(each.process == event.name for each in self.unrecorded):
+                self.unheard.add(event.pid)
             process = self._processes[event.name]
             self._write(_started(process, event.pid, self._marked.get(event.name)))
         elif isinstance(event, ProcessExited):

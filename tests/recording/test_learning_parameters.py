@@ -142,3 +142,30 @@ def test_a_plan_that_was_learnt_needs_nothing_else(stand_in: Path, tmp_path: Pat
     workspace = make_workspace(tmp_path / "ws", stand_in, [renamed])
     ran = workspace.run(*("--secure", "--keystore", str(tmp_path / "ks"), "--nodl", str(tmp_path / "learnt")))
     assert ran.returncode == 0 and "refused" not in ran.stdout + ran.stderr, ran.stdout + ran.stderr
+
+
+def test_two_words_of_one_value_are_told_apart(stand_in: Path, tmp_path: Path) -> None:
+    program = Program(
+        "relay",
+        "node relay\nsubscription %1 std_msgs/msg/String\npublisher %2 std_msgs/msg/String\nwait\n",
+        attributes='args="scan scan"',
+    )
+    first = learn(tmp_path, stand_in, program)
+    assert first["subscription"].parts == first["publisher"].parts == ("scan",), "undecided"
+    names = learn(tmp_path, stand_in, program, "--learn-parameters")
+    assert names["subscription"].parts == (ParameterPart("<1>"),)
+    assert names["publisher"].parts == (ParameterPart("<2>"),)
+
+
+def test_learning_ends_though_a_process_is_started_again_and_again_and_another_cannot_be_heard(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    """What a new life repeats is not new, and nobody waits for a process with an empty environment."""
+    lifecycle = "lifecycle again\nstate 1\nstate 2\npublisher p std_msgs/msg/String\n"
+    programs = [
+        Program("again", lifecycle, attributes='respawn="true" respawn_delay="0.3"'),
+        Program("unheard", "node unheard\nwait\n", attributes='launch-prefix="env -i"'),
+    ]
+    workspace = make_workspace(tmp_path / "ws", stand_in, programs)
+    ran = workspace.run("--learn", str(tmp_path / "learnt"), *LEARN)
+    assert "no new endpoint for 1 s" in ran.stdout and "env -i starts programs" in ran.stdout, ran.stdout
