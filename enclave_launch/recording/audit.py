@@ -16,24 +16,25 @@ from enclave_launch.recording.recording import Recording, Unrecorded
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import RunEvent
 from keystore.formats.policy import Operation, Rule
-from nodl.record.asked import Asked, Role, asked_endpoint, role_of
+from nodl.record.asked import Role, asked_endpoint, role_of
 from nodl.record.lines import EndpointMade, Line
 
 
 class Refusal(NamedTuple):
-    """Something recorded that the plan does not grant."""
+    """Something recorded that the plan does not grant. ``by``: ``described_by`` without where was searched."""
 
     need: Need
     written: str
     type: str
     described_by: str
+    by: str
 
     @property
     def text(self) -> str:
         need = self.need
         return printable(
             f"node {need.node} in enclave {need.enclave} would {WORDS[need.operation]} {need.name} (written "
-            f"{self.written!r}), which is not granted; described by {self.described_by}"
+            f"{self.written!r}), which is not granted; described by {self.by}"
         )
 
 
@@ -79,8 +80,10 @@ class Audit:
         if need not in self._asked:
             self._asked.add(need)
             if not self._grants.permits(need):
-                who = self._grants.described(process, node).text
-                self._refuse(Refusal(need, asked.written, asked.type, _by(who, line, asked)))
+                described = self._grants.described(process, node)
+                short = described.text if described.missing is None else "nobody"
+                who, by = _by(described.text, line), _by(short, line)
+                self._refuse(Refusal(need, asked.written, asked.type, who, by))
 
     def happened(self, event: RunEvent) -> None:
         """Only what was asked for counts."""
@@ -114,7 +117,7 @@ class Audit:
             self._launch.say("WARNING", f"audit: {refusal.text}")
 
 
-def _by(who: str, line: EndpointMade, asked: Asked) -> str:
+def _by(who: str, line: EndpointMade) -> str:
     role = role_of(line)
     return who if role is Role.OWN else f"the library ({role.value}); the node: {who}"
 

@@ -10,6 +10,7 @@ was not seen this time.
 from __future__ import annotations
 
 import os
+import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterable
@@ -104,6 +105,17 @@ def new_run(launch_file: str, distro: str, isolation: str, *, secured: bool = Fa
     now = datetime.now(timezone.utc)
     identifier = f"{now:%Y%m%dT%H%M%S}-{os.getpid():x}{int(now.microsecond / 1000):03x}"
     return Run(identifier, launch_file, distro, isolation, now.isoformat(timespec="seconds"), secured)
+
+
+def prepare_folder(folder: Path) -> None:
+    """Before anything runs: what was seen must not be lost for want of a place. Raises ``ManifestError``."""
+    records = folder / RECORDS
+    try:
+        records.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=records):
+            pass
+    except OSError as error:
+        raise ManifestError(f"{records}: cannot be written: {error.strerror}; nothing was started") from error
 
 
 def keep_record(folder: Path, run: Run, data: bytes) -> Path:

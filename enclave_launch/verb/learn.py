@@ -16,6 +16,7 @@ from enclave_launch.recording.learning import (
     QuietWatch,
     keep_record,
     new_run,
+    prepare_folder,
     write_manifests,
 )
 from enclave_launch.recording.recording import Recording
@@ -39,7 +40,7 @@ def seconds(text: str | None) -> float | None:
     try:
         return parse_duration(text).total_seconds()
     except KeystoreError as error:
-        raise UsageError(f"--learn-for: {error}") from error
+        raise UsageError(f"--learn-for {text}: not a duration; write for example 10s or 2m") from error
 
 
 def learn_launch(target: Target, options: argparse.Namespace, start: Start) -> int:
@@ -47,6 +48,7 @@ def learn_launch(target: Target, options: argparse.Namespace, start: Start) -> i
     of the launch."""
     patience = seconds(options.learn_for)
     folder = Path(options.learn).absolute()
+    prepare_folder(folder)
     isolation = isolate(options.learn_isolation)
     _say(
         f"learning: every process runs as ever{'' if options.secure else ', unsecured'}; {DEVICES_STAY_REAL}"

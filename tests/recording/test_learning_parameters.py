@@ -169,3 +169,12 @@ def test_learning_ends_though_a_process_is_started_again_and_again_and_another_c
     workspace = make_workspace(tmp_path / "ws", stand_in, programs)
     ran = workspace.run("--learn", str(tmp_path / "learnt"), *LEARN)
     assert "no new endpoint for 1 s" in ran.stdout and "env -i starts programs" in ran.stdout, ran.stdout
+
+
+def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(stand_in: Path, tmp_path: Path) -> None:
+    workspace = make_workspace(tmp_path / "ws", stand_in, [Program("n", "node n\nwait\n")])
+    (tmp_path / "file").touch()
+    ran = workspace.run("--learn", str(tmp_path / "file"), *LEARN)
+    assert ran.returncode == 1 and "nothing was started" in ran.stderr and "process started" not in ran.stdout
+    told = workspace.run("--learn", str(tmp_path / "learnt"), "--learn-for", "10")
+    assert told.returncode == 2 and "write for example 10s or 2m" in told.stderr
