@@ -34,11 +34,15 @@ class EnclaveRequest(NamedTuple):
 
 
 class RemapRule(NamedTuple):
-    """``source:=target`` as passed to rcl, with the place it was written."""
+    """``source:=target`` as passed to rcl, with the place it was written.
+
+    ``word``: the index of ``source:=target`` in the command of a process; a load request has no words.
+    """
 
     source: str
     target: str
     location: SourceLocation | None = None
+    word: int | None = None
 
 
 class Respawn(NamedTuple):

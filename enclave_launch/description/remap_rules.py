@@ -66,6 +66,6 @@ def performed_remaps(rules: Iterable[Sequence[Any]], context: LaunchContext) -> 
     ]
 
 
-def placed(rule: Sequence[str], default: SourceLocation) -> ResolvedRule:
+def placed(rule: Sequence[str], default: SourceLocation, word: int | None = None) -> ResolvedRule:
     """The value that policies are derived from; ``default`` is where a plain pair counts as written."""
-    return ResolvedRule(rule[0], rule[1], getattr(rule, "location", None) or default)
+    return ResolvedRule(rule[0], rule[1], getattr(rule, "location", None) or default, word)

@@ -10,14 +10,14 @@ the container's command line (rclcpp_components/component_manager.cpp), unless `
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Literal, NamedTuple
 
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.policy.program_inputs import ProgramInputs, program_inputs
-from enclave_launch.process import RemapRule, ResolvedComponent, ResolvedProcess
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, remap_arguments
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
 from nodl.node_interface import RANDOM_ENDING, Gap, NodeInterface
@@ -62,7 +62,7 @@ def node_of_process(
     process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role
 ) -> RunningNode:
     """One node of ``process``. Raises ``LaunchFileError`` for a remap rule that would make rcl refuse to start."""
-    given = _parse(parse_ros_arguments(process.cmd).remaps, process.remaps, process.location)
+    given = _rules_of_command(process)
     inputs = program_inputs(process)
     if interface.global_arguments is False:  # rcl_node_options_t.use_global_arguments
         rules = RemapRules(local=_own_rules(interface), process=())
@@ -79,16 +79,11 @@ def node_of_component(
 ) -> RunningNode:
     """A node of ``component``: its main one obeys the load request, a further one (with rules of its own) the
     container's command line. Raises ``LaunchFileError`` as ``node_of_process``."""
-    texts = [f"{rule.source}:={rule.target}" for rule in component.remaps]
-    if component.name:
-        texts.append(f"__node:={component.name}")
-    if component.namespace:
-        texts.append(f"__ns:={component.namespace}")
     forwarded: tuple[ParsedRule, ...] = ()
     forwards = component.extra_arguments.get("forward_global_arguments") is True
     if container is not None and (forwards or interface.own_rules):
-        forwarded = _parse(parse_ros_arguments(container.cmd).remaps, container.remaps, container.location)
-    local = _own_rules(interface) or _parse(texts, component.remaps, component.location)
+        forwarded = _rules_of_command(container)
+    local = _own_rules(interface) or _rules_of_load_request(component)
     rules = RemapRules(local=local, process=forwarded)
     inputs = ProgramInputs()
     node = _named(interface, rules, component.parameters, enclave, component.location, "component", inputs)
@@ -134,15 +129,25 @@ def _named(
     )
 
 
-def _parse(
-    texts: Iterable[str], written: Iterable[RemapRule], location: SourceLocation
-) -> tuple[ParsedRule, ...]:
-    places: dict[str, str] = {}
-    for rule in written:
-        if rule.location is not None:  # of equal rules rcl applies the first
-            places.setdefault(f"{rule.source}:={rule.target}", str(rule.location))
+def _rules_of_command(process: ResolvedProcess) -> tuple[ParsedRule, ...]:
+    """What rcl reads there. A rule that no ``remap`` wrote (``args``, the name) counts as written with the process."""
+    places = {rule.word: rule.location for rule in process.remaps}
+    rules = remap_arguments(process.cmd).items()
+    return tuple(_parse(text, places.get(word), process.location) for word, text in rules)
+
+
+def _rules_of_load_request(component: ResolvedComponent) -> tuple[ParsedRule, ...]:
+    rules = [(f"{rule.source}:={rule.target}", rule.location) for rule in component.remaps]
+    if component.name:
+        rules.append((f"__node:={component.name}", None))
+    if component.namespace:
+        rules.append((f"__ns:={component.namespace}", None))
+    return tuple(_parse(text, place, component.location) for text, place in rules)
+
+
+def _parse(text: str, place: SourceLocation | None, started_at: SourceLocation) -> ParsedRule:
     try:
-        return tuple(parse_rule(text, places.get(text, str(location))) for text in texts)
+        return parse_rule(text, str(place or started_at))
     except InvalidRemapRuleError as error:
-        what = str(error).removeprefix(f"{location}: ")
-        raise LaunchFileError(f"{what}; rcl would refuse to start this process", location, error) from error
+        what = str(error).removeprefix(f"{started_at}: ")
+        raise LaunchFileError(f"{what}; rcl would refuse to start this process", started_at, error) from error

@@ -48,7 +48,7 @@ def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
     remaps: list[str] = []
     parameters: list[ParameterFileArgument | ParameterRule] = []
     enclave: str | None = None
-    for flag, value in _flags(arguments):
+    for _, flag, value in _flags(arguments):
         if flag in _REMAP:
             remaps.append(value)
         elif flag in _PARAMETER_FILE:
@@ -58,6 +58,11 @@ def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
         elif flag in _PARAMETER and ":=" in value:
             parameters.append(_parameter_rule(value))
     return RosArguments(tuple(remaps), tuple(parameters), enclave)
+
+
+def remap_arguments(arguments: Sequence[str]) -> dict[int, str]:
+    """The remap rules of ``parse_ros_arguments``, in their order, each by the index of its word."""
+    return {index: value for index, flag, value in _flags(arguments) if flag in _REMAP}
 
 
 def words_after_program(cmd: Sequence[str], prefix_length: int, *, shell: bool) -> list[str]:
@@ -73,11 +78,11 @@ def shell_words(cmd: Sequence[str]) -> list[str]:
         return list(cmd)
 
 
-def _flags(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
-    """``(flag, value)`` of each ROS argument; a deprecated bare rule comes as ``-r``."""
+def _flags(arguments: Sequence[str]) -> Iterator[tuple[int, str, str]]:
+    """Each ROS argument: the index of its value, its flag and the value; a deprecated bare rule comes as ``-r``."""
     inside = False
-    words = iter(arguments)
-    for word in words:
+    words = enumerate(arguments)
+    for index, word in words:
         if word == "--ros-args":
             inside = True
         elif inside and word == "--":
@@ -85,9 +90,9 @@ def _flags(arguments: Sequence[str]) -> Iterator[tuple[str, str]]:
         elif inside and word in _WITH_VALUE:
             value = next(words, None)
             if value is not None:
-                yield word, value
+                yield value[0], word, value[1]
         elif not inside and is_bare_rule(word):
-            yield _REMAP[0], word
+            yield index, _REMAP[0], word
 
 
 def is_bare_rule(word: str) -> bool:

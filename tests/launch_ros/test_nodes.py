@@ -8,8 +8,12 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.errors import LaunchFileError
-from enclave_launch.process import Evaluation
+from enclave_launch.policy.running_node import node_of_component, node_of_process
+from enclave_launch.process import Evaluation, ResolvedProcess
 from nodl.ament_index import PackageNotFoundError
+from nodl.node_interface import NodeInterface
+from nodl.remap import NodeNames
+from nodl.source_ref import SourceRef
 
 Evaluate = Callable[..., Evaluation]
 
@@ -45,6 +49,41 @@ def test_remap_rules_know_their_place(launched: Evaluate) -> None:
     component = result.components[0]
     assert [(r.source, r.location and r.location.line) for r in component.remaps] == [("a", 2), ("g", 8)]
     assert (component.location.line, component.location.element) == (8, "composable_node")
+
+
+NODE = NodeInterface("pk", "e", None, "n", None, (), SourceRef("pk.nodl.xml", 1))
+
+
+def origins(process: ResolvedProcess) -> list[tuple[str, str]]:
+    """The rules that the node obeys, each with the line of its origin."""
+    node = node_of_process(process, NODE, "/n", "node")
+    return [(rule.text, rule.origin.partition(" ")[0].rpartition(":")[2]) for rule in node.rules.process]
+
+
+@pytest.mark.parametrize("started_by", ["", 'launch-prefix="nice -n 3"'])
+def test_each_rule_of_a_command_line_tells_where_it_was_written(launched: Evaluate, started_by: str) -> None:
+    text = f"""<set_remap from="a" to="b"/>
+    <node pkg="pk" exec="e" name="n" {started_by} args="x:=y --ros-args -r c:=d --">
+      <remap from="c" to="d"/>
+      <remap from="a" to="b"/>
+    </node>"""
+    (process,) = launched(text).processes
+    of_args_and_name = [("x:=y", "3"), ("c:=d", "3"), ("__node:=n", "3")]
+    assert origins(process) == [*of_args_and_name, ("a:=b", "2"), ("c:=d", "4"), ("a:=b", "5")]
+
+
+def test_of_equal_rules_the_place_of_the_first_is_told(launched: Evaluate) -> None:
+    text = """<set_remap from="a" to="b"/>
+    <node pkg="pk" exec="e" name="n"><remap from="a" to="b"/></node>
+    <load_composable_node target="c">
+      <composable_node pkg="pk" plugin="P" name="n"><remap from="a" to="b"/></composable_node>
+    </load_composable_node>"""
+    result = launched(text)
+    alone = node_of_process(result.processes[0], NODE, "/n", "node")
+    loaded = node_of_component(result.components[0], None, NODE, "/n")
+    for node in (alone, loaded):
+        (rule,) = NodeNames("n", "/", node.rules).topic("a").rules
+        assert ":2" in rule.origin and rule.text == "a:=b"
 
 
 def test_remaps_are_launchs_own_rules_as_written_whoever_wins(launched: Evaluate) -> None:

@@ -13,6 +13,7 @@ from enclave_launch.ros_rules.ros_arguments import (
     ParameterRule,
     RosArguments,
     parse_ros_arguments,
+    remap_arguments,
 )
 
 
@@ -48,6 +49,11 @@ from enclave_launch.ros_rules.ros_arguments import (
 )
 def test_reading(line: str, expected: RosArguments) -> None:
     assert parse_ros_arguments(shlex.split(line)) == expected
+
+
+def test_each_rule_is_found_by_the_index_of_its_word() -> None:
+    line = "x:=y --ros-args -r a:=b -p c:=1 --remap a:=b -- d:=e"
+    assert remap_arguments(shlex.split(line)) == {0: "x:=y", 3: "a:=b", 7: "a:=b", 9: "d:=e"}
 
 
 @given(st.lists(st.sampled_from(["--ros-args", "--", "-r", "-p", "-e", "--params-file", "a:=b", "x", ""])))

@@ -67,7 +67,7 @@ def process(
         namespace=namespace,
         fqn=f"{namespace or ''}/{name or UNSPECIFIED_NODE_NAME}",
         cmd=tuple(cmd),
-        remaps=(RemapRule(*remap, location),) if remap else (),
+        remaps=(RemapRule(*remap, location, len(cmd) - 1),) if remap else (),
         parameters={},
         environment={},
         enclave=enclave or EnclaveRequest(),

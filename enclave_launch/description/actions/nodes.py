@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.actions.processes import ExecuteProcess
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.parameters.types import SomeParameters
     from enclave_launch.description.remap_rules import SomeRemapRules
     from enclave_launch.description.substitution import SomeSubstitutionsType
-    from enclave_launch.process import ResolvedProcess
+    from enclave_launch.process import RemapRule, ResolvedProcess
 
 
 class RosSpecificArgument(Substitution):
@@ -96,6 +96,7 @@ class Node(ExecuteProcess):
         self.__expanded_namespace = UNSPECIFIED_NODE_NAMESPACE
         self.__final_name: str | None = None
         self.__expanded_remappings: list[PlacedRule] | None = None
+        self.__first_remap = 0  # the index of its "-r" in self.cmd
 
     @staticmethod
     def parse_nested_parameters(params: list[Entity], parser: Parser) -> list[Any]:
@@ -183,6 +184,7 @@ class Node(ExecuteProcess):
         rules = [*everywhere, *performed_remaps(self.__remappings, context)]
         if rules:
             self.__expanded_remappings = rules
+            self.__first_remap = len(self.cmd)
             self.__extend_command(word for rule in rules for word in ("-r", f"{rule[0]}:={rule[1]}"))
 
     def __extend_command(self, words: Iterable[str]) -> None:
@@ -206,7 +208,6 @@ class Node(ExecuteProcess):
         process = super().resolve(context)
         sources = self.ros_arguments().parameters
         parameters = self.__parameters.resolve(self.__name_tokens(), sources, process.cwd)
-        rules = [placed(rule, process.location) for rule in self.__expanded_remappings or ()]
         return process._replace(
             kind=self.process_kind,
             package=None if self.__package is None else _performed(context, self.__package),
@@ -214,11 +215,17 @@ class Node(ExecuteProcess):
             name=self.__expanded_name,
             namespace=self.__expanded_namespace,
             fqn=self.node_name,
-            remaps=tuple(rules),
+            remaps=tuple(self.__placed_remaps(process)),
             parameters=parameters.values,
             unread_parameter_files=parameters.unread,
             parameter_files=self.__parameters.written_files(context),
         )
+
+    def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:
+        """The rules of the launch file, each with its place in the file and on the command line."""
+        first = len(process.prefix) + self.__first_remap + 1  # "-r" stands before each
+        for number, rule in enumerate(self.__expanded_remappings or ()):
+            yield placed(rule, process.location, first + 2 * number)
 
     def __name_tokens(self) -> list[str | None]:
         """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""
