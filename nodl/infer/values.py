@@ -519,12 +519,17 @@ def _join_items(items: list[Items]) -> Items:
 
 def widen(old: Value, new: Value, texts_too: bool) -> Value:
     """``join`` for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
-    if len(new) > 0 and any(type(atom) is Unknown for atom in old):  # it may be any number or text already
+    if any(type(atom) is Unknown for atom in old):  # it may be any number or text already
         covered = (int, float, str, Text) if texts_too else (int, float)
         new = tuple(atom for atom in new if not isinstance(atom, covered) or contains(old, atom))
     joined = join(old, new)
     if joined is old:
         return old
+    widened = _widened(old, joined, texts_too)
+    return old if all(contains(old, atom) for atom in widened) else widened
+
+
+def _widened(old: Value, joined: Value, texts_too: bool) -> Value:
     if isinstance(joined[0], Items) and old and isinstance(old[0], Items):
         return (_widen_items(old[0], joined[0], texts_too),)
     if any(type(atom) in (int, float) and not contains(old, atom) for atom in joined):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from nodl.infer.interpreter import generators
@@ -47,6 +48,9 @@ _CHANGES = frozenset({"append", "extend", "insert", "remove", "pop", "clear"})
 _MISSING = unknown("an argument that the caller does not give")
 
 
+Body = Callable[[Run, FunctionValue, LocalCells, Call], Value]
+
+
 @dataclass
 class Summary:
     """A function that calls itself: its joined parameters and result, run to a fixpoint.
@@ -72,8 +76,19 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
         return _cached(run, function, cells, call)
     if generators.is_generator(function):
         return _generator(run, function, cells, call)
-    if node not in run.stack or _decided_recursion(run, node, call.frame):
+    if node not in run.stack and not (run.repeated and node in run.recursive):
         return _remembered(run, function, cells, call)
+    if node not in run.stack:
+        return _remembered(run, function, cells, call, _summarised)
+    if _decided_recursion(run, node, call.frame):
+        return _remembered(run, function, cells, call)
+    return _summarised(run, function, cells, call)
+
+
+def _summarised(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
+    """One of the calls that a function which calls itself gets: all of them together are one."""
+    node = function.node
+    run.recursive.add(node)
     summary = run.summaries.setdefault(node, Summary())
     _widen_parameters(run, summary, cells)
     if not summary.active:
@@ -128,15 +143,17 @@ def _decided_recursion(run: Run, node: ast.AST, caller: Frame) -> bool:
     return run.fuel > 0 and level <= MAX_RECURSION and len(run.stack) < MAX_DEPTH - 8
 
 
-def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
+def _remembered(
+    run: Run, function: FunctionValue, cells: LocalCells, call: Call, body: Body | None = None
+) -> Value:
     """A call that leaves the state as it found it gives the same again while the state is the same."""
     key = (function, tuple(cells.values()), id(call.node) if run.context else 0)
     known = run.memo.get(key)
-    version = (*run.state.version(), run.state.pulled)
+    version = (*run.state.version(), run.state.pulled, run.rounds)
     if known is not None and known[0] == version:
         return known[1]
-    result = _run_body(run, function, cells, call)
-    if (*run.state.version(), run.state.pulled) == version:
+    result = (body or _run_body)(run, function, cells, call)
+    if (*run.state.version(), run.state.pulled, run.rounds) == version:
         run.memo[key] = (version, result)
     return result
 
@@ -193,7 +210,9 @@ def _run_recursive(run: Run, function: FunctionValue, summary: Summary, call: Ca
         cells = LocalCells()
         cells.update(summary.parameters)
         result = join(summary.result, _run_body(run, function, cells, call))
-        run.unstable = run.unstable or result is not summary.result
+        if result is not summary.result:
+            run.unstable = True
+            run.rounds += 1
         summary.result = result
         if not run.unstable:
             break
@@ -215,6 +234,7 @@ def _widen_parameters(run: Run, summary: Summary, cells: LocalCells) -> None:
             summary.parameters[key] = new
             summary.widened += 1
             run.unstable = True
+            run.rounds += 1
 
 
 # --- binding ----------------------------------------------------------------------------------------------

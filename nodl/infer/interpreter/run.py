@@ -235,6 +235,8 @@ class Run:
         self.enum_members: dict[tuple[str, int, str], Instance] = {}
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.summaries: dict[ast.AST, Any] = {}
+        self.recursive: set[ast.AST] = set()  # functions that call themselves, nobody knows how often
+        self.rounds = 0  # how often a recursion learned something
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.decisions: Decisions | None = None
