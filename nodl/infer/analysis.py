@@ -13,7 +13,7 @@ import sys
 from bisect import bisect_left
 from collections.abc import Callable, Iterable
 
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.define import linearized, methods_in
 from nodl.infer.interpreter.imports import execute_module
 from nodl.infer.interpreter.raising import Raised
 from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Decisions, Frame, Run
@@ -23,7 +23,6 @@ from nodl.infer.paths import refine
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.values import (
     ANY,
-    BoundMethod,
     ClassValue,
     External,
     FunctionValue,
@@ -153,8 +152,7 @@ def _expect_methods(run: Run, value: Iterable[object]) -> None:
                 continue
             for name in list(base.cells):
                 if isinstance(name, str) and name not in _NOT_CALLED and not name.startswith("["):
-                    value = base.cells.get(name, ())
-                    bound = tuple(BoundMethod(a, instance) for a in value if isinstance(a, FunctionValue))
+                    bound = methods_in(base.cells.get(name, ()), instance, instance.cls)
                     run.register_callback(bound, None)
 
 
@@ -274,3 +272,6 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
         run.findings.gap(SourceRef(run.main.path), "the analysis was given up: nested too deep")
     finally:
         sys.setrecursionlimit(limit)
+    for instance, source in run.handed.items():
+        if instance.node is not None and instance.node.created:
+            instance.node.gaps.setdefault((source, "the node is handed to code that is not analysed"))

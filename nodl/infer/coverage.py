@@ -37,12 +37,14 @@ _CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, _CREATING_NAMES))))
 
 
-def unsettled_places(run: Run, called: Iterable[ast.AST] = ()) -> list[Gap]:
-    """A gap for each place whose fate is not known; ``called``: functions that other runs have followed."""
+def unsettled_places(
+    run: Run, called: Iterable[ast.AST] = (), instantiated: Iterable[ast.AST] = ()
+) -> list[Gap]:
+    """A gap for each place whose fate is not known; ``called``, ``instantiated``: what other runs have followed."""
     modules = [module for module in run.modules.values() if _CREATING_TEXT.search(module.source.text)]
     if not modules:
         return []
-    audit = _Audit(run, {*run.called, *called})
+    audit = _Audit(run, {*run.called, *called}, {*run.instantiated, *instantiated})
     for module in dict.fromkeys(modules):
         audit.module(module)
     return list(dict.fromkeys(audit.gaps))
@@ -64,10 +66,11 @@ class _Mentions:
 
 
 class _Audit:
-    def __init__(self, run: Run, called: set[ast.AST]) -> None:
+    def __init__(self, run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:
         self.gaps: list[Gap] = []
         self._run = run
         self._called = called
+        self._instantiated = instantiated
         self._file = ""
         self._mentions: _Mentions | None = None
 
@@ -116,7 +119,7 @@ class _Audit:
         return special or node in self._run.bound or name in self._run.asked or name in self._found().texts
 
     def _is_made(self, node: ast.ClassDef) -> bool:
-        return node in self._run.instantiated
+        return node in self._instantiated
 
     def _referred(self, name: str) -> bool:
         mentions = self._found()

@@ -56,7 +56,8 @@ def infer_paths(paths: Iterable[str | Path], prefixes: Sequence[str] = ()) -> In
         for run, _ in runs:
             analyse_rest(run, called, instantiated)
         everywhere = {node for run, _ in runs for node in run.called}
-        unsettled = [gap for run, _ in runs for gap in unsettled_places(run, everywhere)]
+        instantiated.update(node for run, _ in runs for node in run.instantiated)
+        unsettled = [gap for run, _ in runs for gap in unsettled_places(run, everywhere, instantiated)]
         nodes = [node for run, origin in runs for node in interfaces_of(run.findings, origin)]
     gaps = dict.fromkeys(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)
     gaps.update(dict.fromkeys(unsettled))

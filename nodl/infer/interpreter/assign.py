@@ -71,8 +71,13 @@ def plain_store(run: Run, owner: HeapObject, name: str, value: Value, certain: b
         run.state.write(owner.cells, name, join(owner.cells.get(name, BOTTOM), value))
 
 
+_UNMODELLED = frozenset({"unittest", "pytest", "tkinter"})  # whose objects hold attributes of the program
+
+
 def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) -> None:
-    """Setting an attribute of a library's module or class changes what its other users get."""
+    """Setting an attribute of a library's module or class changes what its other users get, if these are modelled."""
+    if owner.path.partition(".")[0] in _UNMODELLED:
+        return
     if "(" not in owner.path and "[" not in owner.path and ".qos" not in owner.path:
         run.gap(node, frame, f"{owner.path}.{name} is replaced; what its users then do is not analysed")
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from nodl.infer.interpreter import generators
-from nodl.infer.interpreter.define import foreign_bases, linearized
+from nodl.infer.interpreter.define import foreign_bases, linearized, methods_in
 from nodl.infer.interpreter.iterate import elements, enum_members
 from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Caller, Frame, Run
 from nodl.infer.models import foreign
@@ -465,9 +465,7 @@ def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
                 continue
             if every or name in wanted:
                 seen.add(name)
-                for atom in value:
-                    if isinstance(atom, FunctionValue):
-                        run.register_callback((BoundMethod(atom, instance),), None)
+                run.register_callback(methods_in(value, instance, cls), None)
 
 
 CALLABLES: dict[type, Caller] = {

@@ -287,6 +287,18 @@ def _merge(orders: list[list[object]], bases: list[object]) -> list[object]:
     return result
 
 
+def methods_in(held: Value, receiver: object, cls: ClassValue) -> Value:
+    """The functions among what a class holds under one name, bound as somebody who calls them gets them."""
+    bound: list[object] = []
+    for atom in held:
+        if isinstance(atom, FunctionValue):
+            bound.append(BoundMethod(atom, receiver))
+        elif isinstance(atom, ClassMethod):
+            functions = [each for each in atom.function if isinstance(each, FunctionValue)]
+            bound.extend(functions if atom.static else [BoundMethod(each, cls) for each in functions])
+    return tuple(bound)
+
+
 def foreign_bases(cls: ClassValue) -> list[object]:
     """The bases that are not analysed: ``External`` or ``Unknown``; ``object`` does not count."""
     return [

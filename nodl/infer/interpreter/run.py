@@ -219,6 +219,7 @@ class Run:
         self.foreign_attributes: dict[tuple[str, str], Value] = {}  # of libraries, by path and name
         self.at: tuple[ast.AST, Frame] | None = None  # the latest call of the program
         self.escaped: dict[ClassValue | Instance, None] = {}  # handed to code that is not analysed
+        self.handed: dict[Instance, SourceRef] = {}  # objects that code which is not analysed got, and where
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
@@ -484,7 +485,7 @@ class Run:
                 self.register_callback((atom,), None)
             elif isinstance(atom, (ClassValue, Instance)):
                 if objects:
-                    self.escape_object(atom)
+                    self.escape_object(atom, trusted=not opened)
             elif kind is ForeignMethod or kind is External:
                 if self.tables.creates(atom):
                     self.callbacks.setdefault(atom, None)
@@ -492,16 +493,18 @@ class Run:
                 held = atom.owner if isinstance(atom, Variables) else atom.receiver
                 self.escape_value((held,), opened, objects, depth + 1)
 
-    def escape_object(self, atom: ClassValue | Instance) -> None:
+    def escape_object(self, atom: ClassValue | Instance, trusted: bool = False) -> None:
         """Code that is not analysed has the class or object: it may make objects and call methods.
 
-        A node in such hands is a gap. Objects of libraries are theirs already.
+        A node in such hands is a gap, unless they are ``trusted`` to know nothing of ROS, as Python's own library does.
+        Objects of libraries are theirs already.
         """
-        if isinstance(atom, Instance) and (atom.node is not None or not isinstance(atom.cls, ClassValue)):
-            if atom.node is not None and atom.node.created and self.at is not None:
-                node, frame = self.at
-                source = SourceRef(frame.module.source.path, getattr(node, "lineno", 0))
-                atom.node.gaps.setdefault((source, "the node is handed to code that is not analysed"))
+        of_program = isinstance(atom, ClassValue) or isinstance(atom.cls, ClassValue)
+        if isinstance(atom, Instance) and self.at is not None and not trusted:
+            node, frame = self.at
+            source = SourceRef(frame.module.source.path, getattr(node, "lineno", 0))
+            self.handed.setdefault(atom, source)  # it may be a node, or become one
+        if isinstance(atom, Instance) and not (of_program and (atom.node is None or trusted)):
             return
         if atom not in self.escaped:
             self.escaped[atom] = None
