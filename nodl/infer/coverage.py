@@ -22,11 +22,12 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
 from nodl.infer.models.foreign import is_node_class
 from nodl.infer.models.signatures import NODE_ENDPOINTS
-from nodl.infer.program import SourceModule
+from nodl.infer.program import Program, SourceModule
 from nodl.infer.values import ClassValue, External, ModuleValue
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
@@ -35,6 +36,31 @@ _LOST = "may be called from somewhere that the analysis did not follow, and woul
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 _CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, _CREATING_NAMES))))
+
+
+_ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
+
+
+def may_make_interfaces(program: Program, module: SourceModule) -> bool:
+    """Whether running this file could: it says so, runs code that is not in it, or imports other files of the program.
+
+    A file that cannot be parsed could do anything.
+    """
+    if module.error or _CREATING_TEXT.search(module.text) or _ELSEWHERE.search(module.text):
+        return True
+    beside = module.path.rpartition("/")[0]
+    return any(program.find(name, beside) for name in _imported(module))
+
+
+def _imported(module: SourceModule) -> Iterator[str]:
+    for node in ast.walk(module.tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name.partition(".")[0] for alias in node.names)
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            package = absolute_name(node, module)
+            yield from (package, *(f"{package}.{alias.name}" for alias in node.names))
+            yield package.partition(".")[0]
 
 
 def unsettled_places(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from nodl.infer.analysis import analyse_rest, start
-from nodl.infer.coverage import unsettled_places
+from nodl.infer.coverage import may_make_interfaces, unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.packages import EntryPoint, Package, find_package
 from nodl.infer.program import Program
@@ -86,6 +86,8 @@ def _distinct(nodes: list[NodeInterface]) -> tuple[NodeInterface, ...]:
 
 def _runs(program: Program, file: str) -> Iterator[tuple[Run, Origin]]:
     module = program.load(file)
+    if not may_make_interfaces(program, module):
+        return
     package = find_package(file)
     entries = package.entry_points_of(module.name) if package else []
     functions = [entry.function for entry in entries]

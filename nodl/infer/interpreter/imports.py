@@ -23,7 +23,7 @@ def run_import(run: Run, node: ast.Import, frame: Frame) -> bool:
 
 
 def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
-    base = _absolute(node, frame.module.source)
+    base = absolute_name(node, frame.module.source)
     module = import_module(run, base, frame) if base else external("")
     for alias in node.names:
         if alias.name == "*":
@@ -34,7 +34,7 @@ def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
     return True
 
 
-def _absolute(node: ast.ImportFrom, source: SourceModule) -> str:
+def absolute_name(node: ast.ImportFrom, source: SourceModule) -> str:
     """The absolute name of the module that ``from ... import`` names."""
     if not node.level:
         return node.module or ""
