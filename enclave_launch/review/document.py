@@ -6,8 +6,10 @@ just resolved are the same thing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
+
+from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 
 Operation = Literal[
     "publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"
@@ -33,13 +35,17 @@ class Grant(NamedTuple):
 
 
 class NodeView(NamedTuple):
-    """One node under its final name. ``own``: what it asks for itself; ``built_in``: what every node has."""
+    """One node under its final name. ``own``: what it asks for itself; ``built_in``: what every node has.
+
+    ``unit``: the node that the launch file starts and of whose process this one is a helper; mostly the node itself.
+    """
 
     fqn: str
     enclave: str
     program: str
     own: frozenset[Grant]
     built_in: frozenset[Grant]
+    unit: str
 
     @property
     def grants(self) -> frozenset[Grant]:
@@ -68,12 +74,20 @@ class PlanDocument(NamedTuple):
     def nodes_of(self, enclave: str) -> tuple[NodeView, ...]:
         return tuple(node for node in self.nodes if node.enclave == enclave)
 
+    def units_of(self, enclave: str) -> dict[str, frozenset[Grant]]:
+        """What can have an enclave of its own: each node that the launch file starts, with what it and the helpers in
+        its process ask for."""
+        units: dict[str, frozenset[Grant]] = {}
+        for node in self.nodes_of(enclave):
+            units[node.unit] = units.get(node.unit, frozenset()) | node.own
+        return units
+
 
 def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
     """Of a document that ``report.contract.DryRun`` accepts."""
     return PlanDocument(
         {path: grants_of(lists) for path, lists in document["enclaves"].items()},
-        tuple(_node(node) for node in document.get("nodes", ())),
+        tuple(_nodes(document)),
         tuple(Told(**told) for told in document.get("diagnostics", ())),
     )
 
@@ -83,13 +97,30 @@ def grants_of(lists: Mapping[str, Sequence[str]]) -> frozenset[Grant]:
     return frozenset(Grant(operation, name) for operation in OPERATIONS for name in lists.get(operation, ()))
 
 
-def _node(node: Mapping[str, Any]) -> NodeView:
+def _nodes(document: Mapping[str, Any]) -> Iterator[NodeView]:
+    launched = {_fqn(item) for item in (*document.get("processes", ()), *document.get("components", ()))}
+    mains: dict[tuple[str, str], list[str]] = {}
+    for node in document.get("nodes", ()):
+        if node["fqn"] in launched:
+            mains.setdefault((node["enclave"], node["program"]), []).append(node["fqn"])
+    for node in document.get("nodes", ()):
+        started_with = mains.get((node["enclave"], node["program"]), [])
+        is_helper = node["fqn"] not in launched and bool(started_with)
+        yield _node(node, started_with[0] if is_helper else node["fqn"])
+
+
+def _fqn(item: Mapping[str, Any]) -> str:
+    return (item["fqn"] or "").replace(UNSPECIFIED_NODE_NAMESPACE, "")
+
+
+def _node(node: Mapping[str, Any], unit: str) -> NodeView:
     return NodeView(
         node["fqn"],
         node["enclave"],
         node["program"],
         _grants(node["interfaces"], built_in=False),
         _grants(node["interfaces"], built_in=True),
+        unit,
     )
 
 

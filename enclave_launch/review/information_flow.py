@@ -62,11 +62,6 @@ def flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
     return _graph(grants)
 
 
-def node_flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
-    """Between nodes, by what each asks for itself: the flows that there would be with an enclave for each node."""
-    return _graph({node.fqn: node.grants if built_in else node.own for node in plan.nodes})
-
-
 def shortest_paths(graph: FlowGraph, source: str, target: str) -> list[tuple[Step, ...]]:
     """All shortest ways from ``source`` to ``target``, sorted; empty when there is none."""
     distances = _distances(graph, source)
@@ -86,13 +81,18 @@ def reached_from(graph: FlowGraph, source: str) -> frozenset[str]:
 def opened_by_sharing(plan: PlanDocument) -> list[tuple[str, str, str]]:
     """Flows that exist only because nodes share an enclave: (enclave, node that is influenced, node that then is).
 
-    In an enclave of its own the first node could not pass anything on to the second.
+    In an enclave of its own the first node could not pass anything on to the second. Nodes of one process count as
+    one: no enclave separates them.
     """
-    nodes = node_flow_graph(plan)
+    units: dict[str, frozenset[Grant]] = {}
+    for enclave in plan.enclaves:
+        for unit, own in plan.units_of(enclave).items():
+            units[unit] = units.get(unit, frozenset()) | own
+    graph = _graph(units)
     opened = []
     for enclave in sorted(plan.enclaves):
-        together = sorted({node.fqn for node in plan.nodes_of(enclave)})
-        reach = {node: reached_from(nodes, node) for node in together}
+        together = sorted(plan.units_of(enclave))
+        reach = {unit: reached_from(graph, unit) for unit in together}
         opened += [
             (enclave, one, two)
             for one in together

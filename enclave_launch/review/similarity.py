@@ -27,7 +27,7 @@ class Merge(NamedTuple):
 
 
 class Split(NamedTuple):
-    """``saved``: for each node of the enclave what it may do today and does not ask for."""
+    """``saved``: for each node of the enclave what it may do today and neither it nor its process asks for."""
 
     enclave: str
     saved: tuple[tuple[str, tuple[Grant, ...]], ...]
@@ -54,9 +54,9 @@ def splits(plan: PlanDocument) -> list[Split]:
     found = []
     for path in plan.enclaves:
         asked = _asked_for(plan, path)
-        nodes = plan.nodes_of(path)
-        saved = tuple((node.fqn, tuple(sorted(asked - node.own))) for node in nodes if asked - node.own)
-        if len(nodes) > 1 and saved:
+        units = plan.units_of(path)
+        saved = tuple((unit, tuple(sorted(asked - own))) for unit, own in units.items() if asked - own)
+        if len(units) > 1 and saved:
             found.append(Split(path, saved))
     return sorted(found, key=lambda split: (-split.gain, split.enclave))
 

@@ -84,6 +84,45 @@ def test_a_permission_that_no_node_asks_for() -> None:
     assert "permission-unasked" not in codes(checked), "the policy speaks for a program that nobody describes"
 
 
+def told(code: str, subject: str, text: str = "") -> dict[str, Any]:
+    return {
+        "severity": "error",
+        "code": code,
+        "subject": subject,
+        "file": None,
+        "line": 0,
+        "text": text,
+        "remedy": "",
+    }
+
+
+def test_missing_ends_are_one_finding_where_not_all_is_known() -> None:
+    checked = two({"subscribe": ["/x"], "publish": ["/y"]}, {})
+    assert {"no-publisher", "no-subscriber"} <= codes(checked)
+    checked["diagnostics"] = [told("no-manifest", "demo/driver")]
+    (found,) = [each for each in check_plan(checked) if each.code in RULES]
+    assert found.code == "ends-not-judged"
+    assert found.text == "/x, /y have one end only among what is known, but not all is known of demo/driver"
+    checked["diagnostics"] = [told("pattern-accepted", "/n")]
+    assert "no-publisher" in {each.code for each in check_plan(checked)}, (
+        "no gap: the name is a known pattern"
+    )
+
+
+def test_a_wildcard_that_planning_told_of_is_not_told_again() -> None:
+    checked = document({"/a": {"/n": {"publish": ["/x*", "/y*"]}}})
+    checked["diagnostics"] = [told("pattern-accepted", "/n", "node /n may publish /x*: a pattern")]
+    assert [each.subject for each in check_plan(checked) if each.code == "wildcard"] == ["/y*"]
+
+
+def test_an_enclave_is_shared_by_processes_not_by_the_nodes_in_one() -> None:
+    checked = document({"/a": {"/n": {"publish": ["/x"]}, "/helper_of_n": {"subscribe": ["/tf"]}}})
+    checked["processes"] = [process(fqn="/n")]
+    assert "enclave-shared" not in codes(checked)
+    checked["processes"] = [process(fqn="/n"), process(fqn="/helper_of_n")]
+    assert "enclave-shared" in codes(checked)
+
+
 def process(**values: Any) -> dict[str, Any]:
     return {
         "fqn": "/n",

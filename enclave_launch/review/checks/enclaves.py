@@ -21,9 +21,11 @@ def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Tol
 
 
 def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+    """Of those that planning did not tell of already."""
+    told = " ".join(each.text for each in plan.told if each.code == "pattern-accepted")
     for enclave, grants in sorted(plan.enclaves.items()):
         for grant in sorted(grants):
-            if any(character in grant.name for character in "*?["):
+            if any(character in grant.name for character in "*?[") and f" {grant.name}:" not in told:
                 yield finding(
                     "wildcard",
                     grant.name,
@@ -38,7 +40,7 @@ def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
         yield finding(
             "enclave-shared",
             split.enclave,
-            f"{len(plan.nodes_of(split.enclave))} nodes share enclave {split.enclave}: {gains}",
+            f"{len(plan.units_of(split.enclave))} nodes share enclave {split.enclave}: {gains}",
             "give them enclaves of their own (enclave=, --enclave-scope node); secure-plan suggest shows all",
         )
 

@@ -46,7 +46,36 @@ _Users = Mapping[tuple[str, str], list[_User]]
 
 
 def missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
-    """Only what nodes ask for themselves; what runs outside of this launch is not known here."""
+    """Only what nodes ask for themselves; what runs outside of this launch is not known here. Where something of the
+    launch itself is not known, the other end may be there: then one finding says so."""
+    found = list(_missing_ends(plan, document))
+    gaps = sorted({told.subject for told in plan.told if told.code in _GAPS})
+    if not found or not gaps:
+        yield from found
+        return
+    names = sorted({told.subject for told in found})
+    yield finding(
+        "ends-not-judged",
+        names[0],
+        f"{_some(names)} have one end only among what is known, but not all is known of {_some(gaps)}",
+        "close the gaps, and check again",
+    )
+
+
+def _some(names: list[str]) -> str:
+    shown = ", ".join(names[:_NAMED])
+    return f"{shown} and {len(names) - _NAMED} more" if len(names) > _NAMED else shown
+
+
+_NAMED = 5
+_GAPS = frozenset({
+    "no-manifest", "interface-unknown", "node-name-unknown", "parameters-unknown", "parameter-file-missing",
+    "include-left-out", "not-foreseeable", "container-elsewhere",
+})  # fmt: skip
+"""What planning tells when something of the launch is not known: another end of a name may be there."""
+
+
+def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
     asked, users = _asked_for(plan), _users(document)
     everywhere: dict[Operation, set[str]] = {}
     for grant in frozenset[Grant]().union(*plan.enclaves.values()):

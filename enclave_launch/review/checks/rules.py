@@ -10,6 +10,7 @@ RULES: Mapping[str, str] = {
     "no-publisher": "A topic is subscribed and nothing in this plan publishes it.",
     "no-subscriber": "A topic is published and nothing in this plan subscribes it.",
     "no-server": "A service or action is called and nothing in this plan serves it.",
+    "ends-not-judged": "Names have one end only among what is known of this plan, which has gaps.",
     "nearly-the-same-name": "Two names that never meet differ by one slash, letter or capital only.",
     "types-differ": "Both ends of a topic, service or action have different types: they never match.",
     "qos-differs": "A publisher offers less QoS than a subscription of the topic asks for: they never match.",
