@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from nodl.infer.cpp.cache.answers import Answers, Made
-from nodl.infer.cpp.cache.folder import CacheFolder
 from nodl.infer.cpp.entry import Entry, Key, Solved
 from nodl.infer.cpp.program import Sources, registered_components, target_entry
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
@@ -32,7 +31,8 @@ def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferre
     """The nodes of ``files``. Raises ``CppSupportMissing``."""
     check_support()
     workspace = workspace_of(files, prefixes)
-    answers = Answers(workspace, None if _in_packages(workspace, files) else CacheFolder(""))
+    loose = (os.path.dirname(file) for file in files if workspace.package_of(file) is None)
+    answers = Answers(workspace, tuple(sorted(set(loose))))
     question = ("files", tuple(files), workspace.build_folders)
     found = answers.find(question)
     if found is None:
@@ -44,11 +44,6 @@ def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferre
         [gap for each in solved if not each.nodes for gap in each.gaps],
         [gap for each in solved for gap in each.dead],
     )
-
-
-def _in_packages(workspace: Workspace, files: Sequence[str]) -> bool:
-    """What a loose file includes lies anywhere; its answers are not kept."""
-    return all(workspace.package_of(file) is not None for file in files)
 
 
 def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -66,12 +66,13 @@ class Made(NamedTuple):
 class Answers:
     """Of one workspace, for one run: a file that was looked at once is not looked at again.
 
-    A question says by its ``repr`` what is asked.
+    A question says by its ``repr`` what is asked. ``folders``: of sources that lie in no package.
     """
 
-    def __init__(self, workspace: Workspace, folder: CacheFolder | None = None) -> None:
+    def __init__(self, workspace: Workspace, folders: Sequence[str] = ()) -> None:
         self._workspace = workspace
-        self._folder = folder or CacheFolder()
+        self._folders = folders
+        self._folder = CacheFolder()
         self._base = ""
         self._content = lru_cache(maxsize=None)(digest_of)
 
@@ -95,7 +96,7 @@ class Answers:
 
     def _key(self, question: object, start: object) -> str:
         if not self._base:
-            self._base = digest(analyser(), surroundings(self._workspace))
+            self._base = digest(analyser(), surroundings(self._workspace, self._folders))
         return digest(self._base, question, start is None)
 
     def _variants(self, key: str) -> list[tuple[tuple[Asked, ...], tuple[tuple[str, str], ...], Any]]:

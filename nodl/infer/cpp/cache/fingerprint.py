@@ -6,7 +6,7 @@ Reads files.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -33,8 +33,9 @@ def _version(name: str) -> str:
         return ""
 
 
-def surroundings(workspace: Workspace) -> str:
-    """Of the names of all files in the packages and below the prefixes' ``include``, and of what the build files say.
+def surroundings(workspace: Workspace, folders: Sequence[str] = ()) -> str:
+    """Of the names of all files in the packages, right in ``folders`` and below the prefixes' ``include``, and of what
+    the build files say.
 
     A file that comes or goes may change what an ``#include`` means; a build file, what a program consists of.
     """
@@ -42,7 +43,8 @@ def surroundings(workspace: Workspace) -> str:
     headers = [os.path.join(prefix, "include") for prefix in workspace.prefixes]
     names = [*_files(folders), *_files(headers)]
     read = [name for name in names if _is_build_file(name)] + list(_left_by_builds(workspace))
-    return digest(sorted(workspace.packages), names, [(name, digest_of(name)) for name in read])
+    beside = [sorted(os.listdir(folder)) for folder in folders]
+    return digest(sorted(workspace.packages), names, beside, [(name, digest_of(name)) for name in read])
 
 
 def _files(folders: Iterable[str]) -> Iterator[str]:

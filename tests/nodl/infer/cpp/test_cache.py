@@ -84,6 +84,15 @@ def test_a_header_that_appears_before_the_one_that_was_found_counts(workspace: P
     assert names(asked(workspace)) == ["nearer"]
 
 
+def test_a_source_in_no_package_is_kept_too_and_its_headers_count(tmp_path: Path, runs: list[str]) -> None:
+    write(tmp_path / "loose.cpp", NODE)
+    write(tmp_path / "names.hpp", '#define TOPIC "a"\n')
+    assert names(asked(tmp_path / "loose.cpp")) == ["a"] == names(asked(tmp_path / "loose.cpp"))
+    assert runs == ["loose.cpp"]
+    write(tmp_path / "names.hpp", '#define TOPIC "b"\n')
+    assert names(asked(tmp_path / "loose.cpp")) == ["b"]
+
+
 def test_what_the_build_says_counts(workspace: Path) -> None:
     asked(workspace)
     cmake = workspace / "demo" / "CMakeLists.txt"
