@@ -14,6 +14,7 @@ from nodl.infer.cpp.cache.digests import digest_of, digest_of_content
 from nodl.infer.cpp.entry import Entry
 from nodl.infer.cpp.findings import NodeRecord
 from nodl.infer.cpp.ledger import CREATES, Answer, account
+from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function
@@ -78,6 +79,8 @@ class Sources:
     def _is_modelled(self, name: str, found: str, file: str) -> bool:
         """rclcpp is known by its model alone; other libraries of the table too, but for their own packages."""
         folder = name.partition("/")[0]
+        if name.endswith("/version.h"):
+            return False  # which release this is
         if folder in _CORE:
             return True
         return folder in KNOWN_HEADERS and self.workspace.package_of(found) is not self.workspace.package_of(
@@ -217,7 +220,7 @@ def _run_main(run: Machine, function: Function) -> None:
 
     arguments: list[Value] = [
         unknown("the number of arguments"),
-        (Seq((unknown("an argument of the program"),), open=True),),
+        (Seq((unknown(ARGUMENT),), open=True),),
     ]
     frame = Frame(function.file, function.scope)
     invoke(run, function, None, arguments[: len(function.parameters)], function.node, frame, ())
@@ -260,6 +263,10 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
 def _findings(run: Machine, sources: Sources) -> Findings:
     findings = Findings()
     findings.nodes = [record for record in run.nodes if record.created]
+    for record in findings.nodes if run.global_arguments else ():
+        if record.use_global_arguments:
+            record.arguments += run.global_arguments
+            record.use_global_arguments = False
     findings.gaps = dict(run.gaps)
     for (file, start), (source, what, name) in run.unset.items():
         if start not in run.handled.get(file, ()):

@@ -13,6 +13,7 @@ from nodl.infer.cpp.libraries import (
     NODE_BASES,
     Call,
     library_class,
+    library_function,
     library_method,
     node_method,
 )
@@ -25,6 +26,7 @@ from nodl.infer.cpp.running.values import (
     Param,
     Seq,
     Text,
+    Unknown,
     Value,
     concatenated,
     join,
@@ -280,3 +282,28 @@ library_method(
     "parameter_event_publisher_options", "allow_undeclared_parameters", "enable_logger_service",
     "automatically_declare_parameters_from_overrides", "allocator", "get_rcl_node_options",
 )(_setter)  # fmt: skip
+
+
+ARGUMENT = "an argument of the program"
+"""Of what ``main`` is called with."""
+
+
+@library_function("rclcpp::init", "rclcpp::init_and_remove_ros_arguments")
+def _init(run: Machine, call: Call) -> Value:
+    """rclcpp/utilities.hpp: (argc, argv, ...). With arguments of the program's own making, those of the launch are not
+    heard; they are rules for all nodes."""
+    given = call.value(1) if len(call.values) > 1 else BOTTOM
+    for atom in given or ((Seq(()),) if call.values else BOTTOM):
+        if isinstance(atom, Seq) and not atom.open:
+            run.global_arguments.append(tuple(_word(run, item) for item in atom.items))
+        elif not _is_of_program(atom):
+            run.gap(
+                call.node, call.frame, "the arguments that the program gives to rclcpp::init are not known"
+            )
+    return unknown("the arguments that are left")
+
+
+def _is_of_program(atom: object) -> bool:
+    return isinstance(atom, Seq) and any(
+        isinstance(each, Unknown) and each.why == ARGUMENT for item in atom.items for each in item
+    )

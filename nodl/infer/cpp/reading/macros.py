@@ -188,6 +188,17 @@ class _Condition:
             return int(_KNOWN_SYMBOLS[name])
         return 0 if self.complete else None
 
+    def _version(self, name: str, given: list[str]) -> int | None:
+        """``RCLCPP_VERSION_GTE(28, 0, 0)``, of the ``version.h`` that ament_generate_version_header() writes."""
+        wanted = [int(token) for token in given if token.isdigit()]
+        if not name.endswith("_VERSION_GTE") or len(wanted) != 3:
+            return None
+        stem = name.removesuffix("GTE")
+        present = [self._symbol(stem + part) if stem + part in self.macros else None for part in _VERSION]
+        if None in present:
+            return None
+        return int([number for number in present if number is not None] >= wanted)
+
     def _symbol(self, name: str) -> int | None:
         if self.tokens and self.tokens[0] == "(":
             inside = []
@@ -201,7 +212,7 @@ class _Condition:
             if name == "__has_include":
                 found = self.has_include("".join(inside[2:-2]))
                 return None if found is None else int(found)
-            return None
+            return self._version(name, inside)
         if name in _VALUES:
             return _VALUES[name]
         macro = self.macros.get(name)
@@ -215,6 +226,7 @@ class _Condition:
         return 0 if self.complete and macro is None else None
 
 
+_VERSION = ("MAJOR", "MINOR", "PATCH")
 _COMPARE: dict[str, Callable[[int, int], bool]] = {
     "==": lambda a, b: a == b, "!=": lambda a, b: a != b, "<": lambda a, b: a < b,
     ">": lambda a, b: a > b, "<=": lambda a, b: a <= b, ">=": lambda a, b: a >= b,

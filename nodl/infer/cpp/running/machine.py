@@ -139,7 +139,7 @@ class Machine:
         self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
         self.called: set[Function] = set()
         self.dead: dict[tuple[str, int, int], str] = {}
-        self.global_arguments: list[Value] = []
+        self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[Function] = []
         self.steps = 0
         self.limit = MAX_STEPS

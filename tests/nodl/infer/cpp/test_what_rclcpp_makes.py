@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, node
+from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, node, package, write
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
@@ -217,3 +217,64 @@ def test_remap_rules_in_the_options_belong_to_the_node(tmp_path: Path) -> None:
 
 
 __all__ = ["node"]
+
+
+OWN = (
+    HEAD
+    + 'struct N : rclcpp::Node {{ N() : Node("n") {{}} }};\nint main(int argc, char ** argv) {{ {0} N n; }}\n'
+)
+
+
+def test_arguments_that_the_program_makes_for_init_are_rules_of_its_nodes_and_those_of_launch_are_not(
+    tmp_path: Path,
+) -> None:
+    made = 'const char * a[] = {"prog", "--ros-args", "-r", "a:=b"}; rclcpp::init(4, a);'
+    (found,) = infer(tmp_path, OWN.format(made)).nodes
+    assert (found.own_rules, found.global_arguments) == (("a:=b",), False)
+
+
+def test_arguments_of_main_are_those_of_launch(tmp_path: Path) -> None:
+    (found,) = infer(tmp_path, OWN.format("rclcpp::init(argc, argv);")).nodes
+    assert (found.own_rules, found.global_arguments) == ((), True)
+
+
+def test_without_arguments_the_launch_is_not_heard(tmp_path: Path) -> None:
+    (found,) = infer(tmp_path, OWN.format("rclcpp::init(0, nullptr);")).nodes
+    assert found.global_arguments is False
+
+
+def test_arguments_that_are_not_known_are_a_gap(tmp_path: Path) -> None:
+    assert any("rclcpp::init" in why for why in gaps(infer(tmp_path, OWN.format("rclcpp::init(2, made());"))))
+
+
+RELEASE = """
+#include <rclcpp/version.h>
+struct N : rclcpp::Node { N() : Node("n") {
+#if RCLCPP_VERSION_GTE(28, 0, 0)
+  create_publisher<std_msgs::msg::String>("new", 1);
+#else
+  create_publisher<std_msgs::msg::String>("old", 1);
+#endif
+} };
+int main() { N n; }
+"""
+
+
+@pytest.mark.parametrize(("major", "name"), [(16, "old"), (28, "new")])
+def test_the_release_that_is_installed_decides_what_is_compiled(
+    tmp_path: Path, major: int, name: str
+) -> None:
+    from nodl.infer.cpp.system import infer_sources
+
+    numbers = zip(("MAJOR", "MINOR", "PATCH"), (major, 0, 1), strict=True)
+    text = "".join(f"#define RCLCPP_VERSION_{part} ({number})\n" for part, number in numbers)
+    write(tmp_path / "ros/include/rclcpp/rclcpp/version.h", text)
+    folder = package(tmp_path / "demo", {"src/main.cpp": HEAD + RELEASE})
+    (found,) = infer_sources([str(folder / "src/main.cpp")], [str(tmp_path / "ros")]).nodes
+    assert [str(endpoint.name) for endpoint in found.endpoints] == [name]
+
+
+def test_where_the_release_is_not_known_neither_is_certain(tmp_path: Path) -> None:
+    found = infer(tmp_path, HEAD + RELEASE)
+    assert endpoints(found) == set()
+    assert len([why for why in gaps(found) if "only where the build says" in why]) == 2
