@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.explanation import explain
 from enclave_launch.report.tree import origin_text
@@ -21,6 +22,10 @@ def explained(plan: LaunchPlan, subject: str) -> list[str]:
             lines.append(f"  interfaces of {label(item)}: {origin_text(item)}")
         if subject.strip("[]") == label(item) or (is_unknown(item) and path == item.fqn):
             lines += _of_process(plan, item)
+    if lines and any(item.middleware == ZENOH for item in plan.processes):
+        from enclave_launch.report.on_zenoh import zenoh_lines
+
+        lines += zenoh_lines(plan, path)
     return lines
 
 
