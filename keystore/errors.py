@@ -43,30 +43,36 @@ class EnclaveTooDeep(InvalidEnclaveNameError):
 
 
 class InvalidInputError(KeystoreError, ValueError):
+    """A document, certificate or option holds what cannot be used."""
+
     exit_status = 2
 
 
 class NotAKeystoreError(KeystoreError):
-    pass
+    """The path is something other than a keystore."""
 
 
 class UnsafeKeystoreError(KeystoreError):
-    pass
+    """Links, owners or modes let others read or change the keystore."""
 
 
 class DamagedKeystoreError(KeystoreError):
-    pass
+    """A file of the keystore is missing, unreadable or not what it should be."""
 
 
 class SigningUnavailableError(KeystoreError):
-    pass
+    """A CA cannot sign here: no key, no passphrase, a token that refuses."""
 
 
 class KeystoreBusyError(KeystoreError):
+    """Another run holds the keystore's lock."""
+
     exit_status = 75  # EX_TEMPFAIL of sysexits.h: trying again may help
 
 
 class StorageError(KeystoreError):
+    """The system would not read or write a file."""
+
     @classmethod
     def of(cls, error: OSError, doing: str) -> StorageError:
         """The translation of a system error; ``doing`` is a phrase such as ``writing the keystore``."""

@@ -37,16 +37,22 @@ class NoDLError(Exception):
 
 
 class NoNoDLFilesError(NoDLError):
+    """A package without NoDL files."""
+
     def __init__(self, package_name: str):
         super().__init__(f"{package_name} has no NoDL files in its share directory")
 
 
 class DuplicateNodeError(NoDLError):
+    """Two definitions of one node of one executable."""
+
     def __init__(self, node: Node):
         super().__init__(f"node {node.name} of executable {node.executable} is defined more than once")
 
 
 class ExecutableNotFoundError(NoDLError):
+    """A package whose NoDL files do not describe the executable."""
+
     def __init__(self, package_name: str, executable_name: str):
         super().__init__(f"the NoDL files of {package_name} do not describe executable '{executable_name}'")
 
@@ -78,15 +84,19 @@ class InvalidNoDLError(NoDLError):
 
 
 class InvalidXMLError(InvalidNoDLError):
+    """A document that no XML parser reads."""
+
     def __init__(self, err: etree.XMLSyntaxError):
         super().__init__(f"{err.filename}: not well-formed XML: {err.msg}")
 
 
 class InvalidYAMLError(InvalidNoDLError):
-    pass
+    """A document that no YAML parser reads."""
 
 
 class InvalidNoDLDocumentError(InvalidNoDLError):
+    """Well-formed, and not what the format allows; the message holds file and line."""
+
     invalid: etree.DocumentInvalid | None = None
 
     def __init__(self, invalid: etree.DocumentInvalid):
@@ -95,10 +105,12 @@ class InvalidNoDLDocumentError(InvalidNoDLError):
 
 
 class IncludeError(InvalidNoDLError):
-    pass
+    """A document that includes another one which cannot be had."""
 
 
 class InvalidElementError(InvalidNoDLError):
+    """An element with content or attributes that it must not have; the message holds file and line."""
+
     element: etree._Element | None = None
 
     def __init__(self, message: str, element: etree._Element):
@@ -107,26 +119,30 @@ class InvalidElementError(InvalidNoDLError):
 
 
 class InvalidActionError(InvalidElementError):
-    pass
+    """An ``action`` element that cannot be read."""
 
 
 class InvalidParameterError(InvalidElementError):
-    pass
+    """A ``parameter`` element that cannot be read."""
 
 
 class InvalidTopicError(InvalidElementError):
-    pass
+    """A ``topic`` element that cannot be read."""
 
 
 class InvalidServiceError(InvalidElementError):
-    pass
+    """A ``service`` element that cannot be read."""
 
 
 class InvalidNodeChildError(InvalidElementError):
+    """An element within ``node`` that has no place there."""
+
     def __init__(self, element: etree._Element) -> None:
         super().__init__("is not allowed in a node, only action, parameter, service and topic are", element)
 
 
 class UnsupportedInterfaceError(InvalidNoDLError):
+    """A version of the format that is newer than what is read here."""
+
     def __init__(self, version: int, max_version: int) -> None:
         super().__init__(f"interface version {version} is not supported, at most {max_version} is")

@@ -68,6 +68,7 @@ def validate_full_name(name: str, what: str = "name") -> None:
 
 
 def is_full_name(name: str) -> bool:
+    """Whether ``name`` is absolute, well-formed and not longer than ROS allows."""
     return len(name) <= MAX_NAME_LENGTH and _ABSOLUTE.match(name) is not None
 
 

@@ -11,6 +11,8 @@ from typing import Any, TypeVar
 
 @unique
 class PubSubRole(Enum):
+    """Which ends of a topic a node has."""
+
     PUBLISHER = "publisher"
     SUBSCRIPTION = "subscription"
     BOTH = "both"
@@ -18,6 +20,8 @@ class PubSubRole(Enum):
 
 @unique
 class ServerClientRole(Enum):
+    """Which ends of a service or action a node has."""
+
     SERVER = "server"
     CLIENT = "client"
     BOTH = "both"
@@ -47,23 +51,31 @@ class NoDLInterface(NoDLData):
 
 
 class Parameter(NoDLInterface):
+    """A parameter with its type."""
+
     def __init__(self, *, name: str, parameter_type: str) -> None:
         super().__init__(name=name, value_type=parameter_type)
 
 
 class Topic(NoDLInterface):
+    """A topic with its message type."""
+
     def __init__(self, *, name: str, message_type: str, role: PubSubRole) -> None:
         super().__init__(name=name, value_type=message_type)
         self.role = role
 
 
 class Service(NoDLInterface):
+    """A service with its type."""
+
     def __init__(self, *, name: str, service_type: str, role: ServerClientRole) -> None:
         super().__init__(name=name, value_type=service_type)
         self.role = role
 
 
 class Action(NoDLInterface):
+    """An action with its type."""
+
     def __init__(self, *, name: str, action_type: str, role: ServerClientRole) -> None:
         super().__init__(name=name, value_type=action_type)
         self.role = role

@@ -24,4 +24,5 @@ def domain_of(environment: Mapping[str, str]) -> int:
 
 
 def covers(domains: Domains, domain: int) -> bool:
+    """Whether ``domain`` is in one of the ranges."""
     return any(first <= domain <= last for first, last in domains.ranges)

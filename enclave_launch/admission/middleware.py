@@ -43,6 +43,7 @@ def middleware_of(environment: Mapping[str, str], distro: str) -> str:
 
 
 def vendor_of(middleware: str) -> Vendor | None:
+    """Whose DDS is behind an ``RMW_IMPLEMENTATION`` that honours enclaves; ``None`` for any other middleware."""
     return HONOURS_ENCLAVES.get(middleware)
 
 

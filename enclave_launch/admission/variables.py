@@ -39,6 +39,8 @@ _PRELOAD = ("LD_PRELOAD", "LD_AUDIT")
 
 
 class Setting(NamedTuple):
+    """An environment variable as a launch file sets it."""
+
     variable: str
     value: str
 

@@ -18,6 +18,8 @@ ALSO: dict[str, frozenset[Condition]] = {
 
 
 def conditions_of(node: RunningNode, also: Iterable[str] = ()) -> frozenset[Condition]:
+    """Which rows of the built-in interfaces hold for ``node``; ``also``: keys of ``ALSO`` for what else runs
+    in it."""
     met = {Condition.ALWAYS}.union(*(ALSO[name] for name in also))
     if node.interface.parameter_services:
         met.add(Condition.PARAMETERS)

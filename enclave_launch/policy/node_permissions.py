@@ -67,6 +67,8 @@ class Reason(NamedTuple):
 
 
 class Permission(NamedTuple):
+    """One operation on a fully qualified name, and why it is granted."""
+
     operation: Operation
     name: str
     reason: Reason

@@ -24,6 +24,8 @@ ReasonsByEnclave = Mapping[str, Mapping[Rule, tuple[Reason, ...]]]
 
 @dataclass(frozen=True, slots=True)
 class MergedPolicy:
+    """The derived policy with the policy file merged over it, the reasons of both, and what is to be told."""
+
     policy: Policy
     reasons: ReasonsByEnclave
     warnings: tuple[Diagnostic, ...]

@@ -38,6 +38,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
 
 
 def plan_json(plan: LaunchPlan, security: SecuritySettings | None = None) -> str:
+    """``plan_document`` as indented JSON text: what ``--dry-run --format json`` writes."""
     return json_text(plan_document(plan, security), indent=2)
 
 

@@ -47,6 +47,7 @@ def findings_text(judged: Judged) -> str:
 
 
 def findings_document(judged: Judged) -> dict[str, object]:
+    """The findings for JSON, each with the reason why it was accepted, or ``None``."""
     return {
         "version": 1,
         "findings": [{**told._asdict(), "accepted": accepted} for told, accepted in judged],
@@ -54,6 +55,7 @@ def findings_document(judged: Judged) -> dict[str, object]:
 
 
 def suggestions_text(merges: Sequence[Merge], splits: Sequence[Split]) -> str:
+    """The enclaves worth merging and splitting, with what each change costs or saves."""
     lines = [line for merge in merges for line in _merge(merge)]
     lines += [line for split in splits for line in _split(split)]
     return (

@@ -27,6 +27,7 @@ def unknown_by_enclave(plan: LaunchPlan) -> dict[str, list[PlannedProcess | Plan
 
 
 def is_unknown(item: PlannedProcess | PlannedComponent) -> bool:
+    """Whether no interface was found for it: the plan has no node of it."""
     return not item.nodes
 
 

@@ -34,6 +34,8 @@ class Never(NamedTuple):
 
 
 class Accepted(NamedTuple):
+    """Findings with this code about a subject that matches (shell wildcards), and why they are accepted."""
+
     code: str
     subject: str
     why: str
@@ -43,6 +45,8 @@ class Accepted(NamedTuple):
 
 
 class Expectations(NamedTuple):
+    """All that an ``enclaves.review.yaml`` says; empty without one."""
+
     never: tuple[Never, ...] = ()
     accept: tuple[Accepted, ...] = ()
 

@@ -47,6 +47,8 @@ class Hop(NamedTuple):
 
 
 class Step(NamedTuple):
+    """From one enclave to the next, by any of ``hops``."""
+
     source: str
     target: str
     hops: tuple[Hop, ...]

@@ -34,6 +34,7 @@ def as_signed(grants: Iterable[Grant]) -> frozenset[Grant]:
 
 
 def grants_of_rules(rules: Iterable[Rule]) -> frozenset[Grant]:
+    """Rules of a policy, read back from signed permissions, as the plan names them."""
     return frozenset(Grant(_OPERATIONS[rule.operation], rule.expression) for rule in rules)
 
 

@@ -61,6 +61,7 @@ def enclave_attribute(action: Any, context: Any) -> str | None:
 
 
 def scope_in_force(context: Any) -> str | None:
+    """The enclave scope pushed last in ``context`` (absolute); ``None`` when nothing was pushed."""
     from enclave_launch.ros_rules.namespaces import enclave_scope
 
     return enclave_scope(context.launch_configurations)

@@ -35,6 +35,9 @@ SECURE = "secure_enclaves"
 
 
 class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without ROS
+    """Adds the options of ``secure-launch`` to ``ros2 launch`` and starts a session where ``--secure`` is
+    given."""
+
     def add_arguments(self, parser: argparse.ArgumentParser, cli_name: str, *, argv: Any = None) -> None:
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
         add_security_options(group)

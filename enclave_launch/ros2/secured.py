@@ -87,6 +87,7 @@ def _read_secrets(launch: ProvisionedLaunch) -> Iterable[str]:
 
 
 def security_variables(settings: SecuritySettings) -> Mapping[str, str]:
+    """The environment that every process of a secured launch gets, whatever its enclave."""
     return {ENABLE: "true", KEYSTORE: settings.keystore, STRATEGY: settings.strategy}
 
 

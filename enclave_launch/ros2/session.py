@@ -58,6 +58,8 @@ class OpenDoor:
 
 
 class EnclaveSession:
+    """One secured launch, from ``install`` on: asks ``door`` for the enclave of each process."""
+
     def __init__(self, door: Doorkeeper) -> None:
         self._door = door
 

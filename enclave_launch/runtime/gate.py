@@ -80,6 +80,7 @@ def identity(process: ResolvedProcess) -> tuple[object, ...]:
 
 
 def component_identity(component: ResolvedComponent) -> tuple[object, ...]:
+    """What decides the permissions of a component, as ``identity`` does for a process."""
     return (
         component.container,
         component.package,

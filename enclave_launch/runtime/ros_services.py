@@ -31,6 +31,7 @@ ALTERNATIVE = (
 
 
 def rclpy_available() -> bool:
+    """Whether ``rclpy`` can be found; it is not imported."""
     import importlib.util
 
     return importlib.util.find_spec("rclpy") is not None

@@ -21,6 +21,8 @@ FLUSH_TIMEOUT = 5.0  # seconds that a blocked screen may hold up our end
 
 
 class Sink(Protocol):
+    """Where a ``SinkWriter`` puts what was queued."""
+
     def write(self, data: bytes) -> None:
         """Write all of ``data``, in the writer's thread. Failures disable the sink; they never reach a
         process.

@@ -142,6 +142,7 @@ def own_cgroup() -> Path | None:
 
 
 def is_delegated(cgroup: Path) -> bool:
+    """Whether systemd has handed ``cgroup`` to this user (``Delegate=``), and groups may be made in it."""
     for name in DELEGATED:
         with contextlib.suppress(OSError):
             if os.getxattr(cgroup, name) == b"1":

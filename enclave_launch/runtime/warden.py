@@ -117,6 +117,8 @@ class Terminal:
 
 
 class Warden:
+    """The loop of this process: obeys ``connection``, reaps children, and ends them all when it closes."""
+
     def __init__(self, connection: socket.socket, terminal: Terminal | None) -> None:
         self.connection = connection
         self.terminal = terminal
@@ -332,6 +334,7 @@ def move_above(streams: list[int]) -> list[int]:
 
 
 def session_of(pid: int) -> int:
+    """The session of ``pid``; -1 when it is gone."""
     try:
         return os.getsid(pid)
     except ProcessLookupError:
@@ -339,6 +342,7 @@ def session_of(pid: int) -> int:
 
 
 def group_of(pid: int) -> int:
+    """The process group of ``pid``; -1 when it is gone."""
     try:
         return os.getpgid(pid)
     except ProcessLookupError:
@@ -346,6 +350,7 @@ def group_of(pid: int) -> int:
 
 
 def kill_all(pids: set[int], number: int) -> None:
+    """Signal each of ``pids``; what is gone or belongs to others is passed over."""
     for pid in pids:
         with contextlib.suppress(ProcessLookupError, PermissionError):
             os.kill(pid, number)
@@ -387,6 +392,7 @@ def set_oom_score(score: str) -> None:
 
 
 def own_oom_score() -> str:
+    """``oom_score_adj`` as this process inherited it; ``0`` where the kernel does not tell."""
     try:
         with open("/proc/self/oom_score_adj", encoding="ascii") as file:
             return file.read().strip()
@@ -398,6 +404,7 @@ OOM_SCORE = own_oom_score()  # what children get back
 
 
 def main() -> None:
+    """Become a subreaper, take the descriptors of the command line, and serve until the launcher goes."""
     global LIBC
     if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
         RESTORED.discard(signal.SIGHUP)

@@ -61,6 +61,7 @@ def find_router(prefixes: Sequence[str]) -> str | None:
 
 
 def who_answers(place: RouterPlace, timeout: float = 5.0) -> Answer:
+    """Connect with TLS, and judge who is there by the certificate that is presented."""
     context = ssl.create_default_context(cafile=place.authorities)
     host, port = place.address
     try:
@@ -210,6 +211,7 @@ class ZenohRouter:
 
 
 def missing_router(address: tuple[str, int], configuration: str) -> str:
+    """The error where no router answers and none can be started: what to install or to start."""
     host, port = address
     return (
         f"processes of this launch are on Zenoh (rmw_zenoh_cpp), no router answers at tls/{host}:{port}, and none can "

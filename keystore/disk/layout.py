@@ -65,10 +65,12 @@ RUNTIME_FILES = (
 
 
 def ca_cert(role: Role) -> str:
+    """The certificate of the CA for ``role``."""
     return f"{PUBLIC}/{role.value}.cert.pem"
 
 
 def ca_key(role: Role) -> str:
+    """The private key of the CA for ``role``."""
     return f"{PRIVATE}/{role.value}.key.pem"
 
 
@@ -83,10 +85,12 @@ def enclave_directory(enclave: str) -> str:
 
 
 def shares(enclave: str) -> str:
+    """Whose permissions meet in ``enclave``, remembered."""
     return f"{SHARES}/{flat_name(enclave)}.json"
 
 
 def request(enclave: str) -> str:
+    """The certificate signing request of ``enclave``, for an identity CA elsewhere."""
     return f"{REQUESTS}/{flat_name(enclave)}.csr"
 
 
@@ -116,6 +120,7 @@ def _links(depth: int) -> Mapping[str, str]:
 
 
 def crl_link(enclave: str) -> str:
+    """What the CRL link of ``enclave`` points to, relative to its directory."""
     return _links(len(segments(enclave)))[ENCLAVE_CRL]
 
 

@@ -94,6 +94,7 @@ def _open(root: Path, relative: str) -> int:
 
 
 def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystoreError:
+    """The error for a link that no keystore has, with the command that removes it."""
     path = root / relative
     return UnsafeKeystoreError(
         f"{printable(path)} is a link to {printable(target)}, which no keystore has there; "
@@ -176,6 +177,7 @@ def close_to_others(root: Path) -> str:
 
 
 def private_repair(path: Path | str, info: os.stat_result) -> str:
+    """The command that makes ``path`` ours (someone else owns it) or closes it to others."""
     quoted = shlex.quote(str(path))
     if info.st_uid != os.geteuid():
         return f"chown -R {os.geteuid()} {quoted}"
@@ -210,4 +212,5 @@ def refuse_unsafe_parent(root: Path) -> None:
 
 
 def mode_text(info: os.stat_result) -> str:
+    """The permission bits as ``chmod`` takes them: ``0600``."""
     return f"{stat.S_IMODE(info.st_mode):04o}"

@@ -34,6 +34,8 @@ _NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.ENOSYS, errno.EOPNOTSUPP, errno.E
 
 @dataclass(frozen=True, slots=True)
 class Content:
+    """A file to write: its bytes and its mode."""
+
     data: bytes = field(repr=False)
     mode: int = PUBLIC_MODE
 

@@ -24,6 +24,8 @@ _VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class Superseded:
+    """A certificate that was replaced and not revoked: it is good until ``not_after``."""
+
     enclave: str
     serial: int
     not_after: datetime
@@ -68,5 +70,6 @@ def remember(batch: Batch, view: KeystoreView, replaced: Iterable[Superseded], n
 
 
 def serials_of(view: KeystoreView, enclaves: Iterable[str]) -> set[int]:
+    """Serials of the superseded certificates of ``enclaves``; raises as ``superseded``."""
     names = set(enclaves)
     return {one.serial for one in superseded(view) if one.enclave in names}

@@ -52,6 +52,7 @@ class RouterFile(NamedTuple):
 
 
 def has_router(view: KeystoreView) -> bool:
+    """Whether the keystore holds a configuration for a Zenoh router."""
     return os.path.lexists(view.root / layout.ZENOH_ROUTER)
 
 
@@ -66,6 +67,7 @@ def session_file(enclave: str) -> str:
 
 
 def session_content(view: KeystoreView, enclave: str, address: RouterAddress) -> bytes:
+    """The session configuration for a process in ``enclave``, whose files it names by their path."""
     directory = f"{view.root}/{layout.enclave_directory(enclave)}"
     authorities = f"{directory}/{Role.IDENTITY.value}.cert.pem"
     files = TlsFiles(authorities, f"{directory}/{layout.CERT}", f"{directory}/{layout.KEY}")

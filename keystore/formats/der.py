@@ -77,6 +77,7 @@ def _elements(data: bytes, at: int, limit: int) -> list[Element]:
 
 
 def encode(tag: int, *parts: bytes) -> bytes:
+    """One element: ``tag``, the length in its shortest form, and the joined ``parts``."""
     content = b"".join(parts)
     size = len(content)
     if size < 0x80:
@@ -91,6 +92,7 @@ def integer(value: int) -> bytes:
 
 
 def object_identifier(dotted: str) -> bytes:
+    """The element for an OID such as ``2.5.4.3``."""
     first, second, *rest = (int(part) for part in dotted.split("."))
     return encode(OID, b"".join(_base128(arc) for arc in (40 * first + second, *rest)))
 

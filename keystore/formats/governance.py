@@ -87,6 +87,8 @@ class NoGovernanceRuleError(InvalidInputError):
 
 @dataclass(frozen=True, slots=True)
 class Governance:
+    """The rules of a governance document, at least one. Raises ``InvalidInputError`` for none."""
+
     domain_rules: tuple[DomainRule, ...] = (DomainRule(),)
 
     def __post_init__(self) -> None:

@@ -72,6 +72,7 @@ def governance_of(path: Path) -> Governance:
 
 
 def parse_governance_yaml(text: bytes, where: str) -> Governance:
+    """Read ``governance.yaml``. Raises ``InvalidInputError``, which begins with ``where``."""
     document = parse_strict(_Document, text, where)
     if document.version != 1:
         raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")

@@ -25,6 +25,7 @@ def guid_prefix(common_name: str) -> int:
 
 
 def half_of(common_name: str) -> Half:
+    """In which half the GUID prefix lies that a participant with this certificate must have."""
     return Half.HIGH if guid_prefix(common_name) & 1 << 46 else Half.LOW
 
 

@@ -54,6 +54,8 @@ class Needs(NamedTuple):
 
 
 class NodeNeeds(NamedTuple):
+    """What the named nodes need of the host they run on."""
+
     nodes: tuple[str, ...]
     needs: Needs
 

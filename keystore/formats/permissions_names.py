@@ -51,6 +51,7 @@ _FORMS: dict[Operation, tuple[Forms, Forms]] = {
 
 
 def has_wildcard(name: str) -> bool:
+    """Whether ``name`` holds a character that permissions read as a pattern."""
     return not _WILDCARDS.isdisjoint(name)
 
 

@@ -31,6 +31,8 @@ class Operation(str, Enum):
 
 
 class Qualifier(str, Enum):
+    """Whether a rule of an SROS2 policy grants or refuses."""
+
     __hash__ = str.__hash__
 
     ALLOW = "ALLOW"

@@ -68,6 +68,7 @@ def subject_name(cn: str) -> str:
 
 
 def scheme_of(cn: str) -> SubjectScheme:
+    """Which scheme a certificate's common name follows: SROS2's is the enclave's path."""
     return SubjectScheme.COMPATIBLE if cn.startswith("/") else SubjectScheme.EXACT
 
 

@@ -122,6 +122,7 @@ def parse_end(text: str, now: datetime) -> datetime:
 
 
 def utc_now() -> datetime:
+    """Now in UTC, in whole seconds as certificates count."""
     return datetime.now(timezone.utc).replace(microsecond=0)
 
 

@@ -30,6 +30,8 @@ if TYPE_CHECKING:
 
 
 class Curve(str, Enum):
+    """The elliptic curves of keys that are made here."""
+
     P256 = "P-256"
     P384 = "P-384"  # Fast DDS only: Cyclone DDS refuses EC keys that are not 256 bits
 
@@ -58,12 +60,14 @@ def authority_of(cert_pem: bytes, signer: Signer, place: str) -> Authority:
 
 
 def spki(key: PublicKey) -> bytes:
+    """DER of a public key (SubjectPublicKeyInfo, RFC 5280 section 4.1)."""
     from cryptography.hazmat.primitives import serialization
 
     return key.public_bytes(serialization.Encoding.DER, serialization.PublicFormat.SubjectPublicKeyInfo)
 
 
 def pem_certificate(der: bytes) -> bytes:
+    """A certificate in PEM (RFC 7468)."""
     text = binascii.b2a_base64(der, newline=False)
     lines = b"\n".join(text[at : at + 64] for at in range(0, len(text), 64))
     return b"-----BEGIN CERTIFICATE-----\n" + lines + b"\n-----END CERTIFICATE-----\n"
@@ -75,6 +79,7 @@ def default_ca_name(role: Role) -> str:
 
 
 def new_key(curve: Curve) -> FileSigner:
+    """A new private key on ``curve``, in memory."""
     from cryptography.hazmat.primitives.asymmetric import ec
 
     return FileSigner(ec.generate_private_key(ec.SECP256R1() if curve is Curve.P256 else ec.SECP384R1()))

@@ -34,6 +34,7 @@ def signed_bytes(payload: bytes, payload_type: str) -> bytes:
 
 
 def envelope_text(content: dict[str, Any]) -> str:
+    """An envelope as the JSON text that is written."""
     return json.dumps(content, indent=2) + "\n"
 
 

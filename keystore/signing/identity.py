@@ -29,6 +29,7 @@ class Identity:
 def new_identity(
     issuer: IdentityIssuer, common_name: str, validity: Validity, curve: Curve = Curve.P256
 ) -> Identity:
+    """A new key pair, and a certificate for it from ``issuer``."""
     signer = new_key(curve)
     return certify(issuer, common_name, signer.public_key(), validity, key_pem(signer))
 

@@ -60,6 +60,7 @@ class _RsaTokenKey(_TokenKey, rsa.RSAPrivateKey):
 
 
 def builder_key(signer: Signer) -> ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey:
+    """``signer`` in the shape of a private key, for the builders of ``cryptography``."""
     if isinstance(signer.public_key(), ec.EllipticCurvePublicKey):
         return _EcTokenKey(signer)
     return _RsaTokenKey(signer)

@@ -202,6 +202,7 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
 
 
 def authority_kind(made: Authority) -> str:
+    """Algorithm and size of a CA's key, in words for a report."""
     from keystore.signing.public_key import key_kind
 
     return key_kind(made.facts.public_key)
@@ -238,6 +239,8 @@ def _make_ca(
 
 
 def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
+    """What new CA keys are encrypted with; ``None``: they are not. Raises ``InvalidInputError`` without a
+    passphrase."""
     if encrypt and access.passphrase is None:
         raise InvalidInputError("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
     return access.passphrase if encrypt else None
@@ -381,6 +384,7 @@ def write_governance(opened: Store, document: bytes, permissions_ca: Authority, 
 
 
 def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
+    """``document`` signed by ``ca`` as S/MIME, the form that DDS-Security asks for."""
     return smime.sign(document, ca.facts, ca.signer, now)
 
 

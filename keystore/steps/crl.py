@@ -39,6 +39,7 @@ def can_revoke(view: KeystoreView) -> bool:
 
 
 def refuse_without_crl_sign(view: KeystoreView) -> None:
+    """Raises ``InvalidInputError`` when the identity CA may not sign a CRL."""
     if not can_revoke(view):
         raise InvalidInputError(
             "the identity CA may not sign CRLs (key usage lacks cRLSign), participants would refuse one; "

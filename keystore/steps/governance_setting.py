@@ -21,6 +21,8 @@ from keystore.steps.opening import opened_for_change
 
 @dataclass(frozen=True, slots=True)
 class GovernanceOptions:
+    """How ``set_governance`` signs, waits for the lock, and syncs to the disk."""
+
     access: CaAccess = field(default_factory=CaAccess)
     lock_timeout: float = lock.DEFAULT_TIMEOUT
     durable: bool = True

@@ -52,6 +52,8 @@ class RemoveOptions:
 
 @dataclass(frozen=True, slots=True)
 class RemoveReport:
+    """What a removal did."""
+
     removed: tuple[str, ...]
     revoked: int
     """How many certificates the CRL lists now."""

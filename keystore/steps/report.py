@@ -19,6 +19,8 @@ class EnclaveReport(NamedTuple):
 
 
 class ProvisionReport(NamedTuple):
+    """What one provisioning did, enclave by enclave."""
+
     keystore: Path
     created: tuple[str, ...]
     """What was done to the keystore itself, in words."""

@@ -48,6 +48,9 @@ from keystore.steps.zenoh_configuration import follow, options_of
 
 
 class Step(str, Enum):
+    """The three steps in which a CA is replaced without a stop: both trusted, the new one signs, the old one
+    goes."""
+
     START = "start"
     SWITCH = "switch"
     FINISH = "finish"

@@ -113,6 +113,7 @@ def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> l
 
 
 def options_of(options: ProvisionOptions) -> ZenohOptions:
+    """The part of ``options`` that concerns Zenoh's files."""
     return ZenohOptions(
         access=options.access, lock_timeout=options.lock_timeout, durable=options.durable,
         renew_within=options.renew_within, now=options.now,

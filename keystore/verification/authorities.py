@@ -36,6 +36,7 @@ def check_authorities(
     now: datetime,
     required: Governance | None = None,
 ) -> Iterator[Finding]:
+    """Findings about both CAs: certificates, keys, bundles, what is retired."""
     yield from check_deployed(view, register, now, required)
     for role in Role:
         yield from _check_key(view, role, access)
@@ -120,6 +121,7 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
 def check_governance(
     view: KeystoreView, register: Register | None = None, required: Governance | None = None
 ) -> Iterator[Finding]:
+    """Findings about the governance: signature, strength, whether it was signed last, and the XML beside it."""
     place = layout.GOVERNANCE
     again = repair.sign_governance(view.root)
     try:

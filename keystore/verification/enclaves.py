@@ -55,6 +55,7 @@ _WILDCARD = re.compile(r"[*?\[]")
 def check_enclaves(
     view: KeystoreView, register: Register | None, revoked: frozenset[int], now: datetime
 ) -> Iterator[Finding]:
+    """Findings about every enclave, and about what enclaves must not share."""
     names: dict[str, str] = {}
     serials: dict[int, str] = {}
     holders: dict[str, CertificateFacts] = {}

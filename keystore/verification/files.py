@@ -34,6 +34,7 @@ _UNFINISHED = (layout.STAGING, layout.INCOMING)
 
 
 def check_files(root: Path) -> Iterator[Finding]:
+    """Findings about owners, modes, links and strange files below ``root``."""
     names: list[str] = []
     yield from _check_owner(root, ".", os.lstat(root), private=False)
     for relative, info in _walk(root, ""):

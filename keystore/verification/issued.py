@@ -88,6 +88,7 @@ def check_published(view: KeystoreView, register: Register | None, now: datetime
 def check_governance_issued(
     view: KeystoreView, register: Register | None, document: bytes
 ) -> Iterator[Finding]:
+    """Finds a governance that was signed here once and is not the last one."""
     if register is not None and register.governance and document != register.governance:
         yield Finding(
             Severity.ERROR, "governance-not-last", layout.GOVERNANCE,
@@ -99,6 +100,7 @@ def check_governance_issued(
 def check_certificate_issued(
     view: KeystoreView, register: Register | None, enclave: str, facts: CertificateFacts
 ) -> Iterator[Finding]:
+    """Finds a certificate that the register does not know for ``enclave``, or that was replaced since."""
     if register is None:
         return
     place = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
@@ -118,6 +120,7 @@ def check_certificate_issued(
 def check_permissions_issued(
     view: KeystoreView, register: Register | None, enclave: str, document: bytes
 ) -> Iterator[Finding]:
+    """Finds permissions of ``enclave`` other than those that were signed last."""
     if register is None:
         return
     last = register.permissions(enclave)

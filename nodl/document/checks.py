@@ -16,10 +16,12 @@ Checker = Callable[[YamlValue, str], None]
 
 
 def fail(value: YamlValue, message: str) -> None:
+    """Raises ``InvalidNoDLDocumentError`` with the place of ``value``."""
     raise InvalidNoDLDocumentError.at(value.source, message)
 
 
 def text_of(pattern: str | None = None, meaning: str = "") -> Checker:
+    """Text, and if ``pattern`` is given, text in which it is found; ``meaning`` says in the error what that is."""
     compiled = re.compile(pattern) if pattern else None
 
     def check(value: YamlValue, what: str) -> None:
@@ -32,6 +34,8 @@ def text_of(pattern: str | None = None, meaning: str = "") -> Checker:
 
 
 def one_of(*allowed: str) -> Checker:
+    """One of the given words."""
+
     def check(value: YamlValue, what: str) -> None:
         if not isinstance(value, YamlScalar) or value.value not in allowed:
             fail(value, f"{what} must be one of {', '.join(allowed)}")
@@ -40,6 +44,8 @@ def one_of(*allowed: str) -> Checker:
 
 
 def integer(minimum: int, maximum: int | None = None) -> Checker:
+    """An integer within bounds."""
+
     def check(value: YamlValue, what: str) -> None:
         number = value.value if isinstance(value, YamlScalar) else None
         if isinstance(number, bool) or not isinstance(number, int):
@@ -52,11 +58,13 @@ def integer(minimum: int, maximum: int | None = None) -> Checker:
 
 
 def boolean(value: YamlValue, what: str) -> None:
+    """``true`` or ``false``."""
     if not isinstance(value, YamlScalar) or not isinstance(value.value, bool):
         fail(value, f"{what} must be true or false")
 
 
 def number(value: YamlValue, what: str) -> None:
+    """An integer or a float."""
     given = value.value if isinstance(value, YamlScalar) else None
     if isinstance(given, bool) or not isinstance(given, (int, float)):
         fail(value, f"{what} must be a number")
@@ -67,6 +75,8 @@ def anything(value: YamlValue, what: str) -> None:
 
 
 def list_of(item: Checker, length: int | None = None, minimum: int = 0) -> Checker:
+    """A list whose elements pass ``item``."""
+
     def check(value: YamlValue, what: str) -> None:
         if not isinstance(value, YamlList):
             fail(value, f"{what} must be a list")
@@ -127,5 +137,6 @@ def either(*checkers: Checker) -> Checker:
 
 
 def null(value: YamlValue, what: str) -> None:
+    """Nothing, as for a key that takes no argument."""
     if not isinstance(value, YamlScalar) or value.value is not None:
         fail(value, f"{what} takes no argument")

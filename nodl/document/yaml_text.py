@@ -34,6 +34,8 @@ class YamlScalar:
 
 @dataclass(frozen=True, slots=True)
 class YamlList:
+    """A sequence, and where it is written."""
+
     items: tuple[YamlValue, ...]
     source: SourceRef
 

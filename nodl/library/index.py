@@ -36,6 +36,8 @@ class IndexEntry(NamedTuple):
 
 
 def read_index(folder: str) -> tuple[IndexEntry, ...]:
+    """What the index file of a library folder lists. Raises ``OSError``, ``ValueError`` for JSON that does
+    not parse."""
     with open(os.path.join(folder, INDEX), encoding="utf-8") as stream:
         listed = json.load(stream)
     return tuple(
@@ -106,6 +108,7 @@ def _misplaced(folder: str, file: str) -> NoDLError:
 
 
 def write_index(folder: str) -> None:
+    """Write the index file of a library folder anew."""
     text = index_text(folder)
     with open(os.path.join(folder, INDEX), "w", encoding="utf-8") as stream:
         stream.write(text)

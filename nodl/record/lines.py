@@ -57,6 +57,8 @@ class NodeMade(NamedTuple):
 
 
 class NodeEnded(NamedTuple):
+    """A node was destroyed."""
+
     pid: int
     at: int
     node: int
@@ -104,6 +106,8 @@ class EndpointMade(NamedTuple):
 
 
 class Ended(NamedTuple):
+    """A process said that it ends."""
+
     pid: int
     at: int
 

@@ -55,6 +55,7 @@ def _permission(graph: Graph, use: Use) -> str:
 
 
 def findings(contents: ReportContents) -> str:
+    """What ``check`` found, the most severe first and what was accepted last."""
     if not contents.judged:
         return "<p>Nothing was found.</p>"
     ordered = sorted(contents.judged, key=lambda item: (item[1] is not None, item[0].severity))
@@ -80,6 +81,7 @@ def _finding(told: Told, accepted: str | None) -> str:
 
 
 def flows(contents: ReportContents) -> str:
+    """Who influences whom, and which ways exist only because nodes share an enclave."""
     parts = [
         table(
             "Which enclave can influence which",
@@ -104,6 +106,7 @@ def _influence(one: Influence) -> str:
 
 
 def statistics(contents: ReportContents) -> str:
+    """Counts of the plan, in the columns of table 2 of the LiSA4ROS2 paper."""
     rows = (
         row((one.column, one.meaning, str(one.all), str(one.system)), attributes=' class="numbers"')
         for one in contents.counts
@@ -116,6 +119,7 @@ def statistics(contents: ReportContents) -> str:
 
 
 def expiry(endings: Iterable[Ending] | None) -> str:
+    """When the certificates and documents of the keystore end; a hint where no keystore was given."""
     if endings is None:
         return "<p>No keystore was given (<code>--keystore DIR</code>).</p>"
     return table("What of the keystore ends when", ("ends", "days left", "what"), _endings(endings))

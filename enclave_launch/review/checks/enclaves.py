@@ -14,6 +14,7 @@ _NAMED = 3  # permissions that a node gains, by name; the rest is counted
 
 
 def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+    """Nodes with the same fully qualified name: ROS cannot tell them apart."""
     for name, count in sorted(Counter(node.fqn for node in plan.nodes).items()):
         if count > 1:
             text = f"{count} nodes are called {name}"
@@ -21,7 +22,7 @@ def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Tol
 
 
 def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
-    """Of those that planning did not tell of already."""
+    """Permissions whose name is a pattern, less those that planning has told of already."""
     told = " ".join(each.text for each in plan.told if each.code == "pattern-accepted")
     for enclave, grants in sorted(plan.enclaves.items()):
         for grant in sorted(grants):
@@ -35,6 +36,7 @@ def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]
 
 
 def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+    """Enclaves in which nodes gain permissions of others."""
     for split in splits(plan):
         gains = "; ".join(f"{node} gains {_some(grants)}" for node, grants in split.saved)
         yield finding(

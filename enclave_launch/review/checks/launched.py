@@ -90,6 +90,7 @@ def parameters(plan: PlanDocument, document: Document) -> Iterator[Told]:
 
 
 def security_variables(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """``ROS_SECURITY_*`` variables that the launch file sets itself."""
     for process in document["processes"]:
         for name, value in sorted(process["environment"].items()):
             if name.startswith("ROS_SECURITY_"):
@@ -103,6 +104,7 @@ def security_variables(plan: PlanDocument, document: Document) -> Iterator[Told]
 
 
 def secrets(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """Parameters with a text value whose name says that it is a secret; the value is not repeated."""
     for item in launched(document):
         for name, value in sorted(item["parameters"].items()):
             if _SECRET.search(_CAMEL.sub("_", name)) and isinstance(value, str) and value:

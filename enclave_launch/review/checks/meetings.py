@@ -97,6 +97,7 @@ def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
 
 
 def near_names(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """Two names of opposite ends that never meet and differ by a slip."""
     asked, users = _asked_for(plan), _users(document)
     for here, there in _PAIRS:
         lonely_here = asked.get(here, set()) - asked.get(there, set())
@@ -137,6 +138,7 @@ def _one_edit(one: str, two: str) -> bool:
 
 
 def types(plan: PlanDocument, document: Document) -> Iterator[Told]:
+    """One name under different interface types: those endpoints never match."""
     found: dict[tuple[str, str], dict[str, list[_User]]] = {}
     for (operation, name), users in _users(document).items():
         for user in users:
