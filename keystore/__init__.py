@@ -69,6 +69,8 @@ if TYPE_CHECKING:
     from keystore.steps.rollover import roll_over as roll_over
     from keystore.steps.sharing import LaunchShares as LaunchShares
     from keystore.steps.sharing import list_shares as list_shares
+    from keystore.steps.tool_enclaves import ToolEnclave as ToolEnclave
+    from keystore.steps.tool_enclaves import create_tool_enclave as create_tool_enclave
     from keystore.verification import Finding as Finding
     from keystore.verification import Requirements as Requirements
     from keystore.verification import Severity as Severity
@@ -87,6 +89,8 @@ _HOMES = {
     "LaunchHold": "disk.share_files",
     "LaunchShares": "steps.sharing",
     "list_shares": "steps.sharing",
+    "ToolEnclave": "steps.tool_enclaves",
+    "create_tool_enclave": "steps.tool_enclaves",
     "list_enclaves": "steps.enclaves",
     "KeystoreError": "errors",
     "PublicFiles": "steps.bundle",

@@ -50,7 +50,7 @@ def read_observed(path: Path) -> Observed:
             {str(guid): tuple(map(str, words)) for guid, words in document["commands"].items()},
             tuple(map(_start, document["starts"])),
         )
-    except (NotAGraph, ValueError, KeyError, TypeError, AttributeError) as error:
+    except (NotAGraph, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise ObservationError(f"{path} is not what secure-nodl observe --save wrote: {error}") from error
 
 

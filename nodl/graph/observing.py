@@ -16,6 +16,12 @@ INTERVAL = 0.1  # seconds between two looks: clients that call once and leave ar
 SOURCES = ("auto", "cyclonedds", "rclpy")
 
 
+_OF_RCLPY = (
+    "on a secured system it needs an enclave that ROS nodes can start in: secure-keystore tool-enclave KEYSTORE "
+    "--for list"
+)
+
+
 class Observer(Protocol):
     """What both have."""
 
@@ -60,7 +66,12 @@ def observer(where: Where, environment: Mapping[str, str]) -> Iterator[Observer]
         from nodl.graph.rclpy_graph import RclpyObserver
 
         with _ros_variables(where):
-            up = RclpyObserver()
+            try:
+                up = RclpyObserver()
+            except (
+                Exception
+            ) as error:  # a half installed ROS, a middleware that refuses: rclpy has no common class
+                raise ObserverError(f"rclpy cannot observe the domain: {error}; {_OF_RCLPY}") from error
     else:
         up = CycloneObserver(where.domain_id, environment, where.enclave_directory)
     try:

@@ -8,6 +8,7 @@ by the identifiers of what their nodes publish. It does not tell processes. Sour
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
@@ -17,7 +18,8 @@ from nodl.graph.seen import SeenEndpoint, SeenParticipant
 from nodl.names import join
 from nodl.node_interface import EndpointKind
 
-_NAME = "enclave_launch_observer"
+_NAME = f"_ros2cli_observer_{os.getpid()}"
+"""Hidden, and what the enclave of ``secure-keystore tool-enclave --for list`` may call itself."""
 _GUID = 16
 _NO_DURATION = (0, 9223372036854775807)  # unspecified, and rmw's infinite
 

@@ -35,8 +35,13 @@ from keystore.verification.contents import holds_private_key, mime_problem
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2
 from nodl.errors import InvalidNoDLError
+from nodl.graph.discovery_info import decode as decode_discovery_info
+from nodl.graph.json_form import NotAGraph, graph_document
+from nodl.graph.json_form import graph_from_document as observed_from
 from nodl.record.lines import read_lines
 from nodl.remap import InvalidRemapRuleError, parse_rule
+from tests.graph.made import one_node
+from tests.graph.test_discovery_info import encoded
 
 FIXTURES = Path(__file__).parents[2] / "fixtures/demo_ws/share/demo_nodes"
 GOLDEN = Path(__file__).parents[1] / "keystore/golden_permissions"
@@ -66,6 +71,10 @@ def template(data: str) -> None:
 
 def words(*listed: str) -> tuple[bytes, ...]:
     return tuple(word.encode() for word in listed)
+
+
+def observed_document() -> dict[str, object]:
+    return graph_document(one_node("/a/b", "writer rt/x a::msg::dds_::B_"))
 
 
 XML = words(
@@ -245,6 +254,18 @@ def targets() -> dict[str, Target]:
             lambda data: parse_shares(data, "shares.json"),
             refused,
             (b"{}", b'{"version": 1, "shares": []}'),
+            words("[", "]", "{", "}", "null", "true", '"', "1e999", ","),
+        ),
+        "discovery-info": Target(
+            decode_discovery_info,
+            (),
+            (encoded(bytes(16), [("/a/b", [bytes(16)], [])], 16), encoded(bytes(16), [], 24)),
+            (b"\0\1\0\0", bytes(8), b"\xff\xff\xff\xff"),
+        ),
+        "observed-graph": Target(
+            lambda data: observed_from(json.loads(data)),
+            (NotAGraph, ValueError),
+            (json.dumps(observed_document()).encode(),),
             words("[", "]", "{", "}", "null", "true", '"', "1e999", ","),
         ),
         "domains": Target(text(Domains.parse), refused, (b"0-10,42", b"all"), words("-", ",", "9")),
