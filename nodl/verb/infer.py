@@ -38,6 +38,11 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
     parser.add_argument(
         "--accept-patterns", action="store_true", help="allow names known in part as patterns in a policy"
     )
+    parser.add_argument(
+        "--compare",
+        action="store_true",
+        help="say what installed manifests lack of that which the sources make; 1: something is missing",
+    )
     add_prefix_argument(parser)
     parser.set_defaults(run=run)
 
@@ -51,6 +56,8 @@ def run(args: argparse.Namespace) -> int:
     except LookupError as error:
         print(f"secure-nodl infer: error: {error.args[0]}", file=sys.stderr)
         return 2
+    if args.compare:
+        return _compare(system, search_prefixes(args.prefix))
     from nodl.infer.report.expanded import expand
 
     expanded = expand(system)
@@ -83,6 +90,30 @@ def _tell_guesses(system: InferredSystem) -> None:
                 f"note: which executable runs node {node.name} is not known; the manifest says {node.name!r}"
             )
             print(printable(f"{text}: correct it if that is not its name ({node.source})"), file=sys.stderr)
+
+
+def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
+    """Each program of ``system`` beside its manifest. 1: a manifest lacks something, or none was found."""
+    from nodl.infer.report.comparison import lacking, to_text
+    from nodl.lookup import ManifestLookup
+
+    lookup = ManifestLookup(prefixes)
+    programs: dict[tuple[str, str | None, str | None], list[NodeInterface]] = {}
+    for node in system.nodes:
+        if node.package and (node.executable or node.plugin):
+            programs.setdefault((node.package, node.executable, node.plugin), []).append(node)
+    described, complete = 0, True
+    for (package, executable, plugin), nodes in sorted(programs.items(), key=str):
+        name = f"{package}/{executable or plugin}"
+        by_executable = lookup.find(package, executable=executable) if executable else None
+        manifest = by_executable or lookup.find(package, plugin=plugin or executable)
+        if not manifest:
+            print(printable(f"{name}: no manifest; looked at {', '.join(manifest.searched)}"))
+            continue
+        found = lacking(manifest.found, nodes)
+        sys.stdout.write(_encodable(to_text(name, found)))
+        described, complete = described + 1, complete and not found.endpoints
+    return 0 if described and complete else 1
 
 
 def _documents(
