@@ -41,26 +41,38 @@ _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, _CREATING_NAMES))))
 _ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
 
 
-def may_make_interfaces(program: Program, module: SourceModule) -> bool:
-    """Whether running this file could: it says so, runs code that is not in it, or imports other files of the program.
+def may_make_interfaces(program: Program, main: SourceModule) -> bool:
+    """Whether running this file could: it, or a file of the program that it imports, says so or runs other code.
 
     A file that cannot be parsed could do anything.
     """
-    if module.error or _CREATING_TEXT.search(module.text) or _ELSEWHERE.search(module.text):
-        return True
-    beside = module.path.rpartition("/")[0]
-    return any(program.find(name, beside) for name in _imported(module))
+    beside = main.path.rpartition("/")[0]
+    found = {main.path: main}
+    left = [main]
+    while left:
+        module = left.pop()
+        if module.error or _CREATING_TEXT.search(module.text) or _ELSEWHERE.search(module.text):
+            return True
+        for name in dict.fromkeys(_imported(module)):
+            path = program.find(name, beside) or program.find(name, module.path.rpartition("/")[0])
+            if path is not None and path not in found:
+                found[path] = program.load(path, name)
+                left.append(found[path])
+    return False
 
 
 def _imported(module: SourceModule) -> Iterator[str]:
+    """The modules that import statements may mean, with the packages around them."""
     for node in ast.walk(module.tree):
+        names: list[str] = []
         if isinstance(node, ast.Import):
-            yield from (alias.name.partition(".")[0] for alias in node.names)
-            yield from (alias.name for alias in node.names)
+            names = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             package = absolute_name(node, module)
-            yield from (package, *(f"{package}.{alias.name}" for alias in node.names))
-            yield package.partition(".")[0]
+            names = [package, *(f"{package}.{alias.name}" for alias in node.names)]
+        for name in names:
+            steps = name.split(".")
+            yield from (".".join(steps[:count]) for count in range(1, len(steps) + 1))
 
 
 def unsettled_places(

@@ -148,7 +148,10 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     run.execute(node.body, body)
     run.classes.setdefault(node, cls)
     if any(isinstance(base, External) and base.path == "typing.NamedTuple" for base in bases):
+        from nodl.infer.models import named_tuples
+
         cls.fields = _fields(run, cls, frame)
+        named_tuples.complete(run, cls, node, frame)
     complete_class(run, cls, keywords, node, frame)
     value: Value = (cls,)
     for decorator in reversed(node.decorator_list):

@@ -241,6 +241,7 @@ class Run:
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.decisions: Decisions | None = None
+        self.templates: dict[object, ast.ClassDef] = {}  # classes that a library writes for the program
         self.shares: dict[str, None] = {}  # share directories that the program asked for by a known name
         self.environment = FieldCells()  # variables that the program sets itself
         self.memo: dict[tuple[object, ...], tuple[tuple[int, ...], Value]] = {}

@@ -14,7 +14,7 @@ from nodl.infer.interpreter.assign import plain_store
 from nodl.infer.interpreter.iterate import lose
 from nodl.infer.interpreter.raising import is_builtin_exception
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.models import builtin, concrete, endpoints, files, native, pure, ros, stdlib
+from nodl.infer.models import builtin, concrete, endpoints, files, named_tuples, native, pure, ros, stdlib
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
 from nodl.infer.values import (
@@ -35,7 +35,7 @@ from nodl.infer.values import (
     unknown,
 )
 
-_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS, **files.FUNCTIONS}
+_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS, **files.FUNCTIONS, **named_tuples.FUNCTIONS}
 NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 
 # Libraries that create no endpoints on a node they are given, keep their hands off names and off the program's

@@ -225,10 +225,6 @@ def _default_dict(run: Run, call: Call) -> Value:
     return (obj,)
 
 
-def _named_tuple(run: Run, call: Call) -> Value:
-    return unknown("the class made by namedtuple()")
-
-
 def _simple_namespace(run: Run, call: Call) -> Value:
     instance = _library_instance(run, call, "types.SimpleNamespace")
     for name, value in call.args.keywords.items():
@@ -341,7 +337,6 @@ FUNCTIONS: dict[str, Model] = {
     "collections.defaultdict": _default_dict,
     "collections.OrderedDict": builtin.FUNCTIONS["builtins.dict"],
     "collections.deque": builtin.FUNCTIONS["builtins.list"],
-    "collections.namedtuple": _named_tuple,
     "types.SimpleNamespace": _simple_namespace,
     "copy.copy": _copy,
     "copy.deepcopy": _copy,
@@ -391,6 +386,7 @@ HOOKS: dict[str, frozenset[str]] = {
     "enum.Flag": frozenset(),
     "abc.ABC": frozenset(),
     "typing.NamedTuple": frozenset(),
+    "builtins.tuple": frozenset(),
     "typing.Generic": frozenset(),
     "typing.Protocol": frozenset(),
     "threading.Thread": frozenset({"run"}),
