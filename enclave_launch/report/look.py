@@ -12,6 +12,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple, TextIO
 
+from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.diagnostics import Diagnostic
 
@@ -86,7 +87,7 @@ class Look(NamedTuple):
         return [*lines, *(line for more in later for line in self.wrapped(more.strip(), "    ", "    "))]
 
     def _shortened(self, text: str) -> str:
-        return text.replace(self.folder, "") if self.folder else text
+        return short_paths(text, self.folder)
 
 
 def _by_code(diagnostics: Iterable[Diagnostic]) -> list[list[Diagnostic]]:

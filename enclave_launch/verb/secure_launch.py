@@ -10,6 +10,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
+from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import message, printable, safe_output, write_coloured
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
@@ -205,7 +206,7 @@ def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | Non
         _warn((f"problems: {len(plan.problems)}, warnings: {len(plan.warnings)}; --dry-run shows them",))
     elif options.format == "policy" or options.dump_params:  # the JSON holds them
         _warn(told)
-    sys.stdout.write(_with_short_paths(text) if options.explain else text)
+    sys.stdout.write(short_paths(text, os.getcwd()) if options.explain else text)
     gc.freeze()  # the process ends now: no last search for garbage among all that was read
     return 0
 
@@ -218,11 +219,6 @@ def _show_tree(plan: LaunchPlan, options: argparse.Namespace) -> int:
     write_coloured(plan_tree(shown, look_for(sys.stdout, os.environ, verbose=options.verbose)), sys.stdout)
     gc.freeze()  # as in show_plan
     return 0
-
-
-def _with_short_paths(text: str) -> str:
-    """Files below the working directory by the name a person would type."""
-    return text.replace(os.path.join(os.getcwd(), ""), "")
 
 
 def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | None) -> str:
