@@ -16,8 +16,8 @@ from enclave_launch.boundary.terminal import message
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
+from enclave_launch.runtime.live_launch import LiveLaunch, RunOptions, run_launch, run_launch_async
 from enclave_launch.runtime.run_events import Observer
-from enclave_launch.runtime.service import LaunchService, RunOptions, run_launch, run_launch_async
 
 if TYPE_CHECKING:
     from enclave_launch.options import RunSettings
@@ -60,9 +60,9 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     gate, options = _gate(launch, settings), _options(launch, settings)
     _check_programs(launch)
 
-    async def main(observe: Observer, hold: Callable[[LaunchService], None]) -> int:
+    async def main(observe: Observer, hold: Callable[[LiveLaunch], None]) -> int:
         with _expiry_watch(launch), _zenoh_router(launch):
-            service = LaunchService(
+            service = LiveLaunch(
                 source.launch_file, source.arguments, gate=gate, options=options, observe=observe
             )
             hold(service)

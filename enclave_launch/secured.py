@@ -18,7 +18,7 @@ from enclave_launch.diagnostics import Diagnostic, enclave_of_several_launches, 
 from enclave_launch.errors import ProvisionError, RuntimeFailure
 from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, uses_zenoh
 from enclave_launch.process import ResolvedProcess
-from enclave_launch.runtime.gate import Grant, identity
+from enclave_launch.runtime.gate import StartAdditions, identity
 from enclave_launch.security_environment import (
     OVERRIDE,
     SecuritySettings,
@@ -202,7 +202,7 @@ class PlanProvider:
         """What came late may be in another domain."""
         self._options = with_domains(self._plan, self._launch.asked, os.environ)
 
-    def granted(self, process: ResolvedProcess) -> Grant | None:
+    def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         """The grant, if the plan has the process and its enclave is the one provisioned (a few file reads)."""
         if self._find(process) is None:
             return None
@@ -211,7 +211,7 @@ class PlanProvider:
         except ProvisionError:
             return None  # ``ensure`` says why, where it may take its time
 
-    def ensure(self, process: ResolvedProcess) -> Grant:
+    def ensure(self, process: ResolvedProcess) -> StartAdditions:
         """Raises ``ProvisionError`` when its enclave is no longer what was provisioned."""
         planned = self._find(process)
         assert planned is not None, "the gate lets only planned processes come here"
@@ -224,7 +224,7 @@ class PlanProvider:
         key = identity(process)
         return self._by_name.get((process.process_name, key)) or self._by_identity.get(key)
 
-    def ensure_late(self, process: ResolvedProcess) -> Grant:
+    def ensure_late(self, process: ResolvedProcess) -> StartAdditions:
         """Extend the plan by ``process`` and provision that; what the plan has already is only held against it.
 
         Raises ``ProvisionError`` when its interfaces are not known, or its enclave is no longer what was provisioned.
@@ -259,7 +259,7 @@ class PlanProvider:
         _, _, zenoh = provision_with_zenoh(self._launch.settings, self._plan, self._options)
         zenoh_router(self._launch._replace(zenoh=zenoh), lambda _: None).wait()
 
-    def launcher(self) -> Grant | None:
+    def launcher(self) -> StartAdditions | None:
         launcher, settings = self._plan.launcher, self._launch.settings
         if launcher is None:
             return None
@@ -267,7 +267,7 @@ class PlanProvider:
         variables = dict(launcher_environment(settings))
         if middleware_of(os.environ, self._plan.distro) == ZENOH:
             variables |= zenoh_environment(launcher.enclave, settings)
-        return Grant(("--enclave", launcher.enclave), variables)
+        return StartAdditions(("--enclave", launcher.enclave), variables)
 
     def _check(self, policy: EnclavePolicy) -> None:
         """Nothing is repaired here: what changed since it was signed was changed by somebody else."""
@@ -290,8 +290,8 @@ class PlanProvider:
                 f"{'; '.join(wrong)}. Find out who changed it; a new launch provisions it again"
             )
 
-    def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> Grant:
+    def _grant(self, planned: PlannedProcess, environment: Mapping[str, str]) -> StartAdditions:
         variables = dict(secured_environment(planned, self._launch.settings))
         if planned.enclave is not None and (OVERRIDE in environment or OVERRIDE in os.environ):
             variables[OVERRIDE] = planned.enclave.path
-        return Grant(enclave_arguments(planned), variables)
+        return StartAdditions(enclave_arguments(planned), variables)

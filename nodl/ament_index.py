@@ -44,7 +44,7 @@ class PackageNotFoundError(KeyError):
         return str(self.args[0])  # a KeyError would show the repr
 
 
-class ExecutableNotFoundError(LookupError):
+class ExecutableNotInstalledError(LookupError):
     """The package is installed, but not this executable of it; ``folder`` is where its executables would be."""
 
     def __init__(self, message: str, executable: str = "", folder: str = ""):
@@ -153,19 +153,19 @@ def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> s
     """The file ``<prefix>/lib/<package>/<executable>``.
 
     ``executable`` with a slash is taken as a path, as upstream's ``which`` does. Raises as
-    ``package_prefix``, and ``ExecutableNotFoundError`` in the words of ``exec-in-pkg``.
+    ``package_prefix``, and ``ExecutableNotInstalledError`` in the words of ``exec-in-pkg``.
     """
     prefix = package_prefix(package, prefixes)
     folder = os.path.join(prefix, "lib", package)
     if not os.path.exists(folder):
-        raise ExecutableNotFoundError(
+        raise ExecutableNotInstalledError(
             f"package '{package}' found at '{prefix}', but libexec directory '{folder}' does not exist",
             executable,
             folder,
         )
     found = shutil.which(executable, path=folder)
     if found is None:
-        raise ExecutableNotFoundError(
+        raise ExecutableNotInstalledError(
             f"executable '{executable}' not found on the libexec directory '{folder}' ", executable, folder
         )
     return found

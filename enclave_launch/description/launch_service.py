@@ -13,7 +13,7 @@ from enclave_launch.description.launch_description import LaunchDescription
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event
-    from enclave_launch.runtime.service import LaunchService as Runtime
+    from enclave_launch.runtime.live_launch import LiveLaunch
 
 
 class LaunchService:
@@ -30,7 +30,7 @@ class LaunchService:
         self.__debug = debug
         self.__description = LaunchDescription()
         self.__context = LaunchContext(argv=self.__argv, noninteractive=noninteractive)
-        self.__running: Runtime | None = None
+        self.__running: LiveLaunch | None = None
 
     @property
     def context(self) -> LaunchContext:
@@ -59,12 +59,11 @@ class LaunchService:
             self.__running.shut_down("LaunchService.shutdown() called")
 
     async def __run(self, shutdown_when_idle: bool, *, handle_interrupt: bool) -> int:
-        from enclave_launch.runtime.service import LaunchService as Runtime
-        from enclave_launch.runtime.service import RunOptions
+        from enclave_launch.runtime.live_launch import LiveLaunch, RunOptions
 
         description = self.__description
 
-        class InMemory(Runtime):
+        class InMemory(LiveLaunch):
             """The runtime, launching a description instead of a file."""
 
             def description(self) -> LaunchDescription:
@@ -82,7 +81,7 @@ class LaunchService:
             self.__running = None
 
     @staticmethod
-    async def __run_with_signals(service: Runtime) -> int:
+    async def __run_with_signals(service: LiveLaunch) -> int:
         import asyncio
         from signal import SIGINT, SIGTERM
 

@@ -22,7 +22,12 @@ from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
 from enclave_launch.description.watched_configurations import WatchedConfigurations
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.host.protocol import MISSING_PREFIX
-from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executables, installed_packages
+from nodl.ament_index import (
+    ExecutableNotInstalledError,
+    PackageNotFoundError,
+    executables,
+    installed_packages,
+)
 
 _OWN_PACKAGES = ("enclave_launch", "nodl", "keystore", "boundary")
 
@@ -89,8 +94,8 @@ def _next_step(error: BaseException, text: str) -> str:
             "\nsource its workspace (AMENT_PREFIX_PATH) or name the install prefix with --prefix; "
             "--allow-missing-packages goes on without it, for looking only"
         )
-    if isinstance(error.__cause__ or error, ExecutableNotFoundError):
-        missing = cast("ExecutableNotFoundError", error.__cause__ or error)
+    if isinstance(error.__cause__ or error, ExecutableNotInstalledError):
+        missing = cast("ExecutableNotInstalledError", error.__cause__ or error)
         return did_you_mean(missing.executable, executables(missing.folder))
     if unknown := _UNKNOWN_WORD.match(text):
         known = (

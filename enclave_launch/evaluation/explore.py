@@ -15,7 +15,7 @@ from enclave_launch.description.events.event import Shutdown, TimerEvent
 from enclave_launch.description.events.process import ProcessStarted, process_event_arguments
 from enclave_launch.description.location import location_of, place_of
 from enclave_launch.process import Reaction, Unforeseeable
-from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError
+from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event
@@ -152,7 +152,7 @@ class Explorer:
             self._context._set_is_shutdown(False)
             self._suppose(known, new_from)
         except Exception as error:
-            if isinstance(_root(error), (PackageNotFoundError, ExecutableNotFoundError)):
+            if isinstance(_root(error), (PackageNotFoundError, ExecutableNotInstalledError)):
                 raise
             self._note_failure(event, error)
         finally:

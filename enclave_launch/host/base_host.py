@@ -85,7 +85,7 @@ class BaseHost:
             return os.path.join(prefix, "lib", package, executable)
         try:
             return ament_index.executable_path(package, executable, [prefix])
-        except ament_index.ExecutableNotFoundError:
+        except ament_index.ExecutableNotInstalledError:
             if not self.allow_missing_packages:
                 raise
         placeholder = os.path.join(MISSING_PREFIX, package, "lib", package, os.path.basename(executable))

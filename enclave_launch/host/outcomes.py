@@ -201,13 +201,13 @@ def _say(records: Iterable[logging.LogRecord]) -> None:
 def _listener(hear: Callable[[logging.LogRecord], None]) -> logging.Handler:
     import logging
 
-    class Listener(logging.Handler):
+    class LogKeeper(logging.Handler):
         """Keeps records for later, and keeps them off the screen now."""
 
         def emit(self, record: logging.LogRecord) -> None:
             hear(record)
 
-    return Listener()
+    return LogKeeper()
 
 
 class Effects(NamedTuple):

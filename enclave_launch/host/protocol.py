@@ -82,7 +82,7 @@ class Host(Protocol):
 
     def find_executable(self, package: str, executable: str) -> str:
         """The file in the package's libexec directory. Raises as ``find_package_prefix``, and
-        ``ament_index.ExecutableNotFoundError``."""
+        ``ament_index.ExecutableNotInstalledError``."""
 
     def is_missing(self, path: str) -> bool:
         """Is ``path`` inside the placeholder of a package that is not installed?"""

@@ -20,7 +20,7 @@ _CLEANERS = frozenset({"sudo", "doas", "pkexec"})
 _LARGEST_TABLE = 1 << 20
 
 
-class Program(NamedTuple):
+class ProgramToRecord(NamedTuple):
     """``obstacle``: why it cannot be recorded, empty if it can; ``sanitizer``: a runtime that must be loaded first."""
 
     path: str
@@ -28,23 +28,23 @@ class Program(NamedTuple):
     sanitizer: str | None = None
 
 
-def look_at_command(words: Sequence[str], search_path: str = os.defpath) -> Program:
+def look_at_command(words: Sequence[str], search_path: str = os.defpath) -> ProgramToRecord:
     """The first program of a command line that stands in the way, else the last one that is run."""
     programs = list(_programs(words, search_path))
     hindered = next((program for program in programs if program.obstacle), None)
     if hindered is not None:
         return hindered
     sanitized = next((program for program in programs if program.sanitizer), None)
-    return sanitized or (programs[-1] if programs else Program(""))
+    return sanitized or (programs[-1] if programs else ProgramToRecord(""))
 
 
-def _programs(words: Sequence[str], search_path: str) -> Iterator[Program]:
+def _programs(words: Sequence[str], search_path: str) -> Iterator[ProgramToRecord]:
     for place, word in enumerate(words):
         name = os.path.basename(word)
         if name in _CLEANERS and place == 0:
-            yield Program(word, f"{name} starts programs with an environment of its own")
+            yield ProgramToRecord(word, f"{name} starts programs with an environment of its own")
         elif name == "env" and set(words[place + 1 : place + 2]) & {"-i", "-", "--ignore-environment"}:
-            yield Program(word, "env -i starts programs with an empty environment")
+            yield ProgramToRecord(word, "env -i starts programs with an empty environment")
         elif place == 0 or os.path.isabs(word):
             path = shutil.which(word, path=search_path)
             if path is not None:
@@ -60,27 +60,31 @@ def _state(path: str) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=1024)
-def _looked_at(path: str, state: tuple[int, int]) -> Program:
+def _looked_at(path: str, state: tuple[int, int]) -> ProgramToRecord:
     """Launches start one program many times; ``state`` changes with the file."""
     return look_at_program(path)
 
 
-def look_at_program(path: str, depth: int = 0) -> Program:
+def look_at_program(path: str, depth: int = 0) -> ProgramToRecord:
     """What the head of the file says; a script is what its interpreter is."""
     try:
         with open(path, "rb") as file:
             status = os.fstat(file.fileno())
             if not stat.S_ISREG(status.st_mode):
-                return Program(path)
+                return ProgramToRecord(path)
             head = file.read(256)
             if head[:2] == b"#!":
                 interpreter = head[2:].split(b"\n")[0].split()[:1]
                 deeper = depth < 4 and interpreter
-                return look_at_program(os.fsdecode(interpreter[0]), depth + 1) if deeper else Program(path)
+                return (
+                    look_at_program(os.fsdecode(interpreter[0]), depth + 1)
+                    if deeper
+                    else ProgramToRecord(path)
+                )
             gains = _gains_privileges(path, status)
-            return Program(path, gains) if gains else _elf(path, head, file)
+            return ProgramToRecord(path, gains) if gains else _elf(path, head, file)
     except OSError:
-        return Program(path)  # its start will say so
+        return ProgramToRecord(path)  # its start will say so
 
 
 def _gains_privileges(path: str, status: os.stat_result) -> str:
@@ -97,20 +101,22 @@ def _gains_privileges(path: str, status: os.stat_result) -> str:
     return f"{path} has file capabilities: the dynamic linker ignores LD_PRELOAD for it"
 
 
-def _elf(path: str, head: bytes, file: BinaryIO) -> Program:
+def _elf(path: str, head: bytes, file: BinaryIO) -> ProgramToRecord:
     if head[:4] != b"\x7fELF":
-        return Program(path)
+        return ProgramToRecord(path)
     wide, little = head[4] == 2, head[5] == 1
     if wide != (struct.calcsize("P") == 8):
-        return Program(path, f"{path} is a program of another word size than the recorder")
+        return ProgramToRecord(path, f"{path} is a program of another word size than the recorder")
     try:
         segments = _segments(head, file, wide, "<" if little else ">")
         if not any(kind == _INTERPRETER for kind, *_ in segments):
-            return Program(path, f"{path} is linked statically: nothing can be loaded into it")
+            return ProgramToRecord(path, f"{path} is linked statically: nothing can be loaded into it")
         needed = _needed(file, segments, wide, "<" if little else ">")
     except (struct.error, ValueError):
-        return Program(path)
-    return Program(path, sanitizer=next((name for name in needed if name.startswith("libasan.so")), None))
+        return ProgramToRecord(path)
+    return ProgramToRecord(
+        path, sanitizer=next((name for name in needed if name.startswith("libasan.so")), None)
+    )
 
 
 _Segment = tuple[int, int, int, int]  # type, offset in the file, address, size in the file

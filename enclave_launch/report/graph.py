@@ -30,7 +30,7 @@ NO_ENCLAVE = ""
 """The group of programs that run without an enclave."""
 
 
-class Reason(NamedTuple):
+class UseReason(NamedTuple):
     """Why a permission is there. ``place``: file and line of the description, or a row of a table."""
 
     place: str
@@ -78,7 +78,7 @@ class Use(NamedTuple):
     enclave: str
     channel: int
     operation: Operation
-    reasons: tuple[Reason, ...]
+    reasons: tuple[UseReason, ...]
 
     @property
     def built_in(self) -> bool:
@@ -101,7 +101,7 @@ _Key = tuple[str, "int | None", Operation, str]
 def plan_graph(document: Mapping[str, Any], root: str = "") -> Graph:
     """Of the dry run's JSON; files below ``root`` get the names that a person there would type."""
     members = tuple(sorted(_members(document, root)))
-    reasons: dict[_Key, list[Reason]] = dict(_reasons(document, members, root))
+    reasons: dict[_Key, list[UseReason]] = dict(_reasons(document, members, root))
     asked = {(enclave, operation, name) for enclave, _, operation, name in reasons}
     for enclave, operation, name in _granted(document):
         if (enclave, operation, name) not in asked:
@@ -115,7 +115,7 @@ def plan_graph(document: Mapping[str, Any], root: str = "") -> Graph:
     return Graph(tuple(sorted(document["enclaves"])), members, channels, uses)
 
 
-def _order(item: tuple[_Key, list[Reason]]) -> tuple[str, int, int, str]:
+def _order(item: tuple[_Key, list[UseReason]]) -> tuple[str, int, int, str]:
     enclave, member, operation, name = item[0]
     return enclave, -1 if member is None else member, OPERATIONS.index(operation), name
 
@@ -155,21 +155,21 @@ def _place(item: Mapping[str, Any], root: str) -> str:
 
 def _reasons(
     document: Mapping[str, Any], members: tuple[Member, ...], root: str
-) -> Iterator[tuple[_Key, list[Reason]]]:
+) -> Iterator[tuple[_Key, list[UseReason]]]:
     number_of = {
         (member.enclave, member.name): number for number, member in enumerate(members) if member.known
     }
     for node in document["nodes"]:
-        found: dict[_Key, list[Reason]] = {}
+        found: dict[_Key, list[UseReason]] = {}
         for item in node["interfaces"]:
             key = (node["enclave"], number_of[node["enclave"], node["fqn"]], item["operation"], item["name"])
             found.setdefault(key, []).append(_reason(item, root))
         yield from found.items()
 
 
-def _reason(item: Mapping[str, Any], root: str) -> Reason:
+def _reason(item: Mapping[str, Any], root: str) -> UseReason:
     rules = (rule.rpartition(" at ") for rule in item["remapped_by"])
-    return Reason(
+    return UseReason(
         short_path(item["place"], root),
         item["written"],
         tuple(f"{rule}{at}{short_path(origin, root)}" for rule, at, origin in rules),
@@ -186,7 +186,7 @@ def _granted(document: Mapping[str, Any]) -> Iterator[tuple[str, Operation, str]
                 yield path, operation, name
 
 
-def _channels(reasons: Mapping[_Key, list[Reason]]) -> tuple[Channel, ...]:
+def _channels(reasons: Mapping[_Key, list[UseReason]]) -> tuple[Channel, ...]:
     types: dict[tuple[Kind, str], set[str]] = {}
     for (_, _, operation, name), why in reasons.items():
         types.setdefault((KIND_OF[operation], name), set()).update(

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from enclave_launch.report.graph import Reason
+from enclave_launch.report.graph import UseReason
 
 
-def evidence_text(reason: Reason) -> str:
+def evidence_text(reason: UseReason) -> str:
     """``talker.nodl.xml:4; written chatter; remapped by chatter:=conversation at f.launch.xml:7``."""
     parts = [reason.place]
     if reason.written:

@@ -14,16 +14,16 @@ from enclave_launch.errors import ProvisionError
 from enclave_launch.policy.launcher import LAUNCHER_NODE
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.ros2.context import KEY
-from enclave_launch.runtime.gate import Grant, PlannedGate
+from enclave_launch.runtime.gate import PlannedGate, StartAdditions
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 
 
 class Doorkeeper(Protocol):
     """Decides about one process; a container may load components at once."""
 
-    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> Grant: ...
+    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> StartAdditions: ...
 
-    def launcher(self) -> Grant | None: ...
+    def launcher(self) -> StartAdditions | None: ...
 
 
 @dataclass(frozen=True)
@@ -32,10 +32,10 @@ class PlannedDoor:
 
     gate: PlannedGate
 
-    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> Grant:
+    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> StartAdditions:
         return self.gate.ensure(process)
 
-    def launcher(self) -> Grant | None:
+    def launcher(self) -> StartAdditions | None:
         return self.gate.launcher()
 
 
@@ -47,13 +47,13 @@ class OpenDoor:
     def __init__(self, launch: ProvisionedLaunch) -> None:
         self._provider = PlanProvider(launch)
 
-    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> Grant:
+    def admit(self, process: ResolvedProcess, *, loads_components: bool) -> StartAdditions:
         """:raises ProvisionError: no manifest, or something to load that only a plan could have permitted."""
         if loads_components:
             raise ProvisionError(f"{process.location}: {process.fqn} loads components; {_NEEDS_PLAN}")
         return self._provider.ensure_late(process)
 
-    def launcher(self) -> Grant | None:
+    def launcher(self) -> StartAdditions | None:
         return None
 
 
@@ -72,7 +72,7 @@ class EnclaveSession:
             OnShutdown(on_shutdown=lambda *_: context.locals.ros_adapter.shutdown_if_running())
         )
 
-    def enter(self, process: ResolvedProcess, *, loads_components: bool = False) -> Grant:
+    def enter(self, process: ResolvedProcess, *, loads_components: bool = False) -> StartAdditions:
         """:raises EnclaveLaunchError: not foreseen in the plan, or its enclave cannot be completed."""
         return self._door.admit(process, loads_components=loads_components)
 
@@ -96,7 +96,7 @@ class _NoAdapter:
         """Nothing ever runs."""
 
 
-def _adapter(grant: Grant | None) -> Any:
+def _adapter(grant: StartAdditions | None) -> Any:
     """What launch_ros keeps as ``ros_adapter`` (launch_ros/ros_adapters.py); started when it is first
     asked for.
     """

@@ -17,10 +17,8 @@ from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.runtime.difference import compared, compared_component
 
 
-class Grant(NamedTuple):
-    """What a process gets for its enclave: ``arguments`` end its command line, ``environment`` is laid
-    over.
-    """
+class StartAdditions(NamedTuple):
+    """What a process gets for its enclave: ``arguments`` end its command line, ``environment`` is laid over."""
 
     arguments: tuple[str, ...] = ()
     environment: Mapping[str, str] = MappingProxyType({})
@@ -29,10 +27,10 @@ class Grant(NamedTuple):
 class EnclaveGate(Protocol):
     """Asked before every start, one call at a time: ``granted`` first, else ``ensure`` in a worker thread."""
 
-    def granted(self, process: ResolvedProcess) -> Grant | None:
+    def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         """The answer of ``ensure`` where it takes no work: nobody touched the enclave since it was looked at."""
 
-    def ensure(self, process: ResolvedProcess) -> Grant:
+    def ensure(self, process: ResolvedProcess) -> StartAdditions:
         """Return once the enclave of ``process`` is complete on disk; idempotent.
 
         :raises EnclaveLaunchError: it cannot be; nothing that depends on it is started.
@@ -41,22 +39,22 @@ class EnclaveGate(Protocol):
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
         """The same for components about to be loaded into a container that runs already."""
 
-    def launcher(self) -> Grant | None:
+    def launcher(self) -> StartAdditions | None:
         """For our own ROS node, where the plan has calls for it to make."""
 
 
 class Provider(Protocol):
     """What makes enclaves complete: implemented over a plan and a keystore."""
 
-    def granted(self, process: ResolvedProcess) -> Grant | None:
+    def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         """What takes no work; None for every process that the plan does not have."""
 
-    def ensure(self, process: ResolvedProcess) -> Grant: ...
+    def ensure(self, process: ResolvedProcess) -> StartAdditions: ...
 
-    def ensure_late(self, process: ResolvedProcess) -> Grant:
+    def ensure_late(self, process: ResolvedProcess) -> StartAdditions:
         """Extend the plan by a process it did not have, and provision that."""
 
-    def launcher(self) -> Grant | None: ...
+    def launcher(self) -> StartAdditions | None: ...
 
 
 class LateProcess(RuntimeFailure):
@@ -111,10 +109,10 @@ class PlannedGate:
         self._allow_late = allow_late
         self._say_late = say_late
 
-    def granted(self, process: ResolvedProcess) -> Grant | None:
+    def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         return self._provider.granted(process)
 
-    def ensure(self, process: ResolvedProcess) -> Grant:
+    def ensure(self, process: ResolvedProcess) -> StartAdditions:
         if identity(process) in self._processes:
             return self._provider.ensure(process)
         if process.kind == "executable" and process.enclave.attribute is process.enclave.argument is None:
@@ -149,7 +147,7 @@ class PlannedGate:
                 )
             )
 
-    def launcher(self) -> Grant | None:
+    def launcher(self) -> StartAdditions | None:
         return self._provider.launcher()
 
 

@@ -22,7 +22,7 @@ from enclave_launch.host.protocol import HostOptions
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.environment_watch import EnvironmentWatch, Unplanned, Watched
-from enclave_launch.runtime.gate import EnclaveGate, Grant
+from enclave_launch.runtime.gate import EnclaveGate, StartAdditions
 from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.live_process import LiveProcess
 from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
@@ -225,9 +225,9 @@ class LiveHost(BaseHost):
         self.failed.append(found.watched.name)
         self._log.log("ERROR", found.watched.name, str(found))
 
-    async def _granted(self, process: ResolvedProcess) -> Grant:
+    async def _granted(self, process: ResolvedProcess) -> StartAdditions:
         if self._gate is None:
-            return Grant()
+            return StartAdditions()
         if not self._waiting_at_the_gate and (grant := self._gate.granted(process)) is not None:
             return grant
         self._waiting_at_the_gate += 1

@@ -30,7 +30,7 @@ from enclave_launch.runtime.launch_log import LaunchLog, Level
 from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, Stream
 from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter
 from enclave_launch.runtime.run_events import Observer
-from enclave_launch.runtime.supervision import LifeRules, Outcome, Patience, SupervisedProcess
+from enclave_launch.runtime.supervision import LifeRules, Patience, ProcessEnd, SupervisedProcess
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.processes import ExecuteLocal
@@ -72,7 +72,7 @@ class LiveProcess:
         for handler in self._registered:
             context.register_event_handler(handler)
 
-    async def run(self) -> Outcome:
+    async def run(self) -> ProcessEnd:
         """To its last exit; afterwards no handler of it is left, however often a launch starts something new."""
         try:
             return await self._run()
@@ -80,7 +80,7 @@ class LiveProcess:
             for handler in self._registered:
                 self._context.unregister_event_handler(handler)
 
-    async def _run(self) -> Outcome:
+    async def _run(self) -> ProcessEnd:
         if self._action.log_cmd:
             command = " ".join(word for word in self.process.cmd if word.strip())
             self._say("INFO", f"process details: cmd='{command}', cwd='{self.process.cwd}', custom_env?=True")

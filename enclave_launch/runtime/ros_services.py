@@ -20,7 +20,7 @@ from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.launcher import LAUNCHER_NODE
 from enclave_launch.process import ResolvedComponent
 from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.runtime.gate import Grant
+from enclave_launch.runtime.gate import StartAdditions
 from enclave_launch.runtime.launch_log import Level
 
 ALTERNATIVE = (
@@ -46,7 +46,7 @@ def require_rclpy() -> None:
 class RosServices:
     """:raises RuntimeFailure: no rclpy, or none that works; said before anything starts."""
 
-    def __init__(self, grant: Grant | None, say: Callable[[Level, str], None]) -> None:
+    def __init__(self, grant: StartAdditions | None, say: Callable[[Level, str], None]) -> None:
         require_rclpy()
         import rclpy
         import rclpy.executors
@@ -55,7 +55,7 @@ class RosServices:
         self._loop = asyncio.get_running_loop()
         self._closing = threading.Event()
         self._closed = False
-        grant = grant or Grant()
+        grant = grant or StartAdditions()
         with _environment(grant.environment):
             try:
                 self._ros = rclpy.Context()

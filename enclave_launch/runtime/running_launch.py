@@ -21,6 +21,7 @@ from typing import Any, Literal, NamedTuple
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.process import ResolvedProcess
+from enclave_launch.runtime.live_launch import LiveLaunch
 from enclave_launch.runtime.run_events import (
     Endpoint,
     EndpointCreated,
@@ -33,7 +34,6 @@ from enclave_launch.runtime.run_events import (
     ProcessStarted,
     RunEvent,
 )
-from enclave_launch.runtime.service import LaunchService
 from nodl.node_interface import EndpointKind
 
 REMEMBERED_EVENTS = 10_000
@@ -105,7 +105,7 @@ def endpoint_seen(name: str, endpoint: str, *, kind: EndpointKind | None = None,
 
 
 # Runs a launch to its end, with who watches it and who gets its service; gives the exit status.
-Main = Callable[[Observer, Callable[[LaunchService], None]], Coroutine[Any, Any, int]]
+Main = Callable[[Observer, Callable[[LiveLaunch], None]], Coroutine[Any, Any, int]]
 
 
 class RunningLaunch:
@@ -123,7 +123,7 @@ class RunningLaunch:
         self._exit_status: int | None = None
         self._error: BaseException | None = None
         self._loop: asyncio.AbstractEventLoop | None = None
-        self._service: LaunchService | None = None
+        self._service: LiveLaunch | None = None
         self._thread = threading.Thread(target=self._run, args=(main,), name="launch", daemon=True)
         self._thread.start()
         with self._changed:
@@ -231,7 +231,7 @@ class RunningLaunch:
             self._version += 1
             self._changed.notify_all()
 
-    def _hold(self, service: LaunchService) -> None:
+    def _hold(self, service: LiveLaunch) -> None:
         self._loop, self._service = asyncio.get_running_loop(), service
 
     def _observe(self, event: RunEvent) -> None:

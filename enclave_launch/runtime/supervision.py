@@ -60,7 +60,7 @@ class Watcher(Protocol):
     def on_exited(self, pid: int, returncode: int) -> None: ...
 
 
-class Outcome(NamedTuple):
+class ProcessEnd(NamedTuple):
     """How the last incarnation ended. ``returncode`` is None when none could be started."""
 
     returncode: int | None
@@ -98,7 +98,7 @@ class SupervisedProcess:
     def child(self) -> Child | None:
         return self._child
 
-    async def run(self) -> Outcome:
+    async def run(self) -> ProcessEnd:
         """From the first start to the last exit."""
         retries = short_lives = 0
         clock = asyncio.get_running_loop().time
@@ -113,7 +113,7 @@ class SupervisedProcess:
                     break
                 self._clear_away()
                 retries += 1
-            return Outcome(returncode, self._ending.is_set())
+            return ProcessEnd(returncode, self._ending.is_set())
         finally:
             self._cancel_timers()
 

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import check_regular, read_text
-from nodl.ament_index import ExecutableNotFoundError, PackageNotFoundError, executable_path
+from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError, executable_path
 from nodl.infer.analysis import start, start_function
 from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
@@ -71,7 +71,7 @@ def infer_executable(
         return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
     try:
         path = executable_path(package, executable, prefixes)
-    except (PackageNotFoundError, ExecutableNotFoundError, ValueError) as error:
+    except (PackageNotFoundError, ExecutableNotInstalledError, ValueError) as error:
         return _compiled(package, executable, None, sources, start_of, str(error))
     if not _is_python(path):
         return _compiled(package, executable, None, sources, start_of, f"{path} is a compiled program")

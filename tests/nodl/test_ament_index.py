@@ -53,15 +53,19 @@ def test_what_cannot_be_a_package_name(name: str, prefixes: tuple[str, str]) -> 
 
 def test_executables_are_found_below_lib(prefixes: tuple[str, str]) -> None:
     assert ament_index.executable_path("demo", "talker", prefixes) == f"{prefixes[0]}/lib/demo/talker"
-    with pytest.raises(ament_index.ExecutableNotFoundError, match="executable 'nosuch' not found on the lib"):
+    with pytest.raises(
+        ament_index.ExecutableNotInstalledError, match="executable 'nosuch' not found on the lib"
+    ):
         ament_index.executable_path("demo", "nosuch", prefixes)
-    with pytest.raises(ament_index.ExecutableNotFoundError, match=r"libexec directory '.*' does not exist"):
+    with pytest.raises(
+        ament_index.ExecutableNotInstalledError, match=r"libexec directory '.*' does not exist"
+    ):
         ament_index.executable_path("base", "talker", prefixes)
 
 
 def test_a_file_that_may_not_be_executed_is_no_executable(prefixes: tuple[str, str]) -> None:
     Path(prefixes[0], "lib/demo/talker").chmod(0o644)
-    with pytest.raises(ament_index.ExecutableNotFoundError):
+    with pytest.raises(ament_index.ExecutableNotInstalledError):
         ament_index.executable_path("demo", "talker", prefixes)
 
 

@@ -23,7 +23,7 @@ import enclave_launch.ros2.attributes as attributes
 from enclave_launch.ros2.context import KEY
 from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
 from enclave_launch.ros2.observation import observe_node
-from enclave_launch.runtime.gate import Grant
+from enclave_launch.runtime.gate import StartAdditions
 
 seen = []
 def look(self, context, ros_specific_arguments, node_action):
@@ -37,7 +37,7 @@ EnclaveNodeActionExtension.prepare_for_execute = look
 
 service = launch.LaunchService(noninteractive=True)
 class Session:
-    enter = staticmethod(lambda process: Grant())
+    enter = staticmethod(lambda process: StartAdditions())
 service.context.extend_globals({KEY: Session()})
 service.include_launch_description(launch.LaunchDescription([
     launch.actions.IncludeLaunchDescription(AnyLaunchDescriptionSource(sys.argv[1]))]))
@@ -225,13 +225,13 @@ from launch_ros.descriptions import ComposableNode
 import enclave_launch.ros2.attributes
 from enclave_launch.ros2.context import KEY
 from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
-from enclave_launch.runtime.gate import Grant
+from enclave_launch.runtime.gate import StartAdditions
 
 told = []
 class Session:
     def enter(self, process, *, loads_components=False):
         told.append(loads_components)
-        return Grant()
+        return StartAdditions()
 
 node = ComposableNode(package="p", plugin="P", name="n", remappings=[("chatter", "news"), ("a", "b")],
                       parameters=[{"x": 1}], extra_arguments=[{"use_intra_process_comms": True}])

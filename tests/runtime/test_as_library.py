@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.errors import RuntimeFailure
-from enclave_launch.runtime.service import run_launch, run_launch_async
+from enclave_launch.runtime.live_launch import run_launch, run_launch_async
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir")
 
@@ -40,7 +40,7 @@ STRICT = ("-X", "dev", "-W", "error")  # asyncio debug mode; unclosed or never a
 
 STATE = """
 import asyncio, logging, os, resource, signal, sys, threading
-from enclave_launch.runtime.service import run_launch, run_launch_async
+from enclave_launch.runtime.live_launch import run_launch, run_launch_async
 
 def state():
     return {
@@ -144,9 +144,7 @@ def test_the_blocking_call_in_a_running_loop_says_which_to_use(tmp_path: Path) -
 def test_started_with_standard_streams_closed(closed: str, tmp_path: Path, ros_log_dir: Path) -> None:
     """As some supervisors do; what we open must not take their places."""
     file = launch_file(tmp_path, "echo hello")
-    script = (
-        "import sys; from enclave_launch.runtime.service import run_launch; sys.exit(run_launch(sys.argv[1]))"
-    )
+    script = "import sys; from enclave_launch.runtime.live_launch import run_launch; sys.exit(run_launch(sys.argv[1]))"
     command = f'"$0" -c "$1" "$2" {closed}'
     result = subprocess.run(
         ["sh", "-c", command, sys.executable, script, str(file)],
@@ -165,9 +163,7 @@ def test_a_reader_of_our_output_that_goes_away_does_not_end_the_launch(
     tmp_path: Path, ros_log_dir: Path
 ) -> None:
     file = launch_file(tmp_path, "sh -c 'for i in 1 2 3 4 5 6; do echo $i; sleep 0.1; done'")
-    script = (
-        "import sys; from enclave_launch.runtime.service import run_launch; sys.exit(run_launch(sys.argv[1]))"
-    )
+    script = "import sys; from enclave_launch.runtime.live_launch import run_launch; sys.exit(run_launch(sys.argv[1]))"
     command = '("$0" -c "$1" "$2"; echo "status $?" >&2) | head -n 3'
     result = subprocess.run(
         ["sh", "-c", command, sys.executable, script, str(file)],

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.process import EnclaveRequest, RemapRule, ResolvedComponent, ResolvedProcess
-from enclave_launch.runtime.gate import Grant, LateProcess, PlannedGate, identity
+from enclave_launch.runtime.gate import LateProcess, PlannedGate, StartAdditions, identity
 from enclave_launch.source_location import SourceLocation
 
 PLACE = SourceLocation("demo.launch.py", 12, "node")
@@ -48,18 +48,18 @@ class Keystore:
     def __init__(self) -> None:
         self.done: list[str] = []
 
-    def granted(self, process: ResolvedProcess) -> Grant | None:
-        return Grant(("--enclave", "/robot")) if identity(process) == identity(TALKER) else None
+    def granted(self, process: ResolvedProcess) -> StartAdditions | None:
+        return StartAdditions(("--enclave", "/robot")) if identity(process) == identity(TALKER) else None
 
-    def ensure(self, process: ResolvedProcess) -> Grant:
+    def ensure(self, process: ResolvedProcess) -> StartAdditions:
         self.done.append(f"planned {process.fqn}")
-        return Grant(("--enclave", "/robot"))
+        return StartAdditions(("--enclave", "/robot"))
 
-    def ensure_late(self, process: ResolvedProcess) -> Grant:
+    def ensure_late(self, process: ResolvedProcess) -> StartAdditions:
         self.done.append(f"late {process.fqn}")
-        return Grant(("--enclave", "/robot"))
+        return StartAdditions(("--enclave", "/robot"))
 
-    def launcher(self) -> Grant | None:
+    def launcher(self) -> StartAdditions | None:
         return None
 
 
@@ -85,7 +85,7 @@ def gate(*, allow_late: bool = False) -> tuple[PlannedGate, Keystore, list[str]]
 )
 def test_what_the_plan_foresaw_is_provisioned(same: ResolvedProcess) -> None:
     guard, keystore, _ = gate()
-    assert guard.granted(same) == guard.ensure(same) == Grant(("--enclave", "/robot"))
+    assert guard.granted(same) == guard.ensure(same) == StartAdditions(("--enclave", "/robot"))
     assert keystore.done == ["planned /robot/talker"]
 
 

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.process import ResolvedProcess
-from enclave_launch.runtime.gate import Grant, LateProcess
-from enclave_launch.runtime.service import RunOptions, run_launch
+from enclave_launch.runtime.gate import LateProcess, StartAdditions
+from enclave_launch.runtime.live_launch import RunOptions, run_launch
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir", "small_ros")
 
@@ -154,18 +154,18 @@ def launched(tmp_path: Path, actions: str, gate: Gate | None = None) -> int:
 class Gate:
     """Everything is permitted but components called ``late``."""
 
-    def granted(self, process: ResolvedProcess) -> Grant | None:
-        return Grant()
+    def granted(self, process: ResolvedProcess) -> StartAdditions | None:
+        return StartAdditions()
 
-    def ensure(self, process: ResolvedProcess) -> Grant:
+    def ensure(self, process: ResolvedProcess) -> StartAdditions:
         raise AssertionError("granted at once")
 
     def ensure_components(self, components: object) -> None:
         if "late" in str(components):
             raise LateProcess("refused: component late")
 
-    def launcher(self) -> Grant | None:
-        return Grant(("--enclave", "/launcher"), {"ROS_SECURITY_ENABLE": "true"})
+    def launcher(self) -> StartAdditions | None:
+        return StartAdditions(("--enclave", "/launcher"), {"ROS_SECURITY_ENABLE": "true"})
 
 
 CONTAINER = """ComposableNodeContainer(

@@ -13,8 +13,8 @@ import pytest
 
 from enclave_launch.errors import ProvisionError, RuntimeFailure
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from enclave_launch.runtime.gate import Grant
-from enclave_launch.runtime.service import RunOptions, run_launch, run_launch_async
+from enclave_launch.runtime.gate import StartAdditions
+from enclave_launch.runtime.live_launch import RunOptions, run_launch, run_launch_async
 from tests.runtime.conftest import alive, read_pid
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir")
@@ -31,15 +31,15 @@ class SlowKeystore:
         self.order: list[str] = []
         self.inside = threading.Lock()
 
-    def granted(self, process: ResolvedProcess) -> Grant | None:
+    def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         assert not self.inside.locked(), "one process at a time"
         label = process.process_name.rpartition("-")[0]
         if label not in self.untouched:
             return None
         self.order.append(label)
-        return Grant()
+        return StartAdditions()
 
-    def ensure(self, process: ResolvedProcess) -> Grant:
+    def ensure(self, process: ResolvedProcess) -> StartAdditions:
         assert threading.current_thread() is not threading.main_thread(), (
             "the event loop must go on meanwhile"
         )
@@ -53,12 +53,12 @@ class SlowKeystore:
             (self.directory / with_label).write_text("complete")
         finally:
             self.inside.release()
-        return Grant(("extra",), {"ENCLAVE_FILE": str(self.directory / with_label)})
+        return StartAdditions(("extra",), {"ENCLAVE_FILE": str(self.directory / with_label)})
 
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
         raise AssertionError("no components here")
 
-    def launcher(self) -> Grant | None:
+    def launcher(self) -> StartAdditions | None:
         return None
 
 

@@ -19,8 +19,8 @@ from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, 
 from enclave_launch.runtime.supervision import (
     TOLERATED,
     LifeRules,
-    Outcome,
     Patience,
+    ProcessEnd,
     SupervisedProcess,
     pause_after,
 )
@@ -65,13 +65,15 @@ class Story:
 Steps = Callable[[SupervisedProcess, Story], Awaitable[None]]
 
 
-def lived(script: str, rules: LifeRules | None = None, steps: Steps | None = None) -> tuple[Outcome, Story]:
+def lived(
+    script: str, rules: LifeRules | None = None, steps: Steps | None = None
+) -> tuple[ProcessEnd, Story]:
     story = Story()
 
     async def prepare() -> ProcessSpec:
         return ProcessSpec((script,), dict(os.environ), shell=True)
 
-    async def main() -> Outcome:
+    async def main() -> ProcessEnd:
         async with ProcessTree() as tree:
             process = SupervisedProcess("a-1", prepare, tree, rules or LifeRules(), story, story.say)
             running = asyncio.create_task(process.run())
@@ -84,7 +86,7 @@ def lived(script: str, rules: LifeRules | None = None, steps: Steps | None = Non
 
 def test_a_clean_end() -> None:
     outcome, story = lived("true")
-    assert outcome == Outcome(0, asked_to_end=False)
+    assert outcome == ProcessEnd(0, asked_to_end=False)
     assert story.lines == [
         ("INFO", "process started with pid [PID]"),
         ("INFO", "process has finished cleanly [pid PID]"),
@@ -93,7 +95,7 @@ def test_a_clean_end() -> None:
 
 def test_a_bad_end() -> None:
     outcome, story = lived("exit 7")
-    assert outcome == Outcome(7, asked_to_end=False)
+    assert outcome == ProcessEnd(7, asked_to_end=False)
     assert story.lines[-1] == ("ERROR", "process has died [pid PID, exit code 7, cmd 'exit 7'].")
 
 
@@ -103,13 +105,13 @@ def test_a_program_that_cannot_be_started() -> None:
     async def prepare() -> ProcessSpec:
         return ProcessSpec(("/no/such/program",), {})
 
-    async def main() -> Outcome:
+    async def main() -> ProcessEnd:
         async with ProcessTree() as tree:
             return await SupervisedProcess(
                 "a-1", prepare, tree, LifeRules(respawn=True), story, story.say
             ).run()
 
-    assert asyncio.run(main()) == Outcome(None, asked_to_end=False)
+    assert asyncio.run(main()) == ProcessEnd(None, asked_to_end=False)
     assert story.lines == [("ERROR", "cannot start process: No such file or directory: '/no/such/program'")]
 
 
@@ -117,7 +119,7 @@ def test_respawn_until_the_retries_are_used_up() -> None:
     outcome, story = lived("exit 1", LifeRules(respawn=True, max_retries=2))
     assert story.exits == [1, 1, 1]
     assert len(set(story.pids)) == 3
-    assert outcome == Outcome(1, asked_to_end=False)
+    assert outcome == ProcessEnd(1, asked_to_end=False)
 
 
 def test_respawn_under_kill_9_until_asked_to_end() -> None:
@@ -179,7 +181,7 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed() -> None:
         process.end(QUICK, quiet=True)
 
     outcome, story = lived(STUBBORN, steps=steps)
-    assert outcome == Outcome(-9, asked_to_end=True)
+    assert outcome == ProcessEnd(-9, asked_to_end=True)
     assert story.lines[1:-1] == [
         (
             "ERROR",
@@ -247,10 +249,10 @@ def test_a_nul_character_is_told_and_never_taken_for_a_start(cmd: tuple[str, ...
     async def prepare() -> ProcessSpec:
         return ProcessSpec(cmd, dict(os.environ))
 
-    async def main() -> Outcome:
+    async def main() -> ProcessEnd:
         async with ProcessTree() as tree:
             return await SupervisedProcess("a-1", prepare, tree, LifeRules(), story, story.say).run()
 
-    assert asyncio.run(main()) == Outcome(returncode=None, asked_to_end=False)
+    assert asyncio.run(main()) == ProcessEnd(returncode=None, asked_to_end=False)
     assert story.pids == []
     assert "holds a NUL character" in story.lines[0][1]

@@ -11,7 +11,7 @@ from enclave_launch.description.substitution import (
 )
 from enclave_launch.description.substitutions.paths import PathOperator
 from enclave_launch.description.templates import TemplateSubstitution, template
-from nodl.ament_index import ExecutableNotFoundError
+from nodl.ament_index import ExecutableNotInstalledError
 
 
 class FindPackage(PathOperator, TemplateSubstitution):
@@ -70,5 +70,5 @@ class ExecutableInPackage(FindPackagePrefix):
         package = perform_substitutions(context, self.package)
         try:
             return context.host.find_executable(package, executable)
-        except ExecutableNotFoundError as error:
+        except ExecutableNotInstalledError as error:
             raise SubstitutionFailure(str(error)) from error

@@ -105,7 +105,7 @@ def run_launch(
     started = warden or WardenProcess(interactive=not chosen.noninteractive)
 
     async def main() -> int:
-        service = LaunchService(launch_file, arguments, gate=gate, options=chosen, warden=started)
+        service = LiveLaunch(launch_file, arguments, gate=gate, options=chosen, warden=started)
         with _signals_to(service):
             return await service.run()
 
@@ -120,11 +120,11 @@ async def run_launch_async(
     options: RunOptions | None = None,
 ) -> int:
     """As ``run_launch``; signals stay the caller's. Cancelling it shuts down, in order, before it returns."""
-    return await LaunchService(launch_file, arguments, gate=gate, options=options or RunOptions()).run()
+    return await LiveLaunch(launch_file, arguments, gate=gate, options=options or RunOptions()).run()
 
 
-class LaunchService:
-    """One run. ``shut_down`` may be called from the loop at any time."""
+class LiveLaunch:
+    """One run of a launch file. ``shut_down`` may be called from the loop at any time."""
 
     def __init__(
         self,
@@ -440,7 +440,7 @@ def _require_signals() -> None:
 
 
 @contextmanager
-def _signals_to(service: LaunchService) -> Iterator[None]:
+def _signals_to(service: LiveLaunch) -> Iterator[None]:
     """SIGHUP only where nobody (nohup) asked us to ignore it."""
     loop = asyncio.get_running_loop()
     numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if _wanted(number)]
