@@ -18,19 +18,23 @@ from enclave_launch.frontend.xml_tree import parse_launch_xml as parse_launch_xm
 from enclave_launch.frontend.yaml_scalar import load as load_scalar
 from enclave_launch.frontend.yaml_tree import parse_yaml as parse_launch_yaml
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+from keystore.disk.archive import ExportedFile, archive_bytes, read_archive
 from keystore.errors import KeystoreError
 from keystore.formats import der
+from keystore.formats.bundle import parse_manifest
 from keystore.formats.certificate import read_certificates
 from keystore.formats.domains import Domains
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.governance import parse_governance
 from keystore.formats.governance_yaml import parse_governance_yaml
+from keystore.formats.hosts import parse_hosts
 from keystore.formats.permissions_read import parse_permissions
 from keystore.formats.policy_xml import parse_policy
 from keystore.formats.register import parse_register
 from keystore.formats.shares import parse_shares
 from keystore.formats.validity import parse_duration, parse_moment
 from keystore.signing import smime
+from keystore.steps.host_keys import parse_requests, request, requests_text
 from keystore.verification.contents import holds_private_key, mime_problem
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2
@@ -45,6 +49,21 @@ from tests.graph.test_discovery_info import encoded
 
 FIXTURES = Path(__file__).parents[2] / "fixtures/demo_ws/share/demo_nodes"
 GOLDEN = Path(__file__).parents[1] / "keystore/golden_permissions"
+
+
+HOSTS = b"""version: 1
+hosts:
+  base: {enclaves: [/base, "/base/*"], nodes: ["/camera/*"]}
+needs:
+  - {nodes: ["/camera/*"], devices: [/dev/video0], realtime: true, memory: 1Gi}
+"""
+MANIFEST = b"""{
+"type": "enclave-launch bundle", "version": 1, "host": "base", "number": 1763774400,
+"authorities": {"identity_ca": ["ab"], "permissions_ca": ["cd"]}, "crl_number": 0, "ends": "2036-11-19T02:06:24Z",
+"enclaves": [["/base", "1f", "ab", "cd", "2026-11-19T02:06:24Z", "2036-11-19T02:06:24Z", true]],
+"files": [["public/identity_ca.cert.pem", "ab"]]
+}
+"""
 
 
 class Target(NamedTuple):
@@ -153,6 +172,7 @@ def documents() -> dict[str, bytes]:
             for name in ("enclaves/a/permissions.p7s", "enclaves/a/permissions.xml", "enclaves/a/cert.pem",
                          "enclaves/a/key.pem", "enclaves/governance.xml", "private/register.json"):  # fmt: skip
                 _DOCUMENTS[name.rpartition("/")[2]] = (root / name).read_bytes()
+            _DOCUMENTS["requests.pem"] = requests_text(request(Path(folder) / "host", ["/a"]))
     return _DOCUMENTS
 
 
@@ -216,6 +236,27 @@ def targets() -> dict[str, Target]:
         "policy": Target(parse_policy, refused, POLICY, XML),
         "governance-yaml": Target(
             lambda data: parse_governance_yaml(data, "a.yaml"), refused, (GOVERNANCE_YAML,), YAML
+        ),
+        "hosts": Target(lambda data: parse_hosts(data, "a.yaml"), refused, (HOSTS,), YAML),
+        "bundle": Target(
+            lambda data: read_archive(data, "a.bundle"),
+            refused,
+            (archive_bytes([ExportedFile("enclaves/a/key.pem", 0o600, b"key")]),),
+            words("\0", "ustar", "../", "0000600", "1", "2", "x", "L"),
+        ),
+        "bundle-manifest": Target(
+            lambda data: parse_manifest(data, "a"),
+            refused,
+            (MANIFEST,),
+            words('"', "[", "]", "{", "}", ",", "null"),
+        ),
+        "certificate-requests": Target(
+            lambda data: parse_requests(data, "a.pem"),
+            refused,
+            (made["requests.pem"],),
+            words(
+                "enclave: ", "\n", "-----BEGIN CERTIFICATE REQUEST-----", "-----END CERTIFICATE REQUEST-----"
+            ),
         ),
         "governance": Target(
             lambda data: parse_governance(data, "a.xml"), refused, (made["governance.xml"],), XML
