@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <fstream>
+#include <optional>
 
 #include <fastdds/dds/domain/DomainParticipantFactory.hpp>
 #include <fastdds/dds/subscriber/SampleInfo.hpp>
@@ -45,6 +46,13 @@ void stay_in_one_network(dds::DomainParticipantQos& qos) {
   builtin.discovery_config.leaseDuration_announcementperiod = eprosima::fastrtps::Duration_t(1, 0);
 }
 
+// The ``pkcs11:`` URI of key.p11, which rmw_fastrtps takes before key.pem (rmw_dds_common/src/security.cpp).
+std::optional<std::string> token_key(const std::string& directory) {
+  std::ifstream file(directory + "/key.p11");
+  std::string uri;
+  return file >> uri ? std::optional(uri) : std::nullopt;
+}
+
 bool exists(const std::string& path) { return std::ifstream(path).good(); }
 
 // The properties of rmw_fastrtps (rmw_fastrtps_shared_cpp/src/participant.cpp).
@@ -59,7 +67,7 @@ void secure(dds::DomainParticipantQos& qos, const std::string& directory) {
   set("dds.sec.auth.plugin", "builtin.PKI-DH");
   set(authentication + "identity_ca", file("identity_ca.cert.pem"));
   set(authentication + "identity_certificate", file("cert.pem"));
-  set(authentication + "private_key", file("key.pem"));
+  set(authentication + "private_key", token_key(directory).value_or(file("key.pem")));
   if (exists(directory + "/crl.pem")) set(authentication + "identity_crl", file("crl.pem"));
   set("dds.sec.crypto.plugin", "builtin.AES-GCM-GMAC");
   set("dds.sec.access.plugin", "builtin.Access-Permissions");
