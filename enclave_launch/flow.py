@@ -20,7 +20,7 @@ from enclave_launch.admission.middleware import middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic, middleware_refused, program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
-from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner, mixed_enclaves, uses_zenoh
+from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner, mixed_enclaves, on_zenoh
 from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:
@@ -55,7 +55,7 @@ def resolve(
         problems=(*plan.problems, *_launcher_refusals(plan)),
         warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)),
     )
-    return _told_of_middlewares(plan) if uses_zenoh(plan, os.environ) else plan
+    return _told_of_middlewares(plan) if on_zenoh(plan, os.environ) else plan
 
 
 def _told_of_middlewares(plan: LaunchPlan) -> LaunchPlan:
@@ -166,7 +166,7 @@ def provision(
     asked = asked._replace(launch=asked.launch or LaunchHold(settings.keystore, launch_owner(plan)))
     asked = asked._replace(guid_halves=halves(mixed_enclaves(plan.processes)))
     wanted = with_domains(plan, asked, os.environ)
-    if not uses_zenoh(plan, os.environ):
+    if not on_zenoh(plan, os.environ):
         report = provision_policies(settings, plan, wanted)
         return ProvisionedLaunch(plan, settings, report, wanted, asked)
     wanted, report, zenoh = provision_with_zenoh(settings, plan, wanted)

@@ -325,10 +325,12 @@ def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
     )
 
 
-def uses_zenoh(plan: LaunchPlan, environment: Mapping[str, str]) -> bool:
-    """Whether a process of the plan, or the launcher's own node in ``environment``, is on Zenoh."""
-    own = plan.launcher is not None and middleware_of(environment, plan.distro) == ZENOH
-    return own or any(item.middleware == ZENOH and item.enclave is not None for item in plan.processes)
+def on_zenoh(plan: LaunchPlan, environment: Mapping[str, str]) -> frozenset[str]:
+    """Enclaves with a process on Zenoh, or with the launcher's own node, in ``environment``, on it."""
+    found = {item.enclave.path for item in plan.processes if item.enclave and item.middleware == ZENOH}
+    if plan.launcher is not None and middleware_of(environment, plan.distro) == ZENOH:
+        found.add(plan.launcher.enclave)
+    return frozenset(found)
 
 
 def _handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:

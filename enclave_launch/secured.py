@@ -16,7 +16,7 @@ from enclave_launch.admission.handshakes import failing
 from enclave_launch.admission.middleware import ZENOH, middleware_of
 from enclave_launch.diagnostics import Diagnostic, enclave_of_several_launches, handshake_fails
 from enclave_launch.errors import ProvisionError, RuntimeFailure
-from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, uses_zenoh
+from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, on_zenoh
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions, identity
 from enclave_launch.security_environment import (
@@ -95,11 +95,11 @@ def provision_with_zenoh(
     from keystore.formats.zenoh.types import types_text
     from keystore.steps.zenoh_configuration import options_of, write_zenoh
 
-    on_zenoh = zenoh_enclaves(plan, os.environ)
-    options = options._replace(types={path: types_text(types) for path, types in on_zenoh.items()})
+    wanted = zenoh_enclaves(plan, os.environ)
+    options = options._replace(types={path: types_text(types) for path, types in wanted.items()})
     report = provision_policies(settings, plan, options)
     try:
-        return options, report, write_zenoh(settings.keystore, on_zenoh, options=options_of(options))
+        return options, report, write_zenoh(settings.keystore, wanted, options=options_of(options))
     except KeystoreError as error:
         raise ProvisionError(str(error)) from error
 
@@ -158,7 +158,7 @@ def check_router(plan: LaunchPlan, keystore: str) -> None:
     from keystore.formats.zenoh.address import RouterAddress
     from nodl.ament_index import search_prefixes
 
-    if not uses_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):
+    if not on_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):
         return
     try:
         address = present_address(KeystoreView(Path(keystore))) or RouterAddress()
@@ -197,6 +197,7 @@ class PlanProvider:
         self._by_name = {(item.process.process_name, key): item for key, item in identified}
         self._by_identity = dict(identified)
         self._policies = {enclave.path: enclave for enclave in plan.derived.policy.enclaves}
+        self._on_zenoh = on_zenoh(plan, os.environ)
 
     def _follow_domains(self) -> None:
         """What came late may be in another domain."""
@@ -244,7 +245,7 @@ class PlanProvider:
             if policy.path in before:  # to extend is not to repair
                 self._check(before[policy.path])
             self._follow_domains()
-            if uses_zenoh(self._plan, os.environ):
+            if on_zenoh(self._plan, os.environ):
                 self._extend_zenoh(process)
             else:
                 provision_policies(self._launch.settings, self._plan, self._options, policy)
@@ -276,10 +277,10 @@ class PlanProvider:
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = differences(keystore, policy, options=self._options)
-            if self._launch.zenoh is not None:
+            if (zenoh := self._launch.zenoh) is not None and enclave in self._on_zenoh:
                 from keystore.steps.zenoh_configuration import session_differences
 
-                wrong = (*wrong, *session_differences(keystore, enclave))
+                wrong = (*wrong, *session_differences(keystore, enclave, zenoh.router))
         except KeystoreError as error:
             raise ProvisionError(
                 f"enclave {enclave} cannot be looked at any more, though it was provisioned for this launch: {error}"

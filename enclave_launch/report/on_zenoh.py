@@ -14,10 +14,9 @@ from keystore.formats.zenoh.key_expressions import data_keys, domain_chunks
 
 def zenoh_lines(plan: LaunchPlan, subject: str) -> Iterator[str]:
     """Of an enclave all of them, of a topic, service or part of an action those that name it; nothing on DDS."""
-    on_zenoh = {item.enclave.path for item in plan.processes if item.enclave and item.middleware == ZENOH}
     domains = enclave_domains(item for item in plan.processes if item.middleware == ZENOH)
     for policy in plan.derived.policy.enclaves:
-        if policy.path not in on_zenoh:
+        if policy.path not in domains:
             continue
         grants = grants_of_policy(policy, enclave_types(plan.derived, policy.path))
         chunks = domain_chunks(Domains((number, number) for number in domains[policy.path]))

@@ -18,7 +18,7 @@ from enclave_launch.diagnostics import (
     zenoh_cannot_grant,
     zenoh_router_trusted,
 )
-from enclave_launch.plan import LaunchPlan, PlannedProcess
+from enclave_launch.plan import LaunchPlan, PlannedProcess, on_zenoh
 from enclave_launch.policy.zenoh_types import enclave_types
 from keystore.formats.policy import Operation, Qualifier
 from keystore.formats.zenoh.grants import Types, grants_of_policy
@@ -31,11 +31,8 @@ _ENDS = (
 
 
 def zenoh_enclaves(plan: LaunchPlan, environment: Mapping[str, str]) -> dict[str, Types]:
-    """Enclaves with a process on Zenoh, and the types of what they talk about. ``environment``: the launcher's own."""
-    paths = {item.enclave.path for item in _on_zenoh(plan) if item.enclave is not None}
-    if plan.launcher is not None and middleware_of(environment, plan.distro) == ZENOH:
-        paths.add(plan.launcher.enclave)
-    return {path: enclave_types(plan.derived, path) for path in sorted(paths)}
+    """Enclaves on Zenoh, and the types of what they talk about. ``environment``: the launcher's own."""
+    return {path: enclave_types(plan.derived, path) for path in sorted(on_zenoh(plan, environment))}
 
 
 def _on_zenoh(plan: LaunchPlan) -> list[PlannedProcess]:

@@ -323,12 +323,12 @@ def _deadline(launch: ProvisionedLaunch) -> Deadline | None:
 def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
     """What ``run`` would refuse in any case, asked before the keystore is touched. Raises as ``run`` does."""
     from enclave_launch.evaluation.programs import check_programs
-    from enclave_launch.plan import uses_zenoh
+    from enclave_launch.plan import on_zenoh
 
     if plan.problems:
         return  # told first, by ``provision``
     check_programs(plan.evaluation.processes)
-    if uses_zenoh(plan, os.environ):
+    if on_zenoh(plan, os.environ):
         from enclave_launch.secured import check_router
 
         check_router(plan, keystore)

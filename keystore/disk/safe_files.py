@@ -22,7 +22,7 @@ from keystore.errors import (
 )
 
 _MAX_FILE = 8_000_000
-_MAX_REGISTER = 200_000_000
+_MAX_OF_ALL = 200_000_000  # of a file that speaks of every enclave
 _WRITABLE_BY_OTHERS = 0o022
 
 
@@ -68,7 +68,7 @@ def _read(root: Path, relative: str) -> bytes:
         info = os.fstat(descriptor)
         if not stat.S_ISREG(info.st_mode):
             raise UnsafeKeystoreError(f"{printable(root / relative)} is not a regular file; remove it")
-        limit = _MAX_REGISTER if relative == layout.REGISTER else _MAX_FILE
+        limit = _MAX_OF_ALL if relative in (layout.REGISTER, layout.ZENOH_ROUTER) else _MAX_FILE
         if info.st_size > limit:
             raise DamagedKeystoreError(f"{printable(root / relative)} is larger than {limit} bytes")
         content = os.read(descriptor, info.st_size + 1)

@@ -135,12 +135,11 @@ def follow(root: Path, options: ZenohOptions) -> list[str]:
     return [*said, *report.gaps]
 
 
-def session_differences(keystore: Path | str, enclave: str) -> tuple[str, ...]:
-    """Why the session file of an enclave is not what ``write_zenoh`` left; empty when it is, or has none to have."""
+def session_differences(keystore: Path | str, enclave: str, address: RouterAddress) -> tuple[str, ...]:
+    """Why the session file of an enclave is not what ``write_zenoh`` left; empty when it is. Cheap: asked before each
+    process."""
     view = KeystoreView(resolve_root(keystore))
-    text = safe_files.read_if_there(view.root, session_file(enclave))
-    address = present_address(view)
-    if text is None or address is None or text == session_content(view, enclave, address):
+    if safe_files.read_if_there(view.root, session_file(enclave)) == session_content(view, enclave, address):
         return ()
     return (f"{session_file(enclave)} is not what was written for it",)
 

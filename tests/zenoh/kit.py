@@ -125,12 +125,12 @@ def serving(session: Any, key: str, text: str) -> Any:
     return session.declare_queryable(key, lambda query: query.reply(query.key_expr, text), complete=True)
 
 
-def transient_local_publisher(session: Any, key: str) -> Any:
-    """As rmw_zenoh makes them for RELIABLE and TRANSIENT_LOCAL."""
+def transient_local_publisher(session: Any, key: str, *, heartbeats: bool = True) -> Any:
+    """As rmw_zenoh makes them for TRANSIENT_LOCAL, with heartbeats those that are RELIABLE."""
     detection = zenoh.ext.MissDetectionConfig(sporadic_heartbeat=0.05)  # type: ignore[call-arg]
     return zenoh.ext.declare_advanced_publisher(
         session, key, cache=zenoh.ext.CacheConfig(max_samples=10), publisher_detection=True,
-        sample_miss_detection=detection,
+        sample_miss_detection=detection if heartbeats else None,
     )  # fmt: skip
 
 

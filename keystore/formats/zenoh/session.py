@@ -64,5 +64,15 @@ def transport(tls: dict[str, Any]) -> dict[str, Any]:
 
 
 def json_bytes(content: dict[str, Any]) -> bytes:
-    """JSON is JSON5; the same content gives the same bytes."""
-    return json.dumps(content, indent=1).encode() + b"\n"
+    """JSON is JSON5. A line for each setting, and for each entry of a list of the access control: two versions can be
+    compared line by line. The same content gives the same bytes."""
+    return (_lines(content, 2) + "\n").encode()
+
+
+def _lines(value: Any, depth: int) -> str:
+    if depth and isinstance(value, dict) and value:
+        inner = ",\n".join(f"{json.dumps(name)}: {_lines(one, depth - 1)}" for name, one in value.items())
+        return f"{{\n{inner}\n}}"
+    if isinstance(value, list) and value and isinstance(value[0], dict):
+        return "[\n" + ",\n".join(map(json.dumps, value)) + "\n]"
+    return json.dumps(value)
