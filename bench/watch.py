@@ -9,11 +9,13 @@ steady, and for each minute of the steady state, with and without ``--watch``.
 
 from __future__ import annotations
 
+import json
 import os
 import subprocess
 import sys
 import tempfile
 import time
+from collections import Counter
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -121,7 +123,8 @@ def beside(processes: int, folder: Path, watched: bool) -> None:
             )
         up = shown.read_bytes().count(b"is up")
         told = report.read_text().splitlines() if report.exists() else []
-        print(f"  {up} of {processes} nodes were up, {len(told)} findings told")
+        kinds = Counter((row["event"], row["level"], row["kind"]) for row in map(json.loads, told))
+        print(f"  {up} of {processes} nodes were up; findings told: {dict(kinds) or 'none'}")
     finally:
         launch.send_signal(2)
         launch.wait(120)

@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_launch.drift.expected import Expected, ExpectedNode
-from enclave_launch.drift.finding import Finding, Kind, Level, finding
+from enclave_launch.drift.finding import Certainty, Finding, Kind, Level, finding
 from enclave_launch.review.document import Grant, Operation
 from keystore.formats.permissions_patterns import covers
 from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, Interface
@@ -151,6 +151,12 @@ class _Comparison:
         has = f"with {', '.join(topics[:5])}" if topics else "without endpoints"
         level = Level.ALARM if topics or enclave in self._expected.enclaves else Level.NOTE
         text = f"a participant {has} is not planned"
+        if (
+            topics and process.participant.pid in self._strangers
+        ):  # whatever name it will have, it is not ours
+            return self._about(
+                Kind.UNPLANNED_PROCESS, process, text, enclave=enclave, certainty=Certainty.FACT
+            )
         return self._about(Kind.UNPLANNED_PROCESS, process, text, level=level, enclave=enclave)
 
     # one node
@@ -283,10 +289,19 @@ class _Comparison:
         level: Level = Level.ALARM,
         enclave: str = "",
         remedy: str = "",
+        certainty: Certainty | None = None,
     ) -> Finding:
         who = participant_text(process)
         return finding(
-            kind, subject or who, text, name=name, level=level, enclave=enclave, who=who, remedy=remedy
+            kind,
+            subject or who,
+            text,
+            name=name,
+            level=level,
+            enclave=enclave,
+            who=who,
+            remedy=remedy,
+            certainty=certainty,
         )
 
 

@@ -44,7 +44,6 @@ class Certainty(Enum):
 
     FACT = "what was announced says so"
     WHEN_SETTLED = "unless more is discovered"
-    WHEN_LEFT = "unless one of them is about to be forgotten"
     ABSENCE = "unless it comes later"
 
 
@@ -70,12 +69,12 @@ class Finding(NamedTuple):
 _CERTAINTY = {
     Kind.UNPLANNED_PROCESS: Certainty.WHEN_SETTLED,
     Kind.NOT_AUTHENTICATED: Certainty.WHEN_SETTLED,
-    Kind.REPEATED_NODE: Certainty.WHEN_LEFT,
+    Kind.REPEATED_NODE: Certainty.WHEN_SETTLED,
     Kind.MISSING_NODE: Certainty.ABSENCE,
     Kind.MISSING_ENDPOINT: Certainty.ABSENCE,
 }
-"""Of the kinds that discovery could still take back. Who was killed is there until its lease ends: 10 s on Cyclone DDS,
-20 s on Fast DDS; a respawned process overlaps with it."""
+"""Of the kinds that discovery could still take back: nodes are named after participants, and who was killed is there
+until its lease ends (10 s on Cyclone DDS, 20 s on Fast DDS), so that a respawned process overlaps with it."""
 
 
 def finding(
@@ -88,7 +87,8 @@ def finding(
     enclave: str = "",
     who: str = "",
     remedy: str = "",
+    certainty: Certainty | None = None,
 ) -> Finding:
-    """With the certainty that its kind has."""
-    certainty = _CERTAINTY.get(kind, Certainty.FACT)
+    """With the certainty that its kind has, where none is given."""
+    certainty = certainty or _CERTAINTY.get(kind, Certainty.FACT)
     return Finding(kind, subject, name, text, certainty, level, enclave, who, remedy)

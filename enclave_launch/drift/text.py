@@ -24,7 +24,7 @@ def drift_text(findings: Sequence[Finding], graph: Graph) -> str:
     ordered = sorted(findings, key=lambda each: (each.level is Level.NOTE, each.kind.value, each.subject))
     seen = f"{len(graph.processes)} participants, {sum(1 for _ in graph.nodes)} nodes"
     alarms = sum(each.level is Level.ALARM for each in findings)
-    summary = f"{alarms} alarm{'s' * (alarms != 1)}" if findings else "as planned"
+    summary = f"{alarms} alarm{'s' * (alarms != 1)}" if alarms else "as planned"
     return "\n".join([*map(finding_text, ordered), f"{summary}; seen: {seen}"]) + "\n"
 
 

@@ -24,6 +24,8 @@ _MOST_AT_ONCE = 4096
 _MOST_PARTICIPANTS = 119  # of one domain on one host: what its ports have room for (DDSI-RTPS 9.6.1)
 _LOOPBACK = '<NetworkInterface name="lo"/>'
 _BOTH = f'<NetworkInterface autodetermine="true"/>{_LOOPBACK}'
+_TYPE_HASH = b"typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
+"""Of rmw_dds_common/msg/ParticipantEntitiesInfo; nodes since Iron warn of an endpoint that tells none."""
 _FILES = {
     "dds.sec.auth.identity_ca": "identity_ca.cert.pem",
     "dds.sec.auth.identity_certificate": "cert.pem",
@@ -305,7 +307,7 @@ def _list_reader(participant: Any) -> Any:
     message.__idl__._xt_bytedata = (b"", b"")
     message.deserialize = classmethod(lambda cls, data, **_: _Raw(data))
     reliable = Policy.Reliability.Reliable(duration(seconds=1))
-    qos = Qos(reliable, Policy.Durability.TransientLocal, Policy.History.KeepAll)
+    qos = Qos(reliable, Policy.Durability.TransientLocal, Policy.History.KeepAll, Policy.Userdata(_TYPE_HASH))
     return DataReader(participant, Topic(participant, DISCOVERY_TOPIC, message), qos)
 
 

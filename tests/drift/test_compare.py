@@ -10,7 +10,7 @@ import pytest
 
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
-from enclave_launch.drift.finding import Finding, Kind, Level
+from enclave_launch.drift.finding import Certainty, Finding, Kind, Level
 from nodl.graph.model import Graph
 from nodl.graph.quality import Quality
 from tests.drift.planned import plan, running
@@ -221,6 +221,16 @@ def test_a_planned_node_in_a_process_that_the_launch_did_not_start_is_found() ->
     running(TALKER, made)
     (finding,) = found(TALKER, made.graph(), strangers=frozenset({1002}))
     assert finding.kind is Kind.STRANGER and "process 1002" in finding.who
+
+
+def test_a_nameless_participant_is_told_at_once_where_its_process_is_known_not_to_be_of_the_launch() -> None:
+    made = Made()
+    running(TALKER, made)
+    guid = made.participant(92, pid=7)
+    made.node(guid, "", "writer HelloWorldTopic HelloWorld")
+    (waits,) = found(TALKER, made.graph())
+    (at_once,) = found(TALKER, made.graph(), strangers=frozenset({7}))
+    assert (waits.certainty, at_once.certainty) == (Certainty.WHEN_SETTLED, Certainty.FACT)
 
 
 def test_nodes_without_names_and_executables_are_not_taken_for_intruders() -> None:

@@ -9,7 +9,7 @@ FACT = finding(Kind.UNPLANNED_NODE, "/x", "there")
 SETTLED = finding(Kind.UNPLANNED_PROCESS, "p", "there")
 LEASE = finding(Kind.REPEATED_NODE, "/x", "twice")
 ABSENT = finding(Kind.MISSING_NODE, "/y", "not there")
-PATIENCE = Patience(settle=5, lease=30, absence=60)
+PATIENCE = Patience(settle=5, absence=60)
 
 
 def test_a_fact_is_told_at_once_and_once() -> None:
@@ -22,7 +22,7 @@ def test_a_fact_is_told_at_once_and_once() -> None:
 
 
 def test_what_discovery_may_take_back_has_to_stand() -> None:
-    for late, seconds in ((SETTLED, 5), (LEASE, 30), (ABSENT, 60)):
+    for late, seconds in ((SETTLED, 5), (LEASE, 5), (ABSENT, 60)):
         steady = Steady(PATIENCE)
         assert not steady.at(0, [late])
         assert not steady.at(seconds - 1, [late])
