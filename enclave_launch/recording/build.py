@@ -58,8 +58,9 @@ def _build(wanted: Path) -> None:
     compiler = os.environ.get("CC") or "cc"
     if shutil.which(compiler) is None:
         raise RuntimeFailure(
-            f"recording needs a C compiler ('{compiler}' is not there): install one (apt install gcc libc6-dev), or "
-            "launch without recording"
+            f"recording needs a C compiler ('{compiler}' is not there): install one (apt install gcc libc6-dev); or "
+            f"take {wanted.name} from ~/.cache/enclave-launch on a machine of this kind that has recorded once, with "
+            f"this version of enclave-launch, and put it into {wanted.parent}; or launch without recording"
         )
     try:
         wanted.parent.mkdir(parents=True, exist_ok=True, mode=0o700)

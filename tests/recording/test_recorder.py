@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from enclave_launch.errors import RuntimeFailure
+from enclave_launch.recording.build import recorder_library
 from enclave_launch.recording.programs import look_at_command
 from nodl.record.asked import Asked, AskedNode, all_asked
 from tests.recording.conftest import Recorded, RunRecorded
@@ -224,3 +227,16 @@ def test_a_script_is_what_its_interpreter_is(tmp_path: Path) -> None:
     script.write_text("#!/bin/sh\nexit 0\n")
     script.chmod(0o755)
     assert look_at_command([str(script)]).obstacle == ""
+
+
+def test_a_machine_without_a_compiler_takes_the_recorder_of_another_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    built = recorder_library()
+    monkeypatch.setenv("CC", "no-such-compiler")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    with pytest.raises(RuntimeFailure, match=rf"take {built.name} .* put it into {tmp_path}/enclave-launch"):
+        recorder_library()
+    (tmp_path / "enclave-launch").mkdir()
+    shutil.copy(built, tmp_path / "enclave-launch")
+    assert recorder_library() == tmp_path / "enclave-launch" / built.name
