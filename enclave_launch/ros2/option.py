@@ -23,6 +23,7 @@ from enclave_launch.boundary.terminal import message
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import (
+    add_explain_option,
     add_looking_options,
     add_policy_options,
     add_security_options,
@@ -42,6 +43,7 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
         add_security_options(group)
         add_policy_options(group)
+        add_explain_option(group)
         self._of_secured = tuple(group._group_actions)
         add_looking_options(group)
         for action in group._group_actions:
@@ -127,7 +129,12 @@ def _secured(description: Any, args: argparse.Namespace) -> Any:
         allow_late=args.allow_late,
         say_late=_say,
     )
-    return enclosed(description, EnclaveSession(PlannedDoor(gate)), launch)
+    explained = None
+    if not args.no_explain_denials:
+        from enclave_launch.ros2.explained import ExplainedLaunch
+
+        explained = ExplainedLaunch(plan)
+    return enclosed(description, EnclaveSession(PlannedDoor(gate)), launch, explained)
 
 
 def _with_our_defaults(args: argparse.Namespace) -> argparse.Namespace:

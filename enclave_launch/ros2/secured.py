@@ -14,7 +14,7 @@ import atexit
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, SetEnvironmentVariable, UnsetEnvironmentVariable
@@ -31,6 +31,9 @@ from enclave_launch.ros_rules.distro import choose_release
 from enclave_launch.secured import ProvisionedLaunch, zenoh_router
 from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY, SecuritySettings
 from nodl.ament_index import search_prefixes
+
+if TYPE_CHECKING:
+    from enclave_launch.ros2.explained import ExplainedLaunch
 
 EXTENSION = "enclave_launch.ros2.node_action"
 
@@ -58,9 +61,13 @@ def secured(
 
 
 def enclosed(
-    description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch
+    description: LaunchDescription,
+    session: EnclaveSession,
+    launch: ProvisionedLaunch,
+    explained: ExplainedLaunch | None = None,
 ) -> LaunchDescription:
-    """``description`` behind the actions that begin ``session`` and point every process at the keystore.
+    """``description`` behind the actions that begin ``session`` and point every process at the keystore;
+    ``explained``: who explains refusals.
 
     :raises RuntimeFailure: processes are on Zenoh, and no router answers or can be started.
     """
@@ -75,6 +82,8 @@ def enclosed(
     actions.append(UnsetEnvironmentVariable(OVERRIDE))
     actions.extend(UnsetEnvironmentVariable(name) for name in _read_secrets(launch))
     actions.append(OpaqueFunction(function=session.install))
+    if explained is not None:
+        actions.append(OpaqueFunction(function=explained.install))
     return LaunchDescription([*actions, *description.entities])
 
 

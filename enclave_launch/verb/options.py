@@ -323,6 +323,11 @@ def _add_recording(group: argparse._ArgumentGroup) -> None:
         help="run unsecured, and tell what the plan would refuse and what it grants that nobody asks for",
     )
     group.add_argument("--audit-report", metavar="FILE", type=Path, help="the audit as JSON, beside the text")
+    add_explain_option(group)
+
+
+def add_explain_option(group: argparse._ArgumentGroup) -> None:
+    """Also of ``ros2 launch``."""
     group.add_argument(
         "--no-explain-denials",
         action="store_true",

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.recording.stand_in_launch import PACKAGE, Program, build_stand_in, make_workspace
 from tests.ros2.conftest import Workspace
 from tests.ros2.upstream import install_metadata
 
@@ -389,3 +390,36 @@ def test_without_a_keystore_its_other_form_is_explained(demo: Workspace) -> None
     status, screen = launch(demo, "--secure", "demo", "demo.launch.xml")
     assert status != 0
     assert '--keystore "$(mktemp -d)/ks"' in screen
+
+
+STRING = "std_msgs/msg/String"
+
+
+def test_a_refusal_is_explained_as_by_secure_launch(
+    workspace: Workspace, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A process, and its neighbour that asks for no more than it may; the launch ends as without explanations."""
+    granted = (("publisher", "granted"),)
+    programs = [
+        Program(
+            "bold",
+            f"node bold\npublisher granted {STRING}\nsubscription secret {STRING}\n",
+            granted,
+            'name="b"',
+        ),
+        Program("good", f"node good\npublisher granted {STRING}\n", granted),
+    ]
+    stand_in = build_stand_in(workspace.directory)
+    made = make_workspace(tmp_path / "ws", stand_in, programs)
+    monkeypatch.setenv("STAND_IN_CATCHES", "1")
+    monkeypatch.setenv("ROS_DISTRO", "jazzy")
+    secured = ("-a", "--secure", "--keystore", str(tmp_path / "ks"), "--enclave-scope", "node")
+    for more in ([], ["--no-explain-denials"]):
+        ran = workspace.ros2_launch(*secured, *more, PACKAGE, "all.launch.xml", prefixes=(made.folder,))
+        said = ran.stdout
+        assert ran.returncode == 0, said
+        assert ("refused: node /b may not subscribe to topic /secret (enclave /b)" in said) is not bool(
+            more
+        ), said
+        assert said.count("refused: node") == (0 if more else 1)
+        assert "+  - {name: 'secret'" in said or more
