@@ -125,7 +125,7 @@ class _Collection:
 
     profiles: dict[str, dict[ProfileKey, Reasons]]
     nodes: dict[str, list[RunningNode]] = field(default_factory=dict)
-    problems: list[Diagnostic] = field(default_factory=list)
+    problems: list[list[Diagnostic]] = field(default_factory=list)  # of each node
     warnings: list[Diagnostic] = field(default_factory=list)
 
     def add(self, found: NodePermissions, policy_file: PolicyDocument | None) -> None:
@@ -135,13 +135,16 @@ class _Collection:
         for operation, name, reason in found.permissions:
             reasons.setdefault(Rule(operation, Qualifier.ALLOW, name), []).append(reason)
         self.warnings.extend(found.warnings)
+        problems: list[Diagnostic] = []
         for unresolved in found.unresolved:
             if unresolved.operation and _answered(policy_file, node, unresolved.operation):
                 self.warnings.append(policy_answers(unresolved.diagnostic))
             else:
-                self.problems.append(unresolved.diagnostic)
+                problems.append(unresolved.diagnostic)
+        self.problems.append(sorted(problems, key=lambda each: len(each.text)))
 
     def result(self) -> DerivedPolicy:
+        """What is easiest to close is told first: nodes with few open questions, of these the short ones."""
         enclaves = tuple(
             EnclavePolicy(
                 path,
@@ -153,7 +156,8 @@ class _Collection:
             enclave.path: _merged_reasons(enclave, self.profiles[enclave.path]) for enclave in enclaves
         }
         nodes = {path: tuple(each) for path, each in self.nodes.items()}
-        return DerivedPolicy(Policy(enclaves), reasons, nodes, _unique(self.problems), _unique(self.warnings))
+        problems = [each for of_node in sorted(self.problems, key=len) for each in of_node]
+        return DerivedPolicy(Policy(enclaves), reasons, nodes, _unique(problems), _unique(self.warnings))
 
 
 def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:

@@ -161,3 +161,16 @@ def test_what_is_missing_says_where_was_looked(workspace: Path) -> None:
     (workspace / "src/demo/src/filter.cpp").unlink()
     (problem,) = plan(workspace).problems
     assert "builds no executable 'filter_node'" in str(problem)
+
+
+def test_what_is_easiest_to_close_is_told_first(workspace: Path) -> None:
+    """Of one node the short questions first."""
+    few = FILTER.replace("auto input =", "acme::attach(this); auto input =")
+    many = few.replace(
+        "acme::attach(this);", "acme::attach_with_more(this); acme::attach(this); acme::other(this);"
+    )
+    write(workspace / "src/demo/src/filter.cpp", many)
+    planned = plan(workspace, '<launch><node pkg="demo" exec="filter_node" name="front"/></launch>')
+    texts = [problem.text for problem in planned.problems]
+    assert len(texts) == 3
+    assert texts == sorted(texts, key=len)
