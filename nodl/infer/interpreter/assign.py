@@ -113,7 +113,7 @@ def _set_by_descriptor(
 
 
 def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame) -> None:
-    from nodl.infer.interpreter.loops import store_item
+    from nodl.infer.interpreter.comprehensions import store_item
 
     owners = run.evaluate(target.value, frame)
     if isinstance(target.slice, ast.Slice):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import builtins
 
-from nodl.infer.interpreter import loops, special
+from nodl.infer.interpreter import comprehensions, special
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, truth, truth_of
 from nodl.infer.interpreter.define import make_function
@@ -178,7 +178,7 @@ def _dict(run: Run, node: ast.Dict, frame: Frame) -> Value:
     for key, value in zip(node.keys, node.values, strict=True):
         held = run.evaluate(value, frame)
         if key is not None:
-            loops.store_item(run, obj, run.evaluate(key, frame), held)
+            comprehensions.store_item(run, obj, run.evaluate(key, frame), held)
         else:
             copy_dictionary(run, obj, held)
     return (obj,)
@@ -467,10 +467,10 @@ EXPRESSIONS: dict[type, Evaluator] = {
     ast.Dict: _dict,
     ast.Subscript: _subscript,
     ast.Lambda: _lambda,
-    ast.ListComp: loops.comprehension,
-    ast.SetComp: loops.comprehension,
-    ast.GeneratorExp: loops.comprehension,
-    ast.DictComp: loops.dict_comprehension,
+    ast.ListComp: comprehensions.comprehension,
+    ast.SetComp: comprehensions.comprehension,
+    ast.GeneratorExp: comprehensions.comprehension,
+    ast.DictComp: comprehensions.dict_comprehension,
     ast.NamedExpr: _walrus,
     ast.Await: _await,
     ast.Yield: _yield,

@@ -1,4 +1,4 @@
-"""Loops and comprehensions: unrolled over known elements, else run to a fixpoint with widening."""
+"""Loops: followed turn by turn over known elements, else run to a fixpoint with widening."""
 
 from __future__ import annotations
 
@@ -13,14 +13,7 @@ from nodl.infer.interpreter.iterate import elements, lose
 from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
 from nodl.infer.models.concrete import NotConcrete, is_usable, pulled
 from nodl.infer.values import (
-    ABSENT,
-    BOTTOM,
-    OTHER,
-    OTHER_KEYS,
-    Dictionary,
     Items,
-    Key,
-    LocalCells,
     NativeObject,
     Sequence,
     Value,
@@ -103,17 +96,8 @@ def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Fr
             break
         seen.append(element)
         run.turns -= 1
-        previous = run.enter((id(node), index))
-        mark = run.state.mark()
-        frame.jump = ""
-        passes = _turn(run, node.target, element, node.body, frame)
-        run.context = previous
-        if frame.unsettled:
-            run.state.join_seen(mark)
-            frame.unsettled = False
-            broken = passes = True
-        elif frame.jump == "continue":
-            passes = True
+        passes, jumped = _followed(run, node, index, element, frame)
+        broken = broken or jumped
         if not passes:
             passes, finished = broken or frame.jump == "break", broken
             break
@@ -199,6 +183,22 @@ def _turn(run: Run, target: ast.expr, element: Value, body: list[ast.stmt], fram
     return run.execute(body, frame)
 
 
+def _followed(
+    run: Run, node: ast.For | ast.AsyncFor, index: int, element: Value, frame: Frame
+) -> tuple[bool, bool]:
+    """One turn by itself; may the next one follow, and may the loop have been left?"""
+    previous = run.enter((id(node), index))
+    mark = run.state.mark()
+    frame.jump = ""
+    passes = _turn(run, node.target, element, node.body, frame)
+    run.context = previous
+    if frame.unsettled:
+        run.state.join_seen(mark)
+        frame.unsettled = False
+        return True, True
+    return passes or frame.jump == "continue", False
+
+
 def _unrolled(
     run: Run, node: ast.For | ast.AsyncFor, exact: tuple[Value, ...], frame: Frame
 ) -> tuple[bool, bool]:
@@ -208,17 +208,8 @@ def _unrolled(
     run.state.depth += 1
     for index, element in enumerate(exact):
         run.turns -= not run.repeated
-        previous = run.enter((id(node), index))
-        mark = run.state.mark()
-        frame.jump = ""
-        passes = _turn(run, node.target, element, node.body, frame)
-        run.context = previous
-        if frame.unsettled:
-            run.state.join_seen(mark)
-            frame.unsettled = False
-            broken = passes = True
-        elif frame.jump == "continue":
-            passes = True
+        passes, jumped = _followed(run, node, index, element, frame)
+        broken = broken or jumped
         if not passes:
             run.state.depth -= 1
             if broken:
@@ -331,116 +322,3 @@ def _fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
         run.state.stakes += 1
     if jumped:
         run.state.join_seen(start)
-
-
-# --- comprehensions -------------------------------------------------------------------------------------
-
-
-def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
-    inner = _inner_frame(run, frame)
-    collected: list[Value] = []
-    exact = _generate(run, node.generators, 0, inner, lambda: collected.append(run.evaluate(node.elt, inner)))
-    _leave(inner)
-    kind = "set" if isinstance(node, ast.SetComp) else "list"
-    if exact:
-        return run.sequence(node, kind, Items(tuple(collected)))
-    result = BOTTOM
-    for value in collected:
-        result = join(result, value)
-    return run.sequence(node, kind, Items(None, result))
-
-
-def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
-    inner = _inner_frame(run, frame)
-    result = run.allocate(node, "dict", Dictionary)
-
-    def add() -> None:
-        key = run.evaluate(node.key, inner)
-        value = run.evaluate(node.value, inner)
-        store_item(run, result, key, value)
-
-    _generate(run, node.generators, 0, inner, add)
-    _leave(inner)
-    return (result,)
-
-
-def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
-    """``obj[key] = value`` for a dictionary."""
-    assert isinstance(obj, Dictionary)
-    if len(key) == 1 and isinstance(key[0], str | int | float | bool | type(None)):
-        cell = Key(key[0])
-        if not run.repeated and obj.cells.get(cell) == ABSENT:
-            del obj.cells[cell]  # it comes last again; undone, it is as absent as before
-        run.state.store(obj, cell, value)
-        return
-    known = [atom for atom in key if isinstance(atom, str | int)]
-    for atom in known:
-        cell = Key(atom)
-        run.state.write(obj.cells, cell, join(obj.cells.get(cell, ABSENT), value))
-    if len(known) < len(key):
-        run.state.write(obj.cells, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
-        run.state.write(obj.cells, OTHER_KEYS, join(obj.cells.get(OTHER_KEYS, BOTTOM), key))
-
-
-def _inner_frame(run: Run, frame: Frame) -> Frame:
-    closure = frame.closure if frame.is_class else frame
-    cells = LocalCells()
-    if frame.is_class:
-        cells.update(frame.cells)
-    inner = Frame(frame.module, cells, closure, run.state.depth)
-    inner.function = frame.function
-    inner.is_comprehension = True
-    return inner
-
-
-def _leave(inner: Frame) -> None:
-    """The variables of a comprehension die with it, unless a function made in it lives on."""
-    if type(inner.cells) is LocalCells and not inner.cells.shared:
-        inner.cells.dead = True
-
-
-def _generate(
-    run: Run, generators: list[ast.comprehension], index: int, frame: Frame, emit: Callable[[], None]
-) -> bool:
-    """Bind the targets for every combination and ``emit``. True: exactly the emitted elements, in order."""
-    if index == len(generators):
-        emit()
-        return True
-    generator = generators[index]
-    items = elements(run, run.evaluate(generator.iter, frame), generator.iter, frame)
-    if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.fuel):
-        run.repeated += 1
-        element = items.any_element()
-        if element:
-            for _ in range(2):  # the second time with what the first one left behind
-                run.state.maybe(lambda: _one(run, generators, index, frame, element, emit) or True)
-        run.repeated -= 1
-        return False
-    exact = True
-    run.turns -= 0 if run.repeated else len(items.exact)
-    for turn, element in enumerate(items.exact):
-        previous = run.enter((id(generator), turn))
-        exact = _one(run, generators, index, frame, element, emit) and exact
-        run.context = previous
-    return exact
-
-
-def _one(
-    run: Run,
-    generators: list[ast.comprehension],
-    index: int,
-    frame: Frame,
-    element: Value,
-    emit: Callable[[], None],
-) -> bool:
-    generator = generators[index]
-    run.spend(1)
-    assign(run, generator.target, element, frame)
-    certain = True
-    for condition in generator.ifs:
-        outcome = decide(run, condition, frame)
-        if outcome is False:
-            return True
-        narrowed(run, condition, True, frame)
-        certain = certain and outcome is True
-    return _generate(run, generators, index + 1, frame, emit) and certain

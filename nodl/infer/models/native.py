@@ -6,9 +6,9 @@ import collections
 from collections.abc import Callable
 
 from nodl.infer.interpreter import special
+from nodl.infer.interpreter.comprehensions import store_item
 from nodl.infer.interpreter.expressions import copy_dictionary, variable
 from nodl.infer.interpreter.iterate import elements, keys_of, values_of
-from nodl.infer.interpreter.loops import store_item
 from nodl.infer.interpreter.operators import joined, str_format, text_value
 from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.models import concrete

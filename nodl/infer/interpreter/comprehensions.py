@@ -1,0 +1,134 @@
+"""Comprehensions: over known elements exactly what they give, else any number of any element."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+
+from nodl.infer.interpreter.assign import assign
+from nodl.infer.interpreter.conditions import decide, narrowed
+from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.loops import MAX_UNROLLED
+from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.values import (
+    ABSENT,
+    BOTTOM,
+    OTHER,
+    OTHER_KEYS,
+    Dictionary,
+    Items,
+    Key,
+    LocalCells,
+    Value,
+    join,
+)
+
+
+def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
+    inner = _inner_frame(run, frame)
+    collected: list[Value] = []
+    exact = _generate(run, node.generators, 0, inner, lambda: collected.append(run.evaluate(node.elt, inner)))
+    _leave(inner)
+    kind = "set" if isinstance(node, ast.SetComp) else "list"
+    if exact:
+        return run.sequence(node, kind, Items(tuple(collected)))
+    result = BOTTOM
+    for value in collected:
+        result = join(result, value)
+    return run.sequence(node, kind, Items(None, result))
+
+
+def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
+    inner = _inner_frame(run, frame)
+    result = run.allocate(node, "dict", Dictionary)
+
+    def add() -> None:
+        key = run.evaluate(node.key, inner)
+        value = run.evaluate(node.value, inner)
+        store_item(run, result, key, value)
+
+    _generate(run, node.generators, 0, inner, add)
+    _leave(inner)
+    return (result,)
+
+
+def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
+    """``obj[key] = value`` for a dictionary."""
+    assert isinstance(obj, Dictionary)
+    if len(key) == 1 and isinstance(key[0], str | int | float | bool | type(None)):
+        cell = Key(key[0])
+        if not run.repeated and obj.cells.get(cell) == ABSENT:
+            del obj.cells[cell]  # it comes last again; undone, it is as absent as before
+        run.state.store(obj, cell, value)
+        return
+    known = [atom for atom in key if isinstance(atom, str | int)]
+    for atom in known:
+        cell = Key(atom)
+        run.state.write(obj.cells, cell, join(obj.cells.get(cell, ABSENT), value))
+    if len(known) < len(key):
+        run.state.write(obj.cells, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
+        run.state.write(obj.cells, OTHER_KEYS, join(obj.cells.get(OTHER_KEYS, BOTTOM), key))
+
+
+def _inner_frame(run: Run, frame: Frame) -> Frame:
+    closure = frame.closure if frame.is_class else frame
+    cells = LocalCells()
+    if frame.is_class:
+        cells.update(frame.cells)
+    inner = Frame(frame.module, cells, closure, run.state.depth)
+    inner.function = frame.function
+    inner.is_comprehension = True
+    return inner
+
+
+def _leave(inner: Frame) -> None:
+    """The variables of a comprehension die with it, unless a function made in it lives on."""
+    if type(inner.cells) is LocalCells and not inner.cells.shared:
+        inner.cells.dead = True
+
+
+def _generate(
+    run: Run, generators: list[ast.comprehension], index: int, frame: Frame, emit: Callable[[], None]
+) -> bool:
+    """Bind the targets for every combination and ``emit``. True: exactly the emitted elements, in order."""
+    if index == len(generators):
+        emit()
+        return True
+    generator = generators[index]
+    items = elements(run, run.evaluate(generator.iter, frame), generator.iter, frame)
+    if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.fuel):
+        run.repeated += 1
+        element = items.any_element()
+        if element:
+            for _ in range(2):  # the second time with what the first one left behind
+                run.state.maybe(lambda: _one(run, generators, index, frame, element, emit) or True)
+        run.repeated -= 1
+        return False
+    exact = True
+    run.turns -= 0 if run.repeated else len(items.exact)
+    for turn, element in enumerate(items.exact):
+        previous = run.enter((id(generator), turn))
+        exact = _one(run, generators, index, frame, element, emit) and exact
+        run.context = previous
+    return exact
+
+
+def _one(
+    run: Run,
+    generators: list[ast.comprehension],
+    index: int,
+    frame: Frame,
+    element: Value,
+    emit: Callable[[], None],
+) -> bool:
+    generator = generators[index]
+    run.spend(1)
+    assign(run, generator.target, element, frame)
+    certain = True
+    for condition in generator.ifs:
+        outcome = decide(run, condition, frame)
+        if outcome is False:
+            return True
+        narrowed(run, condition, True, frame)
+        certain = certain and outcome is True
+    return _generate(run, generators, index + 1, frame, emit) and certain
