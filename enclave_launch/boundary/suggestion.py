@@ -8,9 +8,12 @@ _ALIKE = 0.6  # of difflib's ratio: what Python's own "Did you mean" and git tak
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """``"; did you mean 'talker'?"``, or nothing where no known word is much like ``word``."""
+    """``"; did you mean 'talker'?"``, or nothing where no known word is much like ``word``. A word that goes on where
+    ``word`` ends comes first: who writes ``--form`` has begun ``--format`` and not mistyped ``--for``."""
     import difflib  # only a mistake needs it
 
     by_letters = {each.lower(): each for each in known if each != word}
-    close = difflib.get_close_matches(word.lower(), by_letters, n=1, cutoff=_ALIKE)
+    begun = [each for each in by_letters if each.startswith(word.lower())]
+    close = difflib.get_close_matches(word.lower(), begun, n=1, cutoff=_ALIKE)
+    close = close or difflib.get_close_matches(word.lower(), by_letters, n=1, cutoff=_ALIKE)
     return f"; did you mean {by_letters[close[0]]!r}?" if close else ""

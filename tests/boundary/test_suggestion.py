@@ -14,6 +14,8 @@ from enclave_launch.boundary.suggestion import did_you_mean
         ("demo_node", ["demo_nodes", "demo_nodes_cpp"], "demo_nodes"),
         ("--dryrun", ["--dry-run", "--secure"], "--dry-run"),
         ("/speeker", ["/speaker", "/ear"], "/speaker"),
+        ("--form", ["--for", "--format"], "--format"),
+        ("--fro", ["--for", "--format"], "--for"),
     ],
 )
 def test_what_was_probably_meant(word: str, known: list[str], meant: str) -> None:
