@@ -80,6 +80,12 @@ def _of_node(
     rules = _rules(record, gaps)
     endpoints = tuple(dict.fromkeys(e for found, when in record.endpoints.items() if _is_certain(found, when, record)
                                     for e in _endpoint(found, record)))  # fmt: skip
+    unnamed = [endpoint for endpoint in endpoints if not endpoint.name.parts]
+    endpoints = tuple(endpoint for endpoint in endpoints if endpoint.name.parts)
+    for endpoint in unnamed:  # rcl refuses an empty name, so that nothing is made under it
+        if not any(each.source == endpoint.source for each in endpoints):
+            what = endpoint.kind.value.replace("_", " ")
+            gaps.append(Gap(endpoint.source, f"the name of this {what} is empty: rcl refuses it"))
     names: list[str | None] = [*_texts(record.names, record)]
     if not names and record.description == "tf2_ros::TransformListener":
         names = [f"transform_listener_impl{RANDOM_ENDING}"]

@@ -88,7 +88,7 @@ def _image(run: Machine, call: Call, what: str, place: int = 3) -> Value:
             run.endpoint(owner.node, kind, info, _INFO, call.node, call.frame, follows)
     made = run.obj(
         ("image", call.frame.file.file, call.node.start_byte, call.frame.path),
-        Type(f"image_transport::{what}"),
+        Type(f"image_transport::{what.replace('subscription', 'subscriber').title().replace(' ', '')}"),
         heap=True,
     )
     return (made,)
@@ -234,3 +234,21 @@ def _filter(run: Machine, call: Call) -> Value:
 
 
 LIBRARY_METHODS[("image_transport::SubscriberFilter", "subscribe")] = _filter
+
+
+def _handle(what: str) -> None:
+    """image_transport/publisher.hpp and its siblings: default, copied, or (node, topic, ...) as the functions."""
+
+    def model(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
+        same = tuple(
+            a for value in arguments for a in value if isinstance(a, Obj) and a.type.name == this.type.name
+        )
+        if same or not arguments:
+            return same or None
+        return _image(run, Call(node, frame, arguments, []), what)
+
+    library_class(f"image_transport::{what.title().replace(' ', '')}")(model)
+
+
+for _what in ("publisher", "camera publisher", "subscriber", "camera subscriber"):
+    _handle(_what)

@@ -89,3 +89,27 @@ def test_a_transport_that_nothing_tells_is_a_gap(tmp_path: Path) -> None:
 def test_a_resolved_name_is_the_name_as_launch_makes_it(tmp_path: Path) -> None:
     body = 'create_publisher<std_msgs::msg::String>(get_node_topics_interface()->resolve_topic_name("a"), 1);'
     assert names(infer(tmp_path, in_class(body))) == ["a"]
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        'p_ = std::make_shared<image_transport::CameraPublisher>(image_transport::create_camera_publisher(this, "a"));',
+        'image_transport::CameraPublisher p(this, "a");',
+    ],
+)
+def test_a_publisher_that_is_copied_or_made_by_its_class(tmp_path: Path, made: str) -> None:
+    found = infer(tmp_path, in_class(made, before="#include <image_transport/image_transport.hpp>\n"))
+    assert names(found) == ["a", "a/compressed", "a/compressedDepth", "a/theora", "camera_info"]
+    assert gaps(found) == []
+
+
+def test_nothing_is_made_under_an_empty_name(tmp_path: Path) -> None:
+    body = (
+        'std::string t; if (now().seconds() > 1) { t = "a"; } create_publisher<std_msgs::msg::String>(t, 1);'
+    )
+    assert names(infer(tmp_path, in_class(body))) == ["a"]
+
+
+def test_an_empty_name_alone_is_a_gap(tmp_path: Path) -> None:
+    assert any("empty" in why for why in gaps(infer(tmp_path, in_class('create_publisher<M>("", 1);'))))
