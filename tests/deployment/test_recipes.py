@@ -86,8 +86,18 @@ def test_certificates_come_from_elsewhere(tmp_path: Path) -> None:
 
 def test_a_key_is_bound_to_the_machine(tmp_path: Path) -> None:
     tool("systemd-analyze", "apt-get install systemd")
-    if os.geteuid() != 0:
-        pytest.skip("systemd-creds wants to be root for the host's key")
+    secret = {**os.environ, "SYSTEMD_CREDENTIAL_SECRET": str(tmp_path / "secret")}
+    try_out = [
+        "systemd-creds",
+        "encrypt",
+        "--with-key=host",
+        "--name=x",
+        "/dev/null",
+        str(tmp_path / "tried"),
+    ]
+    tried = subprocess.run(try_out, env=secret, capture_output=True, text=True)
+    if tried.returncode != 0:  # not root, or a container without a machine id
+        pytest.skip(f"this machine has no secret of its own for systemd-creds: {tried.stderr}")
     made("systemd", tmp_path)
     (tmp_path / "out").rename(tmp_path / "deploy")
     follow("systemd-creds", tmp_path, SYSTEMD_CREDENTIAL_SECRET=str(tmp_path / "secret"))
@@ -95,7 +105,7 @@ def test_a_key_is_bound_to_the_machine(tmp_path: Path) -> None:
     assert key not in (tmp_path / "speaker.key.cred").read_bytes()
     shown = subprocess.run(
         ["systemd-creds", "decrypt", "--name=key.pem", tmp_path / "speaker.key.cred", "-"],
-        env={**os.environ, "SYSTEMD_CREDENTIAL_SECRET": str(tmp_path / "secret")}, capture_output=True, check=True,
+        env=secret, capture_output=True, check=True,
     )  # fmt: skip
     assert shown.stdout == key
 
