@@ -20,7 +20,8 @@ from enclave_launch.admission.middleware import middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic, middleware_refused, program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
-from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, Planner, mixed_enclaves, on_zenoh
+from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, mixed_enclaves, on_zenoh
+from enclave_launch.planner import Planner
 from enclave_launch.prefixes import ament_prefixes
 
 if TYPE_CHECKING:

@@ -1,48 +1,27 @@
 """The plan of a launch: everything decided, nothing done.
 
-Takes an ``Evaluation`` and a way to look up node interfaces; gives a ``LaunchPlan``, which the dry run prints,
-``provision`` turns into a keystore and ``run`` carries out. Pure: the look-up is handed in.
-
-What could not be found out is a value with a reason: a ``problem`` stops ``--secure`` and is a warning in a dry run.
+The values: ``planner`` makes a ``LaunchPlan``, which the dry run prints, ``provision`` turns into a keystore and
+``run`` carries out. Pure.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.admission import AdmissionOptions, prefix_refusals, refusals, remarks
-from enclave_launch.admission.domains import domain_of
-from enclave_launch.admission.handshakes import Member, Pair, failing, mixed_pairs
+from enclave_launch.admission import AdmissionOptions
+from enclave_launch.admission.handshakes import Member, Pair, mixed_pairs
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
 from enclave_launch.admission.middleware import ZENOH, middleware_of, vendor_of
 from enclave_launch.diagnostics import (
-    Code,
     Diagnostic,
-    container_elsewhere,
-    domains_shared,
-    enclave_attribute_unused,
-    enclave_shared_with_launcher,
-    enclave_too_deep,
-    enclave_ungranted,
-    executable_without_enclave,
-    handshake_fails,
-    library_version,
-    machine_elsewhere,
-    no_manifest,
-    node_name_unknown,
-    not_foreseeable,
-    parameters_unknown,
-    recording_incomplete,
 )
-from enclave_launch.enclave import EnclaveAssignment, EnclaveScope, assign_enclave
+from enclave_launch.enclave import EnclaveAssignment, EnclaveScope
 from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
-from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
-from enclave_launch.policy.launcher import launcher_node
-from enclave_launch.policy.running_node import Role, UnknownNodeName, node_of_component, node_of_process
+from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
     Evaluation,
@@ -51,8 +30,10 @@ from enclave_launch.process import (
 )
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
-from keystore.formats.subject import common_name
-from nodl.node_interface import RANDOM_ENDING, NodeInterface
+from nodl.node_interface import NodeInterface
+
+if TYPE_CHECKING:
+    from enclave_launch.planner import Planner
 
 
 class InterfaceOrigin(str, Enum):
@@ -206,7 +187,7 @@ class LaunchPlan(NamedTuple):
     @property
     def nodes(self) -> tuple[RunningNode, ...]:
         """Every node of the launch, the launcher's own last."""
-        return _nodes(self.processes, self.components, self.launcher)
+        return nodes_of(self.processes, self.components, self.launcher)
 
 
 class PlanOptions(NamedTuple):
@@ -240,62 +221,6 @@ class EvaluatedLaunch(NamedTuple):
     evaluation: Evaluation
 
 
-class Planner(NamedTuple):
-    """Makes the plan of one launch: assign enclaves, join interfaces with final names, derive the policy."""
-
-    source: LaunchSource
-    lookup: InterfaceLookup
-    options: PlanOptions
-
-    def plan(self, evaluation: Evaluation) -> LaunchPlan:
-        """Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse."""
-        scope = self.options.enclave_scope
-        processes = tuple(
-            self._admitted(_plan_process(process, self.lookup, scope), evaluation.distro)
-            for process in evaluation.processes
-        )
-        containers = _containers(processes)
-        components = tuple(_plan_component(item, containers, self.lookup) for item in evaluation.components)
-        launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
-        derived = derive_policy(
-            _nodes(processes, components, launcher),
-            distro=evaluation.distro,
-            options=self.options.policy,
-            also=_bare_enclaves(processes),
-        )
-        return LaunchPlan(
-            evaluation=evaluation,
-            planner=self,
-            processes=processes,
-            components=components,
-            launcher=launcher,
-            derived=derived,
-            problems=(*_problems(processes, components), *derived.problems),
-            warnings=(
-                *evaluation.warnings,
-                *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
-                *_notes(processes, components, launcher),
-                *(note for item in processes for note in remarks(item.process, evaluation.distro)),
-                *_domains_shared(processes),
-                *_ungranted(processes, derived),
-                *_handshakes(processes),
-                *derived.warnings,
-            ),
-        )
-
-    def _admitted(self, planned: PlannedProcess, distro: str) -> PlannedProcess:
-        """With what decides whether its enclave is used. An executable without one starts where none is found."""
-        process = planned.process
-        middleware = middleware_of(process.final_environment, distro)
-        if planned.enclave is None and process.kind == "executable":
-            unkept = tuple(prefix_refusals(process, self.options.admission))
-            return planned._replace(refusals=unkept, middleware=middleware)
-        refused = tuple(refusals(process, distro, self.options.admission))
-        bad = any(refusal.code is Code.DOMAIN_INVALID for refusal in refused)
-        domain = 0 if bad else domain_of(process.final_environment)
-        return planned._replace(refusals=refused, domain=domain, middleware=middleware)
-
-
 def enclave_domains(processes: Iterable[PlannedProcess]) -> dict[str, dict[int, list[PlannedProcess]]]:
     """Enclave path -> domain -> the processes of that enclave in it."""
     found: dict[str, dict[int, list[PlannedProcess]]] = {}
@@ -303,17 +228,6 @@ def enclave_domains(processes: Iterable[PlannedProcess]) -> dict[str, dict[int, 
         if item.enclave is not None:
             found.setdefault(item.enclave.path, {}).setdefault(item.domain, []).append(item)
     return found
-
-
-def _domains_shared(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
-    for enclave, by_domain in enclave_domains(processes).items():
-        if len(by_domain) > 1:
-            who = (
-                f"{item.process.process_name} in {domain}"
-                for domain, items in sorted(by_domain.items())
-                for item in items
-            )
-            yield domains_shared(enclave, ", ".join(map(str, sorted(by_domain))), tuple(who))
 
 
 def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
@@ -333,171 +247,10 @@ def on_zenoh(plan: LaunchPlan, environment: Mapping[str, str]) -> frozenset[str]
     return frozenset(found)
 
 
-def _handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
-    """With the subjects that enclaves have by themselves."""
-    pairs = mixed_enclaves(processes)
-    subjects = {path: common_name(path) for pair in pairs for path in pair}
-    for pair in failing(pairs, subjects):
-        yield handshake_fails(*pair, planned=True)
-
-
-def _ungranted(processes: Iterable[PlannedProcess], derived: DerivedPolicy) -> Iterator[Diagnostic]:
-    """Enclaves of executables for which no policy file speaks: signed, they permit nothing at all."""
-    empty = {enclave.path for enclave in derived.policy.enclaves if not enclave.profiles}
-    members: dict[str, list[PlannedProcess]] = {}
-    for item in processes:
-        if item.enclave and item.enclave.path in empty and item.process.kind == "executable":
-            members.setdefault(item.enclave.path, []).append(item)
-    for path, items in members.items():
-        names = tuple(item.process.process_name for item in items)
-        yield enclave_ungranted(path, names, items[0].location)
-
-
-def _nodes(
+def nodes_of(
     processes: Iterable[PlannedProcess], components: Iterable[PlannedComponent], launcher: RunningNode | None
 ) -> tuple[RunningNode, ...]:
+    """Every node of what is planned, the launcher's own last."""
     planned: Iterable[PlannedProcess | PlannedComponent] = (*processes, *components)
     own = (launcher,) if launcher else ()
     return (*(node for item in planned for node in item.nodes), *own)
-
-
-def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: EnclaveScope) -> PlannedProcess:
-    if process.kind == "executable":
-        return PlannedProcess(process, assign_enclave(process, scope), ())
-    found = lookup(process, None)
-    if isinstance(found, Missing):
-        unnamed = scope is EnclaveScope.NODE and process.name == UNSPECIFIED_NODE_NAME
-        enclave = None if unnamed else assign_enclave(process, scope)
-        return PlannedProcess(process, enclave, (), found)
-    name = found.interfaces[0].name if found.interfaces else None
-    enclave = assign_enclave(process, scope, name and name.removesuffix(RANDOM_ENDING))
-    path = enclave.path if enclave else "/"
-    role = _role(process)
-    try:
-        nodes = tuple(
-            node_of_process(process, interface, path, "node" if interface.own_rules else role)
-            for interface in found.interfaces
-        )
-    except UnknownNodeName as error:
-        missing = Missing(process.process_name, error.message, unnamed=True)
-        return PlannedProcess(process, enclave, (), missing)
-    return PlannedProcess(process, enclave, nodes, origin=found.origin, doubt=found.doubt)
-
-
-def _role(process: ResolvedProcess) -> Role:
-    if process.kind == "container" or process.package == "rclcpp_components":
-        return "container"
-    return "lifecycle_node" if process.kind == "lifecycle_node" else "node"
-
-
-def _plan_component(
-    component: ResolvedComponent, containers: Mapping[str, PlannedProcess], lookup: InterfaceLookup
-) -> PlannedComponent:
-    container = containers.get("/" + component.container.lstrip("/"))
-    found = lookup(component, container.process if container else None)
-    if isinstance(found, Missing):
-        return PlannedComponent(component, container, (), found)
-    if container is None or container.enclave is None:
-        return PlannedComponent(component, container, (), origin=found.origin, doubt=found.doubt)
-    try:
-        nodes = tuple(
-            node_of_component(component, container.process, interface, container.enclave.path)
-            for interface in found.interfaces
-        )
-    except UnknownNodeName as error:
-        return PlannedComponent(
-            component, container, (), Missing(component.plugin, error.message, unnamed=True)
-        )
-    return PlannedComponent(component, container, nodes, origin=found.origin, doubt=found.doubt)
-
-
-def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess]:
-    """Processes into which components may be loaded, by final name; of equal names the first one started."""
-    containers: dict[str, PlannedProcess] = {}
-    for planned in processes:
-        for node in planned.nodes:
-            containers.setdefault(node.fqn, planned)
-        if planned.fqn and not planned.nodes:
-            containers.setdefault("/" + planned.fqn.rpartition(">/")[2].lstrip("/"), planned)
-    return containers
-
-
-def _bare_enclaves(processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
-    """Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
-    without a manifest, which must not be missing from what a person looks at."""
-    return tuple(p.enclave.path for p in processes if p.enclave and not p.nodes)
-
-
-def _problems(
-    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
-) -> Iterator[Diagnostic]:
-    for process in processes:
-        if process.missing:
-            yield _missing(process.missing, process.process.location)
-        yield from process.refusals
-        if process.enclave and process.enclave.too_deep:
-            yield enclave_too_deep(
-                process.process.process_name, process.enclave.too_deep, process.process.location
-            )
-        for path, why in process.process.unread_parameter_files:
-            yield parameters_unknown(process.process.process_name, path, why, process.process.location)
-    for component in components:
-        if component.missing:
-            yield _missing(component.missing, component.component.location)
-
-
-def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
-    told = node_name_unknown if missing.unnamed else no_manifest
-    return told(missing.subject, missing.why, place)
-
-
-def _notes(
-    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent], launcher: RunningNode | None
-) -> Iterator[Diagnostic]:
-    for item in processes:
-        if item.enclave is None and item.process.kind == "executable":
-            yield executable_without_enclave(item.process.process_name, item.process.location)
-        if item.process.machine:
-            yield machine_elsewhere(item.process.process_name, item.process.machine, item.process.location)
-    for component in components:
-        if component.container is None:
-            target, place = component.component.container, component.component.location
-            yield container_elsewhere(component.fqn, target, _alike(target, processes), place)
-    yield from _library_versions(processes, components)
-    yield from _incomplete(_nodes(processes, components, None))
-    for item in processes:
-        process, attribute = item.process, item.process.enclave.attribute
-        if item.enclave and process.enclave.argument is not None and attribute is not None:
-            yield enclave_attribute_unused(
-                process.process_name, item.enclave.path, attribute, process.location
-            )
-    if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
-        yield enclave_shared_with_launcher(launcher.enclave)
-
-
-def _library_versions(
-    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
-) -> Iterator[Diagnostic]:
-    for item in processes:
-        if item.doubt:
-            program = f"{item.process.package}/{item.process.executable}"
-            yield library_version(program, item.doubt, item.process.location)
-    for component in components:
-        if component.doubt:
-            program = f"{component.component.package}/{component.component.plugin}"
-            yield library_version(program, component.doubt, component.component.location)
-
-
-def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:
-    """What was learnt from runs that cannot have shown all of a node."""
-    for node in nodes:
-        for why in node.interface.incomplete:
-            yield recording_incomplete(node.fqn, why, str(node.interface.source), node.location)
-
-
-def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
-    """Nodes of this launch whose last name is that of ``container``."""
-    last = "/" + container.rpartition("/")[2]
-    return tuple(
-        dict.fromkeys(node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last))
-    )

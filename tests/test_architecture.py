@@ -30,6 +30,8 @@ FLOORS = (
     {"evaluation"},
     {"enclave", "policy", "admission"},
     {"plan"},
+    {"plan_remarks"},
+    {"planner"},
     {"options", "prefixes", "security_environment", "served_domains"},
     {"interfaces"},
     {"review"},

@@ -23,7 +23,8 @@ from enclave_launch import flow
 from enclave_launch.errors import UsageError
 from enclave_launch.interfaces import InterfaceFinder
 from enclave_launch.options import ResolveOptions, SecurityOptions
-from enclave_launch.plan import LaunchSource, Planner
+from enclave_launch.plan import LaunchSource
+from enclave_launch.planner import Planner
 from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
 from enclave_launch.ros2.session import EnclaveSession, OpenDoor

@@ -11,7 +11,8 @@ import pytest
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.interfaces import InterfaceFinder
-from enclave_launch.plan import Found, LaunchPlan, LaunchSource, Missing, Planner, PlanOptions
+from enclave_launch.plan import Found, LaunchPlan, LaunchSource, Missing, PlanOptions
+from enclave_launch.planner import Planner
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 

@@ -34,8 +34,8 @@ class EmitEvent(Action):
         context.emit_event_sync(self.__event)
 
 
-class RegisterEventHandler(Action):
-    """Register a handler, for events that are handled from now on."""
+class _OfHandler(Action):
+    """An action about one event handler."""
 
     def __init__(self, event_handler: BaseEventHandler, **kwargs: Any) -> None:
         super().__init__(**kwargs)
@@ -44,31 +44,27 @@ class RegisterEventHandler(Action):
     @property
     def event_handler(self) -> BaseEventHandler:
         return self.__event_handler
+
+
+class RegisterEventHandler(_OfHandler):
+    """Register a handler, for events that are handled from now on."""
 
     def execute(self, context: LaunchContext) -> None:
         place = self.source_location
-        if place is not None and getattr(self.__event_handler, "source_location", None) is None:
-            self.__event_handler.source_location = place
-        context.register_event_handler(self.__event_handler)
+        if place is not None and getattr(self.event_handler, "source_location", None) is None:
+            self.event_handler.source_location = place
+        context.register_event_handler(self.event_handler)
 
     def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
-        text, entities = self.__event_handler.describe()
+        text, entities = self.event_handler.describe()
         return [(text, normalize_to_list_of_entities(entities))] if entities else []
 
 
-class UnregisterEventHandler(Action):
+class UnregisterEventHandler(_OfHandler):
     """Unregister a handler. Raises ``ValueError`` when it is not registered."""
 
-    def __init__(self, event_handler: BaseEventHandler, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__event_handler = event_handler
-
-    @property
-    def event_handler(self) -> BaseEventHandler:
-        return self.__event_handler
-
     def execute(self, context: LaunchContext) -> None:
-        context.unregister_event_handler(self.__event_handler)
+        context.unregister_event_handler(self.event_handler)
 
 
 @expose_action("shutdown")

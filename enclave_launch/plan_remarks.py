@@ -1,0 +1,147 @@
+"""What is to be told of a plan: problems, at which ``--secure`` stops and a dry run only warns, and notes. Pure.
+
+What could not be found out stands in the plan as a value with a reason; here it becomes a diagnostic.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from enclave_launch.admission.handshakes import failing
+from enclave_launch.diagnostics import (
+    Diagnostic,
+    container_elsewhere,
+    domains_shared,
+    enclave_attribute_unused,
+    enclave_shared_with_launcher,
+    enclave_too_deep,
+    enclave_ungranted,
+    executable_without_enclave,
+    handshake_fails,
+    library_version,
+    machine_elsewhere,
+    no_manifest,
+    node_name_unknown,
+    parameters_unknown,
+    recording_incomplete,
+)
+from enclave_launch.plan import (
+    Missing,
+    PlannedComponent,
+    PlannedProcess,
+    enclave_domains,
+    mixed_enclaves,
+    nodes_of,
+)
+from enclave_launch.policy import DerivedPolicy, RunningNode
+from enclave_launch.source_location import SourceLocation
+from keystore.formats.subject import common_name
+
+
+def problems(
+    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
+) -> Iterator[Diagnostic]:
+    """What ``--secure`` stops at, of each process and then of each component."""
+    for process in processes:
+        if process.missing:
+            yield _missing(process.missing, process.process.location)
+        yield from process.refusals
+        if process.enclave and process.enclave.too_deep:
+            yield enclave_too_deep(
+                process.process.process_name, process.enclave.too_deep, process.process.location
+            )
+        for path, why in process.process.unread_parameter_files:
+            yield parameters_unknown(process.process.process_name, path, why, process.process.location)
+    for component in components:
+        if component.missing:
+            yield _missing(component.missing, component.component.location)
+
+
+def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
+    told = node_name_unknown if missing.unnamed else no_manifest
+    return told(missing.subject, missing.why, place)
+
+
+def notes(
+    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent], launcher: RunningNode | None
+) -> Iterator[Diagnostic]:
+    """What a reader should know of single processes and components."""
+    for item in processes:
+        if item.enclave is None and item.process.kind == "executable":
+            yield executable_without_enclave(item.process.process_name, item.process.location)
+        if item.process.machine:
+            yield machine_elsewhere(item.process.process_name, item.process.machine, item.process.location)
+    for component in components:
+        if component.container is None:
+            target, place = component.component.container, component.component.location
+            yield container_elsewhere(component.fqn, target, _alike(target, processes), place)
+    yield from _library_versions(processes, components)
+    yield from _incomplete(nodes_of(processes, components, None))
+    for item in processes:
+        process, attribute = item.process, item.process.enclave.attribute
+        if item.enclave and process.enclave.argument is not None and attribute is not None:
+            yield enclave_attribute_unused(
+                process.process_name, item.enclave.path, attribute, process.location
+            )
+    if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
+        yield enclave_shared_with_launcher(launcher.enclave)
+
+
+def _library_versions(
+    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
+) -> Iterator[Diagnostic]:
+    for item in processes:
+        if item.doubt:
+            program = f"{item.process.package}/{item.process.executable}"
+            yield library_version(program, item.doubt, item.process.location)
+    for component in components:
+        if component.doubt:
+            program = f"{component.component.package}/{component.component.plugin}"
+            yield library_version(program, component.doubt, component.component.location)
+
+
+def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:
+    """What was learnt from runs that cannot have shown all of a node."""
+    for node in nodes:
+        for why in node.interface.incomplete:
+            yield recording_incomplete(node.fqn, why, str(node.interface.source), node.location)
+
+
+def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
+    """Nodes of this launch whose last name is that of ``container``."""
+    last = "/" + container.rpartition("/")[2]
+    return tuple(
+        dict.fromkeys(node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last))
+    )
+
+
+def shared_domains(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
+    """Enclaves whose processes are in several domains: each of them may join all."""
+    for enclave, by_domain in enclave_domains(processes).items():
+        if len(by_domain) > 1:
+            who = (
+                f"{item.process.process_name} in {domain}"
+                for domain, items in sorted(by_domain.items())
+                for item in items
+            )
+            yield domains_shared(enclave, ", ".join(map(str, sorted(by_domain))), tuple(who))
+
+
+def failing_handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
+    """Enclaves on two DDS implementations that cannot authenticate each other under the subjects they get here."""
+    pairs = mixed_enclaves(processes)
+    subjects = {path: common_name(path) for pair in pairs for path in pair}
+    for pair in failing(pairs, subjects):
+        yield handshake_fails(*pair, planned=True)
+
+
+def ungranted_enclaves(processes: Iterable[PlannedProcess], derived: DerivedPolicy) -> Iterator[Diagnostic]:
+    """Enclaves of executables for which no policy file speaks: signed, they permit nothing at all."""
+    empty = {enclave.path for enclave in derived.policy.enclaves if not enclave.profiles}
+    members: dict[str, list[PlannedProcess]] = {}
+    for item in processes:
+        if item.enclave and item.enclave.path in empty and item.process.kind == "executable":
+            members.setdefault(item.enclave.path, []).append(item)
+    for path, items in members.items():
+        names = tuple(item.process.process_name for item in items)
+        yield enclave_ungranted(path, names, items[0].location)

@@ -1,0 +1,162 @@
+"""From an evaluation to the plan: assign enclaves, join interfaces with final names, derive the policy.
+
+Takes an ``Evaluation`` and a way to look up node interfaces; gives a ``LaunchPlan``. Pure: the look-up is handed in.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+
+from enclave_launch import plan_remarks
+from enclave_launch.admission import prefix_refusals, refusals, remarks
+from enclave_launch.admission.domains import domain_of
+from enclave_launch.admission.middleware import middleware_of
+from enclave_launch.diagnostics import (
+    Code,
+    not_foreseeable,
+)
+from enclave_launch.enclave import EnclaveScope, assign_enclave
+from enclave_launch.plan import (
+    InterfaceLookup,
+    LaunchPlan,
+    LaunchSource,
+    Missing,
+    PlannedComponent,
+    PlannedProcess,
+    PlanOptions,
+    nodes_of,
+)
+from enclave_launch.policy import derive_policy
+from enclave_launch.policy.launcher import launcher_node
+from enclave_launch.policy.running_node import Role, UnknownNodeName, node_of_component, node_of_process
+from enclave_launch.process import (
+    UNSPECIFIED_NODE_NAME,
+    Evaluation,
+    ResolvedComponent,
+    ResolvedProcess,
+)
+from nodl.node_interface import RANDOM_ENDING
+
+
+class Planner(NamedTuple):
+    """Makes the plan of one launch: assign enclaves, join interfaces with final names, derive the policy."""
+
+    source: LaunchSource
+    lookup: InterfaceLookup
+    options: PlanOptions
+
+    def plan(self, evaluation: Evaluation) -> LaunchPlan:
+        """Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse."""
+        scope = self.options.enclave_scope
+        processes = tuple(
+            self._admitted(_plan_process(process, self.lookup, scope), evaluation.distro)
+            for process in evaluation.processes
+        )
+        containers = _containers(processes)
+        components = tuple(_plan_component(item, containers, self.lookup) for item in evaluation.components)
+        launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
+        derived = derive_policy(
+            nodes_of(processes, components, launcher),
+            distro=evaluation.distro,
+            options=self.options.policy,
+            also=_bare_enclaves(processes),
+        )
+        return LaunchPlan(
+            evaluation=evaluation,
+            planner=self,
+            processes=processes,
+            components=components,
+            launcher=launcher,
+            derived=derived,
+            problems=(*plan_remarks.problems(processes, components), *derived.problems),
+            warnings=(
+                *evaluation.warnings,
+                *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
+                *plan_remarks.notes(processes, components, launcher),
+                *(note for item in processes for note in remarks(item.process, evaluation.distro)),
+                *plan_remarks.shared_domains(processes),
+                *plan_remarks.ungranted_enclaves(processes, derived),
+                *plan_remarks.failing_handshakes(processes),
+                *derived.warnings,
+            ),
+        )
+
+    def _admitted(self, planned: PlannedProcess, distro: str) -> PlannedProcess:
+        """With what decides whether its enclave is used. An executable without one starts where none is found."""
+        process = planned.process
+        middleware = middleware_of(process.final_environment, distro)
+        if planned.enclave is None and process.kind == "executable":
+            unkept = tuple(prefix_refusals(process, self.options.admission))
+            return planned._replace(refusals=unkept, middleware=middleware)
+        refused = tuple(refusals(process, distro, self.options.admission))
+        bad = any(refusal.code is Code.DOMAIN_INVALID for refusal in refused)
+        domain = 0 if bad else domain_of(process.final_environment)
+        return planned._replace(refusals=refused, domain=domain, middleware=middleware)
+
+
+def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: EnclaveScope) -> PlannedProcess:
+    if process.kind == "executable":
+        return PlannedProcess(process, assign_enclave(process, scope), ())
+    found = lookup(process, None)
+    if isinstance(found, Missing):
+        unnamed = scope is EnclaveScope.NODE and process.name == UNSPECIFIED_NODE_NAME
+        enclave = None if unnamed else assign_enclave(process, scope)
+        return PlannedProcess(process, enclave, (), found)
+    name = found.interfaces[0].name if found.interfaces else None
+    enclave = assign_enclave(process, scope, name and name.removesuffix(RANDOM_ENDING))
+    path = enclave.path if enclave else "/"
+    role = _role(process)
+    try:
+        nodes = tuple(
+            node_of_process(process, interface, path, "node" if interface.own_rules else role)
+            for interface in found.interfaces
+        )
+    except UnknownNodeName as error:
+        missing = Missing(process.process_name, error.message, unnamed=True)
+        return PlannedProcess(process, enclave, (), missing)
+    return PlannedProcess(process, enclave, nodes, origin=found.origin, doubt=found.doubt)
+
+
+def _role(process: ResolvedProcess) -> Role:
+    if process.kind == "container" or process.package == "rclcpp_components":
+        return "container"
+    return "lifecycle_node" if process.kind == "lifecycle_node" else "node"
+
+
+def _plan_component(
+    component: ResolvedComponent, containers: Mapping[str, PlannedProcess], lookup: InterfaceLookup
+) -> PlannedComponent:
+    container = containers.get("/" + component.container.lstrip("/"))
+    found = lookup(component, container.process if container else None)
+    if isinstance(found, Missing):
+        return PlannedComponent(component, container, (), found)
+    if container is None or container.enclave is None:
+        return PlannedComponent(component, container, (), origin=found.origin, doubt=found.doubt)
+    try:
+        nodes = tuple(
+            node_of_component(component, container.process, interface, container.enclave.path)
+            for interface in found.interfaces
+        )
+    except UnknownNodeName as error:
+        return PlannedComponent(
+            component, container, (), Missing(component.plugin, error.message, unnamed=True)
+        )
+    return PlannedComponent(component, container, nodes, origin=found.origin, doubt=found.doubt)
+
+
+def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess]:
+    """Processes into which components may be loaded, by final name; of equal names the first one started."""
+    containers: dict[str, PlannedProcess] = {}
+    for planned in processes:
+        for node in planned.nodes:
+            containers.setdefault(node.fqn, planned)
+        if planned.fqn and not planned.nodes:
+            containers.setdefault("/" + planned.fqn.rpartition(">/")[2].lstrip("/"), planned)
+    return containers
+
+
+def _bare_enclaves(processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
+    """Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
+    without a manifest, which must not be missing from what a person looks at."""
+    return tuple(p.enclave.path for p in processes if p.enclave and not p.nodes)
