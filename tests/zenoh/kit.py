@@ -10,6 +10,7 @@ from __future__ import annotations
 import contextlib
 import itertools
 import json
+import os
 import socket
 import time
 from collections.abc import Callable, Iterator
@@ -22,7 +23,7 @@ import zenoh.ext
 PATIENCE = 30.0
 STRING = "std_msgs::msg::dds_::String_/RIHS01_df668c74"
 TRIGGER = "std_srvs::srv::dds_::Trigger_/RIHS01_eeff2cd6"
-_marks = itertools.count()
+_marks, _ports = itertools.count(), itertools.count()
 
 
 def wait_for(condition: Callable[[], object]) -> bool:
@@ -36,9 +37,14 @@ def wait_for(condition: Callable[[], object]) -> bool:
 
 
 def free_port() -> int:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """Below those that the system gives to outgoing connections, so that it is still free when a router wants it; each
+    test process begins elsewhere."""
+    for _ in range(1000):
+        port = 20_000 + (os.getpid() * 37 + next(_ports)) % 12_000
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
+    raise AssertionError("no free port between 20000 and 32000")
 
 
 def router(keystore: Path, text: str | None = None) -> Any:
