@@ -55,8 +55,9 @@ class DriftWatch:
     """A ``LaunchCompanion``. ``alarms``: how many there were."""
 
     def __init__(self, document: Mapping[str, Any], options: WatchOptions) -> None:
-        self._document, self._options = document, options
+        self._options = options
         self._domains = sorted({each["domain_id"] for each in document["processes"]})
+        self._expected = {domain: expected_in([document], domain) for domain in self._domains}
         self._observers: dict[int, _Observer] = {}
         self._steady = {domain: Steady(options.patience) for domain in self._domains}
         self._launch: LaunchControl | None = None
@@ -118,8 +119,8 @@ class DriftWatch:
         circumstances = Circumstances(
             self._options.security, self._options.accepted, _strangers(graph, self._started), forged
         )
-        expected = expected_in([self._document], domain)
-        change = self._steady[domain].at(time.monotonic(), compare(expected, graph, circumstances))
+        findings = compare(self._expected[domain], graph, circumstances)
+        change = self._steady[domain].at(time.monotonic(), findings)
         for each in change.new:
             self.alarms += each.level is Level.ALARM
             self._tell("new", each)
