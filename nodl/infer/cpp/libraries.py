@@ -13,7 +13,8 @@ from nodl.infer.cpp.running.values import BOTTOM, Obj, Value
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.running.machine import Frame, Machine
+    from nodl.infer.cpp.running.frames import Frame
+    from nodl.infer.cpp.running.machine import Machine
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,8 @@ from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.machine import BudgetExceeded, Frame, Machine, Settings
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import BudgetExceeded, Machine, Settings
 from nodl.infer.cpp.running.values import BOTTOM, Obj, Seq, Value, unknown
 from nodl.infer.cpp.syntax import line_of
 from nodl.source_ref import SourceRef

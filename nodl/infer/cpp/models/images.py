@@ -8,7 +8,8 @@ from nodl.infer.cpp.findings import Follows
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call, library_class, library_function
 from nodl.infer.cpp.models.table import PUB, SUB, owner_in, texts_in
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import Obj, Param, Text, Value, concatenated, join, literal, plain, unknown
 from nodl.name_template import ParameterPart
 

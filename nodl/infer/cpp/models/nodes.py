@@ -18,7 +18,8 @@ from nodl.infer.cpp.libraries import (
     node_method,
 )
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     NodePart,

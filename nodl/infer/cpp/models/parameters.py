@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method, node_method
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,

@@ -12,7 +12,8 @@ from nodl.infer.cpp.libraries import Call, library_class, library_method
 from nodl.infer.cpp.models.parameters import parameter_names
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Value, join, unknown
 
 if TYPE_CHECKING:

@@ -14,7 +14,8 @@ from nodl.infer.cpp.models.interfaces import add
 from nodl.infer.cpp.models.nodes import become_node
 from nodl.infer.cpp.reading.type_names import ros_type
 from nodl.infer.cpp.running.contents import nodes_in
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Text, Value, concatenated, literal, unknown
 from nodl.node_interface import EndpointKind
 

@@ -8,7 +8,8 @@ from nodl.infer.cpp.libraries import library_class
 from nodl.infer.cpp.models.nodes import become_node
 from nodl.infer.cpp.models.table import ACT, SRV, SUB, TF, Makes, make, owner_in
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import Obj, Value, concatenated, literal, unknown
 
 if TYPE_CHECKING:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.contents import copied
-from nodl.infer.cpp.running.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,

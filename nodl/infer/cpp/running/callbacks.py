@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.ledger import Reach
 from nodl.infer.cpp.reading.writes import Writes, writes_of
+from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
-from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, WORD, Frame, Machine
+from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, WORD, Machine
 from nodl.infer.cpp.running.store import Cell, Changes
 from nodl.infer.cpp.running.values import (
     BOTTOM,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.running.machine import Frame, Machine, template_arguments
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine, template_arguments
 from nodl.infer.cpp.syntax import text
 
 if TYPE_CHECKING:

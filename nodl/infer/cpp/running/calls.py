@@ -12,8 +12,9 @@ from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BA
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
 from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import call_functions, call_methods, call_values
-from nodl.infer.cpp.running.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.method_calls import by_model, is_library_method, method_call, on_object
 from nodl.infer.cpp.running.objects import is_plain_type, made
 from nodl.infer.cpp.running.standard import CASTS, STANDARD

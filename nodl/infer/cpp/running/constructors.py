@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.running.contents import copied, handed_over
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
 from nodl.infer.cpp.running.objects import MAPS, SEQUENCES, converted, default_value, initial_value, made
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Map, Obj, Seq, Text, Value, unknown
 from nodl.infer.cpp.syntax import children

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.objects import made
 from nodl.infer.cpp.running.operators import element
 from nodl.infer.cpp.running.values import (

@@ -6,7 +6,8 @@ import re
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.objects import as_map, made
 from nodl.infer.cpp.running.operators import has_text
 from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown

@@ -11,7 +11,8 @@ from nodl.infer.cpp.reading.collect import parameters_of
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import bind_parameters, chosen
 from nodl.infer.cpp.running.contents import handed_over
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.contents import copied, iterated
-from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
+from nodl.infer.cpp.running.frames import Frame, Loop
+from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Machine, statement
 from nodl.infer.cpp.running.statements import bind_names, condition_value
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.values import Value, join, unknown

@@ -7,15 +7,15 @@ libraries. A place that was run is noted; the ledger later asks about every othe
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.findings import Condition, Follows, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
-from nodl.infer.cpp.reading.declarations import FileIndex, Function, Scope
+from nodl.infer.cpp.reading.declarations import Function
 from nodl.infer.cpp.reading.names import Names
-from nodl.infer.cpp.reading.type_names import Type, split_type
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.store import Changes, Store
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -28,7 +28,6 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     concatenated,
-    join,
     plain,
     unknown,
 )
@@ -40,6 +39,9 @@ from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from tree_sitter import Node
+
+    from nodl.infer.cpp.running.frames import Frame
+
 
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
@@ -71,50 +73,6 @@ def expression(*kinds: str) -> Callable[[ExpressionHandler], ExpressionHandler]:
         return handler
 
     return register
-
-
-@dataclass(eq=False)
-class Loop:
-    """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start``."""
-
-    mark: int
-    start: int
-    breaks: list[Changes] = field(default_factory=list)
-    continues: list[Changes] = field(default_factory=list)
-
-
-@dataclass(eq=False)
-class Frame:
-    """A call that runs. ``path`` tells apart what is made at one place through different calls."""
-
-    file: FileIndex
-    scope: Scope
-    function: Function | None = None
-    this: Obj | None = None
-    bindings: Mapping[str, Type] = field(default_factory=dict)
-    outer: Frame | None = None  # of a lambda: where its captures live
-    path: tuple[object, ...] = ()
-    conditions: tuple[Condition, ...] = ()
-    types: dict[str, str] = field(default_factory=dict)
-    names: set[str] = field(default_factory=set)
-    returned: Value = BOTTOM
-    exits: list[Changes] = field(default_factory=list)
-    exit_values: list[Value] = field(default_factory=list)
-    mark: int = 0
-    loops: list[Loop] = field(default_factory=list)
-    depth: int = 0
-    finished: bool = False  # nobody can see its variables any more
-    captured: bool = False  # a lambda can
-    active: bool = False  # runs now
-
-    def owner_of(self, name: str) -> Frame | None:
-        """The frame whose variable ``name`` is."""
-        frame: Frame | None = self
-        while frame is not None:
-            if name in frame.names:
-                return frame
-            frame = frame.outer
-        return None
 
 
 @dataclass(frozen=True)
@@ -419,6 +377,3 @@ def template_arguments(node: Node | None) -> list[Node]:
 
 def is_reference(written: str) -> bool:
     return written.rstrip().endswith(("&", "*"))
-
-
-__all__ = ["Frame", "Machine", "Scope", "join", "split_type"]

@@ -11,8 +11,9 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
+from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import call_methods, call_values
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
 from nodl.infer.cpp.running.values import (
     BOTTOM,

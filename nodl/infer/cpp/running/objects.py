@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.contents import copied
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Seq, Value, literal, unknown
 from nodl.infer.cpp.syntax import children, text
 

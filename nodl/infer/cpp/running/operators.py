@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
-from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import NEXT, Machine, expression
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.contents import items_of
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,

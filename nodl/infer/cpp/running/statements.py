@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
-from nodl.infer.cpp.running.machine import BREAK, CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
+from nodl.infer.cpp.running.frames import Frame, Loop
+from nodl.infer.cpp.running.machine import BREAK, CONTINUE, NEXT, RETURN, Machine, statement
 from nodl.infer.cpp.running.objects import declared_value
 from nodl.infer.cpp.running.values import BOTTOM, Group, Value, join, truth, unknown
 from nodl.infer.cpp.syntax import children, parse_expression, text, unwrapped, walk

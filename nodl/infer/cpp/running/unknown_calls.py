@@ -9,7 +9,8 @@ from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Seq, Text, Value, join, unknown
 from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import text, unwrapped

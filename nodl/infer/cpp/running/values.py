@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.findings import NodeRecord
     from nodl.infer.cpp.reading.declarations import Class, Function
     from nodl.infer.cpp.reading.type_names import Type
-    from nodl.infer.cpp.running.machine import Frame
+    from nodl.infer.cpp.running.frames import Frame
 
 MAX_ALTERNATIVES = 32
 MAX_SEQUENCES = 6
