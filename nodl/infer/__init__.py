@@ -6,7 +6,24 @@ at what launch starts as ``lib/<package>/<executable>``. What could not be found
 
 from __future__ import annotations
 
-from nodl.infer.executable import InferredExecutable, infer_executable
-from nodl.infer.system import InferredSystem, infer_paths
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from nodl.infer.executable import InferredExecutable, infer_executable
+    from nodl.infer.system import InferredSystem, infer_paths
 
 __all__ = ["InferredExecutable", "InferredSystem", "infer_executable", "infer_paths"]
+_HOMES = {
+    "InferredExecutable": "nodl.infer.executable",
+    "InferredSystem": "nodl.infer.system",
+    "infer_executable": "nodl.infer.executable",
+    "infer_paths": "nodl.infer.system",
+}
+
+
+def __getattr__(name: str) -> object:
+    """Imported when first used: who asks what a launch starts often needs no analysis at all."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_HOMES[name]), name)
