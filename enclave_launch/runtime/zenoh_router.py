@@ -216,8 +216,9 @@ def missing_router(address: tuple[str, int], configuration: str) -> str:
     return (
         f"processes of this launch are on Zenoh (rmw_zenoh_cpp), no router answers at tls/{host}:{port}, and none can "
         f"be started: no {PROGRAM} below AMENT_PREFIX_PATH. Install the package rmw_zenoh_cpp (apt: "
-        f"ros-$ROS_DISTRO-rmw-zenoh-cpp) and source its setup file, or start a router with "
-        f"{CONFIGURATION}={configuration}"
+        f"ros-$ROS_DISTRO-rmw-zenoh-cpp) and source its setup file, or start a router elsewhere with "
+        f"{CONFIGURATION}={configuration} (secure-keystore apply-policy writes it, from the policy that --dry-run "
+        f"--format policy prints)"
     )
 
 

@@ -27,15 +27,23 @@ def type_into(page: Page, field: str, text: str) -> None:
     page.run(f"document.getElementById('{field}').focus()")
     page.run(f"document.getElementById('{field}').select()")
     page.call("Input.insertText", text=text)
+    settled(page)
 
 
 def click(page: Page, selector: str) -> None:
     """With the mouse, in the middle of the element."""
+    settled(page)
     x, y = page.run(
         f"(() => {{ const e = document.querySelector({selector!r}); e.scrollIntoView({{block: 'center'}}); "
         "const r = e.getBoundingClientRect(); return [r.x + r.width / 2, r.y + r.height / 2]; })()"
     )
     page.click(x, y)
+    settled(page)
+
+
+def settled(page: Page) -> None:
+    """Wait until what was asked for is laid out and shown: on a busy machine a frame comes late."""
+    page.run("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
 
 
 def listed(page: Page) -> list[str]:
