@@ -36,7 +36,7 @@ def _section(derived: DerivedPolicy, enclave: str, wanted: Wanted) -> Iterator[s
         chosen = [reason for reason in reasons if wanted(rule, reason)]
         if chosen:
             denied = "DENY " if rule.qualifier is Qualifier.DENY else ""
-            yield f"  {denied}{rule.operation.value} {rule.expression}"
+            yield f"  {denied}{rule.operation.verb} {rule.expression}"
             for reason in chosen:
                 yield from _because(reason)
 

@@ -199,7 +199,7 @@ class _Collector:
         final = join(self._node.process_namespace, name)
         note = "a pattern, because its name is made up at each start"
         self._result.warnings.append(
-            pattern_accepted(self._fqn, operation.value, final, f"{note} ({place})", self._node.location)
+            pattern_accepted(self._fqn, operation.verb, final, f"{note} ({place})", self._node.location)
         )
         return Permission(operation, final, Reason(self._fqn, "built-in", place, name, (), note))
 
@@ -261,7 +261,7 @@ class _Collector:
             self._unresolved(
                 operation,
                 place,
-                f"the name of what it would {operation.value} is not known ({template}: {why})",
+                f"the name of what it would {operation.verb} is not known ({template}: {why})",
             )
             return
         try:
@@ -275,7 +275,7 @@ class _Collector:
         reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note, endpoint.type)
         self._result.permissions.append(Permission(operation, name, reason))
         self._result.warnings.append(
-            pattern_accepted(self._fqn, operation.value, name, note, SourceLocation.read(place))
+            pattern_accepted(self._fqn, operation.verb, name, note, SourceLocation.read(place))
         )
 
     def _impossible(self, error: InvalidNameError) -> None:

@@ -84,10 +84,10 @@ def _denials(path: str, reasons: Mapping[Rule, tuple[Reason, ...]]) -> list[Diag
     denials = [(rule, why) for rule, why in reasons.items() if rule.qualifier is Qualifier.DENY]
     return [
         policy_denies_need(
-            f"{denial.operation.value} {denial.expression}",
+            f"{denial.operation.verb} {denial.expression}",
             path,
             need.node,
-            f"{rule.operation.value} {rule.expression}",
+            f"{rule.operation.verb} {rule.expression}",
             need.place,
             SourceLocation.read(why[0].place),
         )

@@ -22,7 +22,7 @@ class Gain:
 
     def __str__(self) -> str:
         how = "shares a container" if self.composed else f"shares enclave {self.enclave}"
-        names = ", ".join(f"{rule.operation.value} {rule.expression}" for rule in self.gained)
+        names = ", ".join(f"{rule.operation.verb} {rule.expression}" for rule in self.gained)
         return f"node {self.node} {how} and may thereby also {names}"
 
 

@@ -18,7 +18,8 @@ class PolicyError(InvalidInputError):
 
 
 class Operation(str, Enum):
-    """What a rule is about; the value is the attribute of the policy XML."""
+    """What a rule is about; the value is the attribute of the policy XML, where ``call`` is said of actions alone.
+    ``verb`` is what people are told: the same words for topics, services and actions everywhere."""
 
     __hash__ = str.__hash__  # rules are sought by the thousand; that of Enum is Python
 
@@ -28,6 +29,19 @@ class Operation(str, Enum):
     REQUEST = "request"  # call a service
     EXECUTE = "execute"  # serve an action
     CALL = "call"  # call an action
+
+    @property
+    def verb(self) -> str:
+        """Of ``node /a may VERB /name``."""
+        return _VERBS.get(self, str(self.value))
+
+
+_VERBS = {
+    Operation.REPLY: "serve",
+    Operation.REQUEST: "call",
+    Operation.EXECUTE: "serve action",
+    Operation.CALL: "call action",
+}
 
 
 class Qualifier(str, Enum):

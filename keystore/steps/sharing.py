@@ -115,7 +115,7 @@ def kept_shares(shares: Iterable[EnclaveShare]) -> list[str]:
 def _words(profiles: Iterable[Profile]) -> set[str]:
     """``publish /chatter``: what is allowed, by full names."""
     return {
-        f"{operation.value} {full_name(expression, profile)}"
+        f"{operation.verb} {full_name(expression, profile)}"
         for profile in profiles
         for operation, qualifier, expression in profile.rules
         if qualifier is Qualifier.ALLOW
