@@ -6,10 +6,11 @@ components, changing states) has nobody to do it there.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from enum import Enum
 from typing import Any, NamedTuple
 
+from enclave_launch.deployment.processes import DeployedProcess
 from enclave_launch.diagnostics import Code
 
 
@@ -41,6 +42,22 @@ def unexpressed(document: Mapping[str, Any], engine: Engine) -> tuple[Unexpresse
         *_unforeseen(document),
     )
     return tuple(dict.fromkeys(found))
+
+
+def unexpressed_needs(processes: Iterable[DeployedProcess], engine: Engine) -> tuple[Unexpressed, ...]:
+    """What the hosts file says that a process needs and ``engine`` cannot be told by one object: on Kubernetes devices
+    come from a device plugin, and real-time scheduling from the node's configuration."""
+    if engine is not Engine.KUBERNETES:
+        return ()
+    wanted = [
+        (one, (*one.needs.devices, *(["real-time scheduling"] if one.needs.realtime else [])))
+        for one in processes
+    ]
+    return tuple(
+        Unexpressed(f"{one.process} needs {', '.join(what)}, which the cluster has to provide", one.place)
+        for one, what in wanted
+        if what
+    )
 
 
 def ends_launch(document: Mapping[str, Any]) -> frozenset[str]:

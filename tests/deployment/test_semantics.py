@@ -111,3 +111,21 @@ def test_an_enclave_that_is_not_provisioned_is_not_exported(
     launch.write_text(TALK.replace('name="ear"', 'name="other"'))
     assert export("systemd", launch, ks, tmp_path / "out") == 1
     assert "enclave /other is not complete" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_devices_and_real_time_are_said_to_the_engines_that_know_them(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], engine: str
+) -> None:
+    launch = launch_file(tmp_path, TALK, "robot.launch.xml")
+    ks = provisioned(launch, tmp_path / "ks")
+    hosts = tmp_path / "hosts.yaml"
+    hosts.write_text("version: 1\nneeds:\n  - {nodes: [/front/*], devices: [/dev/video0], realtime: true}\n")
+    words = (engine, launch, ks, tmp_path / "out")
+    status = export(*words, "--hosts", str(hosts))
+    error = capsys.readouterr().err
+    if engine == "kubernetes":
+        assert status == 1 and "needs /dev/video0, real-time scheduling, which the cluster has to" in error
+        assert export(*words, "--hosts", str(hosts), "--accept-unexpressed") == 0
+    else:
+        assert (status, error) == (0, "")

@@ -71,15 +71,17 @@ def run(options: argparse.Namespace) -> int:
     from enclave_launch.deployment.folder import write_folder
     from enclave_launch.deployment.placement import ONLY_HOST, place
     from enclave_launch.deployment.processes import deployed_processes
-    from enclave_launch.deployment.semantics import Engine, unexpressed
+    from enclave_launch.deployment.semantics import Engine, unexpressed, unexpressed_needs
 
     _check(options)
     document = read_plan(options.words, options)
     engine = Engine(options.format)
     _refuse_problems(document)
-    lost = unexpressed(document, engine)
+    hosts = hosts_of(options.hosts)
+    processes = [one._replace(needs=hosts.needs_of(one.nodes)) for one in deployed_processes(document)]
+    placement = place(processes, hosts)
+    lost = (*unexpressed(document, engine), *unexpressed_needs(processes, engine))
     _refuse_lost(lost, engine, options.accept_unexpressed)
-    placement = place(deployed_processes(document), hosts_of(options.hosts))
     _refuse_nowhere(placement)
     several = list(placement.hosts) != [ONLY_HOST]
     changed: list[str] = []
@@ -154,8 +156,7 @@ def _deployment(
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.review.information_flow import flow_graph
 
-    hosts = hosts_of(options.hosts)
-    processes = tuple(one._replace(needs=hosts.needs_of(one.nodes)) for one in placement.hosts[key])
+    processes = placement.hosts[key]
     graph = flow_graph(plan_from_document(document))
     notes = differences(document, Engine(options.format))
     for note in notes:
