@@ -5,7 +5,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -30,7 +30,8 @@ class ResolveOptions:
     """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
     else the newest; ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their
     sources be analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first;
-    ``source_folders``: where sources of compiled nodes lie, besides the workspaces of the prefixes."""
+    ``source_folders``: where sources of compiled nodes lie, besides the workspaces of the prefixes; ``progress`` is
+    told which program is analysed next."""
 
     prefixes: tuple[Path, ...] = ()
     manifests: tuple[Path, ...] = ()
@@ -48,6 +49,7 @@ class ResolveOptions:
     accept_middlewares: tuple[str, ...] = ()
     no_python: bool = False
     launch_configurations: Mapping[str, str] = field(default_factory=dict)
+    progress: Callable[[str], None] | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         """One path or name may be given where several can be: text is not taken letter by letter."""

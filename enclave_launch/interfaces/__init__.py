@@ -138,6 +138,8 @@ class InterfaceFinder:
             return None
         from nodl.infer.executable import infer_executable
 
+        if self._options.progress is not None:
+            self._options.progress(str(subject))
         return infer_executable(
             subject.package,
             executable=subject.executable,

@@ -7,6 +7,7 @@ import gc
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
@@ -137,9 +138,17 @@ def _keystore(options: argparse.Namespace) -> str | None:
 
 
 def _resolve(target: Target, options: argparse.Namespace) -> LaunchPlan:
+    from enclave_launch.boundary.progress import ProgressLine, wanted
     from enclave_launch.flow import resolve
 
-    return resolve(target.launch_file, target.arguments, options=resolve_options(options))
+    chosen = resolve_options(options)
+    if not wanted(options.quiet):
+        return resolve(target.launch_file, target.arguments, options=chosen)
+    line = ProgressLine("analysing")
+    try:
+        return resolve(target.launch_file, target.arguments, options=replace(chosen, progress=line))
+    finally:
+        line.clear()
 
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:

@@ -6,6 +6,7 @@ import argparse
 from collections.abc import Iterator
 from datetime import timedelta
 
+from enclave_launch.boundary.progress import ProgressBar, wanted
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.options import SecurityOptions
 from enclave_launch.secured import ProvisionedLaunch
@@ -47,6 +48,7 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
         subjects=subjects,
         revoke=not options.no_revoke,
         access=CaAccess(passphrase=_passphrase(options)),
+        progress=ProgressBar("enclaves") if wanted(options.quiet) else None,
     )
 
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 import argparse
 import math
 import sys
-import time
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.terminal import json_text, raw
+from enclave_launch.boundary.progress import ProgressBar, wanted
+from enclave_launch.boundary.terminal import json_text
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import parse_duration, parse_end, utc_now
 
@@ -23,7 +23,6 @@ if TYPE_CHECKING:
     from keystore.steps.report import ProvisionReport
 
 DEFAULT_LOCK_TIMEOUT = 30.0
-_BAR_WIDTH = 30
 
 
 def add_keystore(parser: argparse.ArgumentParser) -> None:
@@ -154,24 +153,9 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
         access=access(arguments),
         lock_timeout=arguments.lock_timeout,
         revoke=not vars(arguments).get("no_revoke", False),
-        progress=ProgressBar() if sys.stderr.isatty() and not arguments.quiet else None,
+        progress=ProgressBar("enclaves") if wanted(arguments.quiet) else None,
         **more,
     )
-
-
-@dataclass
-class ProgressBar:
-    """Appears on stderr once a run has taken more than a second, and leaves no trace."""
-
-    _started: float = field(default_factory=time.monotonic)
-
-    def __call__(self, done: int, total: int) -> None:
-        if time.monotonic() - self._started < 1.0:
-            return
-        filled = _BAR_WIDTH * done // max(total, 1)
-        bar = f"\r[{'#' * filled}{'.' * (_BAR_WIDTH - filled)}] {done}/{total} enclaves"
-        end = "\r\033[K" if done == total else ""
-        print(bar + end, end="", file=raw(sys.stderr), flush=True)
 
 
 def print_json(content: Any) -> None:

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch.boundary.progress import ProgressLine
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
@@ -128,6 +129,35 @@ def test_recorded_in_a_real_terminal(tmp_path: Path) -> None:
     assert "\033[1m" in shown and "listener-2" in shown
     plain = in_a_terminal(tmp_path, f"env NO_COLOR=1 {command}", "-e")
     assert "\033[" not in plain and "├── enclave /ear" in plain
+
+
+def test_a_slow_analysis_says_what_it_does_and_leaves_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr(sys, "stderr", terminal)
+    line = ProgressLine("analysing")
+    line("demo/quick")
+    line.clear()
+    assert terminal.getvalue() == ""
+    slow = ProgressLine("analysing", _started=time.monotonic() - 2)
+    slow("nav2_amcl/\033amcl")
+    assert terminal.getvalue() == "\r\033[Kanalysing nav2_amcl/\\x1bamcl ..."
+    slow.clear()
+    assert terminal.getvalue().endswith("...\r\033[K")
+
+
+def test_the_analysis_of_each_program_is_told(tmp_path: Path) -> None:
+    program = tmp_path / "lib" / "pk" / "prog"
+    program.parent.mkdir(parents=True)
+    program.write_text("#!/usr/bin/env python3\nimport rclpy\nrclpy.init()\nrclpy.create_node('n')\n")
+    program.chmod(0o755)
+    index = tmp_path / "share/ament_index/resource_index/packages"
+    index.mkdir(parents=True)
+    (index / "pk").touch()
+    file = tmp_path / "one.launch.xml"
+    file.write_text('<launch><node pkg="pk" exec="prog"/></launch>')
+    told: list[str] = []
+    resolve(file, options=ResolveOptions(prefixes=(tmp_path,), progress=told.append))
+    assert told == ["pk/prog"]
 
 
 def test_tab_completes_in_a_real_bash(tmp_path: Path) -> None:

@@ -141,14 +141,14 @@ def test_a_reader_that_leaves_is_no_traceback(root: Path) -> None:
 
 
 def test_the_progress_bar_is_for_terminals_that_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    from keystore.verb.common import ProgressBar
+    from enclave_launch.boundary.progress import ProgressBar
 
     parent, child = pty.openpty()
     with os.fdopen(child, "w") as terminal:
         monkeypatch.setattr(sys, "stderr", terminal)
-        quick = ProgressBar()
+        quick = ProgressBar("enclaves")
         quick(1, 2)
-        slow = ProgressBar()
+        slow = ProgressBar("enclaves")
         slow._started -= 2
         slow(1, 2)
         slow(2, 2)
