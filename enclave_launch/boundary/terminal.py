@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from os import PathLike
 from typing import Any, TextIO, cast
 
@@ -58,6 +58,11 @@ def safe_output() -> Iterator[None]:
         if sys.stderr is not None:
             stack.enter_context(redirect_stderr(_safe(sys.stderr)))
         yield
+
+
+def stdout_is_for_the_plan() -> AbstractContextManager[Any]:
+    """Within the block, what launch files print goes to stderr."""
+    return redirect_stdout(sys.stderr)
 
 
 def raw(stream: TextIO) -> TextIO:

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 import gc
 import os
-import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager, redirect_stdout
+from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.location import OUTSIDE, place_of
@@ -111,12 +110,11 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
 @contextmanager
 def evaluation_surroundings(host: Host) -> Iterator[None]:
     """What evaluation needs around it, undone at the end: our packages under their public names, the host in
-    place, the environment as it was. What launch files print goes to stderr: stdout is for the plan."""
+    place, the environment as it was."""
     from enclave_launch.description.install import installed
     from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
 
     with ExitStack() as stack:
-        stack.enter_context(redirect_stdout(sys.stderr))
         stack.enter_context(STAGE.cleared())
         stack.enter_context(environment_untouched())
         stack.enter_context(active_host(host))

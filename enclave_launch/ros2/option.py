@@ -19,7 +19,7 @@ from typing import Any
 
 from ros2launch.option import OptionExtension
 
-from enclave_launch.boundary.terminal import message
+from enclave_launch.boundary.terminal import message, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import (
@@ -93,7 +93,9 @@ def _looked_at(args: argparse.Namespace) -> int:
 
     path, arguments = target_of(args)
     keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
-    return show_plan(resolve(path, arguments, options=resolve_options(args)), args, keystore)
+    with stdout_is_for_the_plan():
+        plan = resolve(path, arguments, options=resolve_options(args))
+    return show_plan(plan, args, keystore)
 
 
 def _secured(description: Any, args: argparse.Namespace) -> Any:

@@ -12,7 +12,13 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
 from enclave_launch.boundary.short_paths import short_paths
-from enclave_launch.boundary.terminal import message, printable, safe_output, write_coloured
+from enclave_launch.boundary.terminal import (
+    message,
+    printable,
+    safe_output,
+    stdout_is_for_the_plan,
+    write_coloured,
+)
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 from enclave_launch.verb.usage import CommandLine, check_options, read_command_line, unsecured_notice
@@ -74,7 +80,9 @@ def _main(options: argparse.Namespace) -> int:
             return _show_file(target, options)
     keystore = _keystore(options)
     if only_looking(options):
-        return show_plan(_planned(target, options, keystore), options, keystore)
+        with stdout_is_for_the_plan():
+            plan = _planned(target, options, keystore)
+        return show_plan(plan, options, keystore)
     if options.learn is not None:
         from enclave_launch.verb.learn import learn_launch
 

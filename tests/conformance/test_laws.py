@@ -115,7 +115,7 @@ def _shown(process: Any) -> object:
     return process.cmd, process.fqn, rules, dict(process.environment), process.enclave, process.parameters
 
 
-@settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(actions=trees)
 def test_xml_and_yaml_twins_evaluate_alike(actions: list[Action], tmp_path: Path) -> None:
     xml = outcome(tmp_path / "twin.launch.xml", f"<launch>{as_xml(actions)}</launch>")
@@ -123,7 +123,7 @@ def test_xml_and_yaml_twins_evaluate_alike(actions: list[Action], tmp_path: Path
     assert xml == yaml
 
 
-@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(actions=trees)
 def test_a_scope_restores_what_it_found(actions: list[Action], tmp_path: Path) -> None:
     """After a group nothing that it set is left, so the node after it is the node without it.

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.terminal import stdout_is_for_the_plan
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.options import add_evaluation_options, add_policy_options
 
@@ -50,7 +51,9 @@ def plan_of(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, A
     from nodl.ament_index import search_prefixes
 
     target = find_target(words, search_prefixes(options.prefix))
-    return plan_document(resolve(target.launch_file, target.arguments, options=resolve_options(options)))
+    with stdout_is_for_the_plan():
+        plan = resolve(target.launch_file, target.arguments, options=resolve_options(options))
+    return plan_document(plan)
 
 
 def read_saved(file: Path) -> Mapping[str, Any]:
