@@ -87,8 +87,9 @@ def _built_fastdds_probe() -> Path:
 
 
 def build(sources: list[Path], compiler: list[str], libraries: list[str]) -> Path:
-    """Compiled once per version of its source, also when several test processes come at once."""
-    version = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
+    """Compiled once per version of its source and way of building, also when several test processes come at once."""
+    way = repr((compiler, libraries)).encode()  # with the folders that the result looks into when it runs
+    version = hashlib.sha256(way + b"".join(source.read_bytes() for source in sources)).hexdigest()[:16]
     folder = Path(tempfile.gettempdir()) / f"enclave-launch-dds-tests-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
     result, unfinished = folder / version, folder / f"{version}.unfinished"
