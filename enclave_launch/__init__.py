@@ -9,7 +9,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from enclave_launch.boundary.version import VERSION as __version__  # noqa: F401
+from enclave_launch.boundary.version import VERSION
+
+__version__ = VERSION
 
 
 def _homes() -> dict[str, str]:

@@ -6,7 +6,7 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
 from enclave_launch.boundary.dependencies import missing_dependency
@@ -55,6 +55,16 @@ def add_version(parser: argparse.ArgumentParser) -> None:
     from enclave_launch.boundary.version import VERSION
 
     parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}")
+
+
+def complete_with(
+    commands: Iterable[argparse.ArgumentParser], name: str, completer: Callable[..., Iterable[str]]
+) -> None:
+    """Let the positional argument ``name`` of ``commands`` be completed by ``completer``, which argcomplete calls."""
+    for each in commands:
+        for action in each._actions:
+            if action.dest == name and not action.option_strings:
+                setattr(action, "completer", completer)  # noqa: B010  # argcomplete's own attribute
 
 
 def complete(

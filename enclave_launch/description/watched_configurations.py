@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import ItemsView, KeysView, ValuesView
 from typing import Any
 
 
@@ -14,7 +13,8 @@ class WatchedConfigurations(dict[str, Any]):
         self._looked_at = looked_at
 
     def __contains__(self, name: object) -> bool:
-        self._looked_at.add(name)  # type: ignore[arg-type]
+        if isinstance(name, str):
+            self._looked_at.add(name)
         return super().__contains__(name)
 
     def __getitem__(self, name: str) -> Any:
@@ -25,15 +25,15 @@ class WatchedConfigurations(dict[str, Any]):
         self._looked_at.add(name)
         return super().get(name, default)
 
-    def keys(self) -> KeysView[str]:  # type: ignore[override]
+    def keys(self) -> Any:
         self._looked_at.update(dict(self))
         return super().keys()
 
-    def values(self) -> ValuesView[Any]:  # type: ignore[override]
+    def values(self) -> Any:
         self._looked_at.update(dict(self))
         return super().values()
 
-    def items(self) -> ItemsView[str, Any]:  # type: ignore[override]
+    def items(self) -> Any:
         self._looked_at.update(dict(self))
         return super().items()
 

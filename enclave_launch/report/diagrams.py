@@ -10,7 +10,8 @@ import html
 from collections.abc import Iterator
 
 from enclave_launch.boundary.terminal import printable
-from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, Graph, Kind, Use
+from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, Graph, Use
+from enclave_launch.review.document import Kind
 
 _DOT_SHAPES: dict[Kind, str] = {"topic": "ellipse", "service": "box", "action": "hexagon"}
 _MERMAID_SHAPES: dict[Kind, tuple[str, str]] = {

@@ -8,21 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
-from enclave_launch.review.document import OPERATIONS, Operation
+from enclave_launch.review.document import KIND_OF, OPERATIONS, Kind, Operation
 
-Kind = Literal["topic", "service", "action"]
-
-KIND_OF: Mapping[str, Kind] = {
-    "publish": "topic",
-    "subscribe": "topic",
-    "call_services": "service",
-    "serve_services": "service",
-    "call_actions": "action",
-    "serve_actions": "action",
-}
 OUTWARD: frozenset[str] = frozenset({"publish", "call_services", "call_actions"})
 """Drawn from the node to the name; the other operations from the name to the node."""
 

@@ -62,7 +62,7 @@ class Look(NamedTuple):
         """``line`` with the colours of its parts, where colours are wanted."""
         if self.colour:
             for pattern, colour in _COLOURS:
-                line = pattern.sub(lambda match, colour=colour: f"{colour}{match[0]}{_RESET}", line)  # type: ignore[misc]
+                line = pattern.sub(rf"{colour}\g<0>{_RESET}", line)
         return line
 
     def told(self, kind: str, diagnostics: Sequence[Diagnostic]) -> list[str]:

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
+from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.look import Look
 from enclave_launch.report.plan_json import allowed_names
@@ -15,14 +16,7 @@ from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import EnclavePolicy
 
-_LABELS = {
-    "publish": "publish",
-    "subscribe": "subscribe",
-    "call_services": "call",
-    "serve_services": "serve",
-    "call_actions": "call action",
-    "serve_actions": "serve action",
-}
+_LABELS = {listed: operation.verb for operation, listed in LIST_NAMES.items()}
 
 
 class Branch(NamedTuple):

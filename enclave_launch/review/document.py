@@ -22,6 +22,16 @@ OPERATIONS: tuple[Operation, ...] = (
     "call_actions",
     "serve_actions",
 )
+Kind = Literal["topic", "service", "action"]
+KIND_OF: Mapping[str, Kind] = {
+    "publish": "topic",
+    "subscribe": "topic",
+    "call_services": "service",
+    "serve_services": "service",
+    "call_actions": "action",
+    "serve_actions": "action",
+}
+"""What a name is that an operation is about."""
 
 
 class Grant(NamedTuple):

@@ -10,12 +10,11 @@ ros_adapters.py.
 from __future__ import annotations
 
 import asyncio
-import os
 import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from enclave_launch.boundary.environment import environment_with
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.launcher import LAUNCHER_NODE
 from enclave_launch.process import ResolvedComponent
@@ -56,7 +55,7 @@ class RosServices:
         self._closing = threading.Event()
         self._closed = False
         grant = grant or StartAdditions()
-        with _environment(grant.environment):
+        with environment_with(grant.environment):
             try:
                 self._ros = rclpy.Context()
                 rclpy.init(args=["--ros-args", *_without_marker(grant.arguments)], context=self._ros)
@@ -197,18 +196,3 @@ def _parameters(values: Mapping[str, ParameterValue]) -> list[Any]:
 
 def _without_marker(arguments: Sequence[str]) -> list[str]:
     return [word for word in arguments if word != "--ros-args"]
-
-
-@contextmanager
-def _environment(variables: Mapping[str, str]) -> Iterator[None]:
-    """rcl reads the security variables from our own environment, at ``init`` and at node creation."""
-    before = {name: os.environ.get(name) for name in variables}
-    os.environ.update(variables)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value

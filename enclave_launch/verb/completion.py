@@ -10,16 +10,13 @@ import argparse
 import os
 from collections.abc import Iterable, Sequence
 
-from enclave_launch.boundary.command_line import parsers
+from enclave_launch.boundary.command_line import complete_with, parsers
 from nodl import ament_index
 
 
 def offer_launches(parser: argparse.ArgumentParser) -> None:
     """Let the positional words of ``parser`` and its verbs be completed."""
-    for each in parsers(parser):
-        for action in each._actions:
-            if action.dest == "words" and not action.option_strings:
-                setattr(action, "completer", _words)  # noqa: B010  # argcomplete's own attribute
+    complete_with(parsers(parser), "words", _words)
 
 
 def _words(prefix: str, parsed_args: argparse.Namespace, **_: object) -> Iterable[str]:

@@ -15,6 +15,7 @@ from enclave_launch.boundary.command_line import (
     add_verbosity,
     add_version,
     complete,
+    complete_with,
     guarded,
     parsers,
 )
@@ -42,12 +43,8 @@ def _main(argv: Sequence[str] | None) -> int:
 
 def _offer(parser: argparse.ArgumentParser) -> None:
     """Enclaves are offered where they must exist."""
-    for each in parsers(parser):
-        for action in each._actions:
-            if action.dest == "enclaves" and not (
-                each.prog.endswith("create-enclave") or action.option_strings
-            ):
-                setattr(action, "completer", _enclaves)  # noqa: B010  # argcomplete's own attribute
+    existing = (each for each in parsers(parser) if not each.prog.endswith("create-enclave"))
+    complete_with(existing, "enclaves", _enclaves)
 
 
 def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:

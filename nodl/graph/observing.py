@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from enclave_launch.boundary.environment import environment_with
 from nodl.graph.cyclone import CycloneObserver, ObserverError
 from nodl.graph.model import Graph
 
@@ -65,7 +66,7 @@ def observer(where: Where, environment: Mapping[str, str]) -> Iterator[Observer]
     if source == "rclpy":
         from nodl.graph.rclpy_graph import RclpyObserver
 
-        with _ros_variables(where):
+        with environment_with(_ros_variables(where)):
             try:
                 up = RclpyObserver()
             except (
@@ -109,11 +110,8 @@ class Quiet:
         return now >= self._end or now - self._since >= self._settle
 
 
-@contextmanager
-def _ros_variables(where: Where) -> Iterator[None]:
+def _ros_variables(where: Where) -> dict[str, str]:
     """rclpy reads the domain and the enclave from the environment when its context is made."""
-    import os
-
     wanted = {"ROS_DOMAIN_ID": str(where.domain_id)}
     if where.enclave_directory is not None:
         keystore, slash, enclave = str(where.enclave_directory.resolve()).rpartition("/enclaves/")
@@ -125,13 +123,4 @@ def _ros_variables(where: Where) -> Iterator[None]:
             "ROS_SECURITY_KEYSTORE": keystore,
             "ROS_SECURITY_ENCLAVE_OVERRIDE": f"/{enclave}",
         }
-    before = {name: os.environ.get(name) for name in wanted}
-    os.environ.update(wanted)
-    try:
-        yield
-    finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+    return wanted

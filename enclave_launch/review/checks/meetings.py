@@ -7,7 +7,7 @@ from itertools import combinations, product
 from typing import Any, NamedTuple
 
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import Grant, Operation, PlanDocument, Told
+from enclave_launch.review.document import KIND_OF, Grant, Operation, PlanDocument, Told
 from keystore.formats.permissions_patterns import can_meet
 from nodl.graph.quality import INFINITE, Quality, unmet
 
@@ -24,14 +24,6 @@ _PAIRS: tuple[tuple[Operation, Operation], ...] = (
     ("serve_services", "call_services"),
     ("serve_actions", "call_actions"),
 )
-_KINDS: Mapping[str, str] = {
-    "publish": "topic",
-    "subscribe": "topic",
-    "call_services": "service",
-    "serve_services": "service",
-    "call_actions": "action",
-    "serve_actions": "action",
-}
 _SHORTEST = 6  # letters of a name of which one edit is taken for a slip
 
 
@@ -143,7 +135,7 @@ def types(plan: PlanDocument, document: Document) -> Iterator[Told]:
     for (operation, name), users in _users(document).items():
         for user in users:
             if user.interface["type"] and "*" not in name:
-                by_type = found.setdefault((_KINDS[operation], name), {})
+                by_type = found.setdefault((KIND_OF[operation], name), {})
                 by_type.setdefault(user.interface["type"], []).append(user)
     for (kind, name), by_type in sorted(found.items()):
         for one, two in combinations(sorted(by_type), 2):
