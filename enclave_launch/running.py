@@ -16,8 +16,9 @@ from enclave_launch.boundary.terminal import message
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
-from enclave_launch.runtime.live_launch import LiveLaunch, RunOptions, run_launch, run_launch_async
+from enclave_launch.runtime.live_launch import LiveLaunch, run_launch, run_launch_async
 from enclave_launch.runtime.run_events import Observer
+from enclave_launch.runtime.run_options import RunOptions
 
 if TYPE_CHECKING:
     from enclave_launch.options import RunSettings

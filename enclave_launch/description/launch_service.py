@@ -59,7 +59,8 @@ class LaunchService:
             self.__running.shut_down("LaunchService.shutdown() called")
 
     async def __run(self, shutdown_when_idle: bool, *, handle_interrupt: bool) -> int:
-        from enclave_launch.runtime.live_launch import LiveLaunch, RunOptions
+        from enclave_launch.runtime.live_launch import LiveLaunch
+        from enclave_launch.runtime.run_options import RunOptions
 
         description = self.__description
 

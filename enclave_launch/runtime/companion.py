@@ -12,7 +12,7 @@ from typing import Protocol
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.runtime.launch_log import Level
 from enclave_launch.runtime.process_tree import ProcessSpec
-from enclave_launch.runtime.run_events import RunEvent
+from enclave_launch.runtime.run_events import Observer, RunEvent
 
 
 class LaunchControl(Protocol):
@@ -81,3 +81,16 @@ class Together:
     async def closed(self) -> None:
         for each in self._companions:
             await each.closed()
+
+
+def companion_first(companion: LaunchCompanion | None, observe: Observer) -> Observer:
+    """The companion first: what it adds to the record is there when others look."""
+    if companion is None:
+        return observe
+    told = companion
+
+    def both(event: RunEvent) -> None:
+        told.happened(event)
+        observe(event)
+
+    return both

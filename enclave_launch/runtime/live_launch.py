@@ -12,16 +12,13 @@ from __future__ import annotations
 
 import asyncio
 import os
-import resource
 import socket
 import sys
-import threading
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import AsyncExitStack, contextmanager
+from collections.abc import Sequence
+from contextlib import AsyncExitStack
 from datetime import datetime, timezone
-from signal import SIG_IGN, SIGHUP, SIGINT, SIGQUIT, SIGTERM, Signals, getsignal
-from types import MappingProxyType
-from typing import Any, NamedTuple, TextIO
+from signal import SIGINT, Signals
+from typing import Any
 
 from enclave_launch.description.events.dispatch import handle_next
 from enclave_launch.description.events.event import Event, IncludeLaunchDescription, Shutdown
@@ -37,16 +34,14 @@ from enclave_launch.evaluation.evaluate import (
 from enclave_launch.evaluation.stage import STAGE, Actor
 from enclave_launch.host.current import active_host
 from enclave_launch.host.outcomes import Outcomes
-from enclave_launch.host.protocol import HostOptions
 from enclave_launch.prefixes import prepend_prefixes
 from enclave_launch.runtime.back_pressure import BackPressure
-from enclave_launch.runtime.companion import LaunchCompanion
-from enclave_launch.runtime.deadline import Deadline
+from enclave_launch.runtime.companion import companion_first
 from enclave_launch.runtime.gate import EnclaveGate
 from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging
 from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
-from enclave_launch.runtime.overlap import Overlap
+from enclave_launch.runtime.overlap import many_descriptors
 from enclave_launch.runtime.process_tree import ProcessTree
 from enclave_launch.runtime.ros_services import RosServices
 from enclave_launch.runtime.run_events import (
@@ -57,32 +52,10 @@ from enclave_launch.runtime.run_events import (
     RunEvent,
     unobserved,
 )
+from enclave_launch.runtime.run_options import RunOptions
+from enclave_launch.runtime.signals import require_signals, signals_to
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 from enclave_launch.runtime.warden_process import WardenProcess
-
-
-class RunOptions(NamedTuple):
-    """How to run; what to run is decided elsewhere.
-
-    ``prefixes`` come before ``AMENT_PREFIX_PATH``. ``log_limit``: bytes after which a log file is begun anew.
-    ``host_options`` go to the evaluation's host (distribution, seed of anonymous names, ...), the same as the plan's.
-    ``secrets``: environment variables no child may see. ``notices`` are said once, at the start.
-    """
-
-    noninteractive: bool = False
-    debug: bool = False
-    shutdown_when_idle: bool = True
-    launch_configurations: Mapping[str, str] = MappingProxyType({})
-    screen: TextIO | None = None
-    secrets: frozenset[str] = frozenset()
-    notices: tuple[str, ...] = ()
-    needs_ros_services: bool | None = False
-    log_limit: int | None = None
-    deadline: Deadline | None = None
-    prefixes: tuple[str, ...] = ()
-    companion: LaunchCompanion | None = None
-    host_options: HostOptions = HostOptions()
-    outcomes: Outcomes | None = None
 
 
 def run_launch(
@@ -100,13 +73,13 @@ def run_launch(
     :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed, not the
         main thread.
     """
-    _require_signals()
+    require_signals()
     chosen = options or RunOptions()
     started = warden or WardenProcess(interactive=not chosen.noninteractive)
 
     async def main() -> int:
         service = LiveLaunch(launch_file, arguments, gate=gate, options=chosen, warden=started)
-        with _signals_to(service):
+        with signals_to(service.on_signal):
             return await service.run()
 
     return asyncio.run(main())
@@ -136,7 +109,7 @@ class LiveLaunch:
         warden: WardenProcess | None = None,
         observe: Observer = unobserved,
     ) -> None:
-        self._observe = _told_to(options.companion, observe)
+        self._observe = companion_first(options.companion, observe)
         self._launch_file = os.path.abspath(launch_file)
         self._arguments = arguments
         self._gate = gate
@@ -161,7 +134,7 @@ class LiveLaunch:
             self.warden_pid = tree.warden_pid
             tree.on_interrupt = lambda: self.on_signal(SIGINT)
             await stack.enter_async_context(tree)
-            stack.enter_context(_many_descriptors())
+            stack.enter_context(many_descriptors())
             with STAGE.cleared():
                 self._services = self._ros_services()
                 stack.callback(self._close_services)
@@ -395,63 +368,5 @@ class LiveLaunch:
         self._log.log(level, "launch", message)
 
 
-@contextmanager
-def _raised_limit() -> Iterator[None]:
-    """Each process costs us three. The warden runs already: its children keep the limit we were given."""
-    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
-    try:
-        yield
-    finally:
-        resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-
-
-def _told_to(companion: LaunchCompanion | None, observe: Observer) -> Observer:
-    """The companion first: what it adds to the record is there when others look."""
-    if companion is None:
-        return observe
-    told = companion
-
-    def both(event: RunEvent) -> None:
-        told.happened(event)
-        observe(event)
-
-    return both
-
-
-_many_descriptors = Overlap(_raised_limit)
-
-
 class _Over(Exception):
     """Nothing is left to wait for."""
-
-
-def _require_signals() -> None:
-    """Only the main thread can take the signals of a process, and only one that runs no loop can block."""
-    if threading.current_thread() is not threading.main_thread():
-        raise RuntimeFailure(
-            "run() takes the signals of the process, which only its main thread can; "
-            "in another thread use asyncio.run(run_async(...))"
-        )
-    if asyncio._get_running_loop() is not None:
-        raise RuntimeFailure(
-            "run() would block the event loop that is running here; await run_async(...) instead"
-        )
-
-
-@contextmanager
-def _signals_to(service: LiveLaunch) -> Iterator[None]:
-    """SIGHUP only where nobody (nohup) asked us to ignore it."""
-    loop = asyncio.get_running_loop()
-    numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if _wanted(number)]
-    for number in numbers:
-        loop.add_signal_handler(number, service.on_signal, number)
-    try:
-        yield
-    finally:
-        for number in numbers:
-            loop.remove_signal_handler(number)
-
-
-def _wanted(number: Signals) -> bool:
-    return number is not SIGHUP or getsignal(number) is not SIG_IGN

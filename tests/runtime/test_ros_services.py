@@ -14,7 +14,8 @@ import pytest
 
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import LateProcess, StartAdditions
-from enclave_launch.runtime.live_launch import RunOptions, run_launch
+from enclave_launch.runtime.live_launch import run_launch
+from enclave_launch.runtime.run_options import RunOptions
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir", "small_ros")
 

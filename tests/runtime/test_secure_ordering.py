@@ -14,7 +14,8 @@ import pytest
 from enclave_launch.errors import ProvisionError, RuntimeFailure
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions
-from enclave_launch.runtime.live_launch import RunOptions, run_launch, run_launch_async
+from enclave_launch.runtime.live_launch import run_launch, run_launch_async
+from enclave_launch.runtime.run_options import RunOptions
 from tests.runtime.conftest import alive, read_pid
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir")

@@ -23,7 +23,8 @@ from tests.runtime.conftest import alive, eventually, read_pid
 PROGRAM = """
 import sys
 from pathlib import Path
-from enclave_launch.runtime.live_launch import RunOptions, run_launch
+from enclave_launch.runtime.live_launch import run_launch
+from enclave_launch.runtime.run_options import RunOptions
 sys.exit(run_launch(sys.argv[1], options=RunOptions(noninteractive={noninteractive}, debug={debug})))
 """
 
