@@ -18,39 +18,63 @@ PACKAGES = ("enclave_launch", "nodl", "keystore")
 BOUNDARY = "enclave_launch.boundary"
 ALLOWED = {"enclave_launch": {"nodl", "keystore"}, "nodl": set[str](), "keystore": set[str]()}
 
-# The floors of enclave_launch, lowest first: a room imports its own modules and those of the floors below it.
-FLOORS = (
-    {"boundary"},
-    {"source_location"},
-    {"diagnostics"},
-    {"ros_rules"},
-    {"errors", "process"},
-    {"frontend", "host"},
-    {"description"},
-    {"evaluation"},
-    {"enclave", "policy", "admission"},
-    {"plan"},
-    {"plan_remarks"},
-    {"planner"},
-    {"options", "prefixes", "security_environment", "served_domains"},
-    {"interfaces"},
-    {"review"},
-    {"deployment"},
-    {"drift"},
-    {"report", "runtime"},
-    {"recording", "secured"},
-    {"expiry_watch", "drift_watch"},
-    {"running"},
-    {"flow"},
-    {"verb"},
-    {"ros2"},
-    {"__init__", "__main__"},
-)
+# The floors of each package, lowest first: a room imports its own modules and those of the floors below it.
+FLOORS: dict[str, tuple[set[str], ...]] = {
+    "enclave_launch": (
+        {"boundary"},
+        {"source_location"},
+        {"diagnostics"},
+        {"ros_rules"},
+        {"errors", "process"},
+        {"frontend", "host"},
+        {"description"},
+        {"evaluation"},
+        {"enclave", "policy", "admission"},
+        {"plan"},
+        {"plan_remarks"},
+        {"planner"},
+        {"options", "prefixes", "security_environment", "served_domains"},
+        {"interfaces"},
+        {"review"},
+        {"deployment"},
+        {"drift"},
+        {"report", "runtime"},
+        {"recording", "secured"},
+        {"expiry_watch", "drift_watch"},
+        {"running"},
+        {"flow"},
+        {"verb"},
+        {"ros2"},
+        {"__init__", "__main__"},
+    ),
+    "nodl": (
+        {"source_ref", "types", "names", "ament_index"},
+        {"errors", "remap", "name_template"},
+        {"node_interface", "yaml_text"},
+        {"builtin_interfaces", "policy_text"},
+        {"dependence"},
+        {"document"},
+        {"lookup", "v1_api", "record", "infer"},
+        {"graph", "library"},
+        {"verb"},
+        {"__init__"},
+    ),
+    "keystore": (
+        {"errors"},
+        {"formats"},
+        {"signing"},
+        {"disk"},
+        {"verification"},
+        {"steps"},
+        {"verb"},
+        {"__init__"},
+    ),
+}
 
 # Arrows that point up all the same: what a class of upstream's does only when it is used on its own, loaded then.
 UPWARD = {
-    ("description", "runtime"),
-    ("host", "description"),
+    ("enclave_launch", "description", "runtime"),
+    ("enclave_launch", "host", "description"),
 }
 
 # Stages of the flow that decide only: they may not import what acts.
@@ -61,9 +85,6 @@ PURE = {
     "enclave_launch/drift": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/report": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
 }
-
-# The rooms of the keystore, lowest first: each may import those below it (and ``errors``), none above.
-KEYSTORE_FLOORS = ("formats", "signing", "disk", "verification", "steps", "verb")
 
 
 def imports_of(path: Path) -> Iterator[str]:
@@ -100,10 +121,6 @@ def test_the_boundary_room_imports_nothing_of_ours() -> None:
     assert wrong == []
 
 
-def room_of(module: str) -> str:
-    return module.split(".")[1]
-
-
 def runtime_imports_of(path: Path) -> Iterator[str]:
     """As ``imports_of``, without what only the type checker reads."""
     tree = ast.parse(path.read_text(encoding="utf-8"))
@@ -111,23 +128,25 @@ def runtime_imports_of(path: Path) -> Iterator[str]:
         if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
             node.body = []
     for node in ast.walk(tree):
-        if isinstance(node, ast.ImportFrom) and node.module == "enclave_launch":
-            yield from (f"enclave_launch.{alias.name}" for alias in node.names)
+        if isinstance(node, ast.ImportFrom) and node.module in PACKAGES:
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
         elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
             yield node.module
 
 
-def test_each_room_of_enclave_launch_stands_on_the_rooms_below_it() -> None:
-    floor = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+@pytest.mark.parametrize("package", PACKAGES)
+def test_each_room_stands_on_the_rooms_below_it(package: str) -> None:
+    floor = {room: number for number, rooms in enumerate(FLOORS[package]) for room in rooms}
     wrong = []
-    for path in sources("enclave_launch"):
-        room = path.relative_to(ROOT / "enclave_launch").with_suffix("").parts[0]
+    for path in sources(package):
+        room = path.relative_to(ROOT / package).with_suffix("").parts[0]
         assert room in floor, f"{path} stands on no floor: name its room in FLOORS"
         for name in runtime_imports_of(path):
-            if not name.startswith("enclave_launch.") or name == "enclave_launch.__version__":
+            owner, _, inside = name.partition(".")
+            target = inside.split(".")[0]
+            if owner != package or target == room or name == "enclave_launch.__version__":
                 continue
-            target = room_of(name)
-            if target != room and floor[target] >= floor[room] and (room, target) not in UPWARD:
+            if floor[target] >= floor[room] and (package, room, target) not in UPWARD:
                 wrong.append(f"{path.relative_to(ROOT)} imports {name}")
     assert wrong == []
 
@@ -141,25 +160,6 @@ def test_deciding_stages_do_not_import_what_acts(folder: str) -> None:
         if name.startswith(PURE[folder])
     ]
     assert wrong == []
-
-
-@pytest.mark.parametrize("floor", range(len(KEYSTORE_FLOORS)))
-def test_rooms_of_the_keystore_import_downwards_only(floor: int) -> None:
-    above = tuple(f"keystore.{room}" for room in KEYSTORE_FLOORS[floor + 1 :])
-    wrong = [
-        f"{path.relative_to(ROOT)} imports {name}"
-        for path in sources(f"keystore/{KEYSTORE_FLOORS[floor]}")
-        for name in imports_of(path)
-        if name.startswith(above) or name == "keystore"
-    ]
-    assert wrong == []
-
-
-def test_every_file_of_the_keystore_stands_in_a_room() -> None:
-    beside = {path.stem for path in (ROOT / "keystore").glob("*.py")}
-    rooms = {path.parent.name for path in (ROOT / "keystore").glob("*/__init__.py")}
-    assert beside == {"__init__", "errors"}
-    assert rooms == set(KEYSTORE_FLOORS)
 
 
 def modules_loaded_by(arguments: list[str]) -> set[str]:

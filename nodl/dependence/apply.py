@@ -221,7 +221,7 @@ class _Application:
     def _configured(self, configuration: Configuration, scope: Scope, by: NodeInterface) -> None:
         if not scope.holds(configuration.when):
             return
-        from nodl.configuration import read_configuration
+        from nodl.dependence.configuration import read_configuration
 
         file = scope.fill(configuration.file).text
         found = read_configuration(configuration.kind, file or "", self._situation, by.source)

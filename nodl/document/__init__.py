@@ -13,7 +13,7 @@ from nodl.errors import InvalidNoDLError
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
-    from nodl.document.yaml_text import YamlMap
+    from nodl.yaml_text import YamlMap
 
 __all__ = [
     "RESOURCE_TYPE",
@@ -53,7 +53,7 @@ def read_document(
 def read_root(path: str | Path) -> YamlMap:
     """A v2 document as it is written, checked. Raises ``InvalidNoDLError`` as ``read_document``."""
     from nodl.document.v2_schema import check_document
-    from nodl.document.yaml_text import parse_yaml
+    from nodl.yaml_text import parse_yaml
 
     return check_document(parse_yaml(_read(str(path)), str(path)))
 

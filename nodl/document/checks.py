@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 
-from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 from nodl.errors import InvalidNoDLDocumentError
 from nodl.names import shown
+from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 Checker = Callable[[YamlValue, str], None]
 

@@ -23,12 +23,12 @@ from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services
 from nodl.document.v2_schema import check_document
 from nodl.document.v2_section import CATEGORIES, dependence_of, section_of
-from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, validate_namespace, validate_node_name, validate_written_name
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
 from nodl.source_ref import SourceRef
+from nodl.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 
 VERSION = 2
 

@@ -16,10 +16,10 @@ from enclave_launch.boundary.files import read_bytes
 from nodl.ament_index import INDEX_FOLDER, find_resource
 from nodl.document import RESOURCE_TYPE, resource_key
 from nodl.document.v2_schema import check_document
-from nodl.document.yaml_text import MAX_BYTES, YamlList, YamlMap, YamlScalar, parse_yaml
 from nodl.errors import IncludeError
 from nodl.names import shown
 from nodl.source_ref import SourceRef
+from nodl.yaml_text import MAX_BYTES, YamlList, YamlMap, YamlScalar, parse_yaml
 
 MAX_DEPTH = 32
 COMMON = Path(__file__).parent / "common"

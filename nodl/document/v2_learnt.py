@@ -19,11 +19,11 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from nodl.document.v2_section import IDENTITY_KEY
-from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 from nodl.errors import InvalidElementError
 from nodl.name_template import NameTemplate, ParameterPart
 from nodl.names import InvalidNameError, validate_name
 from nodl.node_interface import Endpoint, EndpointKind
+from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 
 class LearntName(NamedTuple):

@@ -22,7 +22,7 @@ from nodl.document.checks import (
     text_of,
 )
 from nodl.document.v2_section import IDENTITY_KEY, SECTION
-from nodl.document.yaml_text import YamlMap, YamlScalar, YamlValue
+from nodl.yaml_text import YamlMap, YamlScalar, YamlValue
 
 
 def check_document(root: YamlValue) -> YamlMap:

@@ -22,8 +22,8 @@ from nodl.dependence import (
     When,
 )
 from nodl.document.checks import Checker, anything, boolean, either, list_of, map_of, one_of, text_of
-from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 from nodl.node_interface import EndpointKind
+from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 IDENTITY_KEY = "enclave_launch"
 

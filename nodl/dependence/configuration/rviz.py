@@ -9,12 +9,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from nodl.configuration import Configured
-from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.dependence.configuration import Configured
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, shown, validate_written_name
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
+from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 _SUBSCRIBE, _PUBLISH = EndpointKind.SUBSCRIPTION, EndpointKind.PUBLISHER
 

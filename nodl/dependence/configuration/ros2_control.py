@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from xml.etree import ElementTree
 
-from nodl.configuration import Configured
+from nodl.dependence.configuration import Configured
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 

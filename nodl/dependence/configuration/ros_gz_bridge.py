@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from nodl.configuration import Configured
-from nodl.document.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.dependence.configuration import Configured
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, shown, validate_written_name
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
+from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 _DIRECTIONS = {
     "BIDIRECTIONAL": (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION),

@@ -11,7 +11,7 @@ import os
 from collections.abc import Iterator
 from xml.etree import ElementTree
 
-from nodl.configuration import Configured
+from nodl.dependence.configuration import Configured
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, shown, validate_written_name
 from nodl.node_interface import Endpoint, EndpointKind, Gap

@@ -10,10 +10,10 @@ from typing import NamedTuple
 
 from enclave_launch.boundary.files import read_bytes
 from nodl.dependence import Situation
-from nodl.document.yaml_text import YamlValue, parse_yaml
 from nodl.errors import InvalidNoDLError
 from nodl.node_interface import Endpoint, Gap
 from nodl.source_ref import SourceRef
+from nodl.yaml_text import YamlValue, parse_yaml
 
 
 class Configured(NamedTuple):
@@ -27,11 +27,11 @@ class Configured(NamedTuple):
 def read_configuration(kind: str, file: str, situation: Situation, place: SourceRef) -> Configured:
     """What ``file`` (or the command line in ``situation``) asks for. ``place``: the document that says it is read."""
     if kind == "ros_gz_bridge arguments":
-        from nodl.configuration.ros_gz_bridge import of_arguments
+        from nodl.dependence.configuration.ros_gz_bridge import of_arguments
 
         return of_arguments(situation.words, place)
     if kind == "ros2_control":
-        from nodl.configuration.ros2_control import of_robot_description
+        from nodl.dependence.configuration.ros2_control import of_robot_description
 
         return of_robot_description(situation.launched.robot_description, place)
     if not file:
@@ -39,7 +39,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)
         )
     if kind == "behavior_tree":
-        from nodl.configuration.behavior_tree import of_tree
+        from nodl.dependence.configuration.behavior_tree import of_tree
 
         return of_tree(file)
     try:
@@ -47,11 +47,11 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
     except InvalidNoDLError as error:
         return Configured(gaps=(Gap(SourceRef(file), f"{kind} file cannot be used: {error}"),))
     if kind == "rviz":
-        from nodl.configuration.rviz import of_file
+        from nodl.dependence.configuration.rviz import of_file
 
         return of_file(root, situation.distro)
     if kind == "ros_gz_bridge":
-        from nodl.configuration.ros_gz_bridge import of_configuration
+        from nodl.dependence.configuration.ros_gz_bridge import of_configuration
 
         return of_configuration(root)
     return Configured(gaps=(Gap(place, f"nobody here can read a file of kind {kind!r}"),))
