@@ -13,10 +13,12 @@ import sys
 from bisect import bisect_left
 from collections.abc import Callable, Iterable
 
+from nodl.infer.interpreter.decisions import Decisions
 from nodl.infer.interpreter.define import linearized, methods_in
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.imports import execute_module
 from nodl.infer.interpreter.raising import Raised
-from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Decisions, Frame, Run
+from nodl.infer.interpreter.run import BudgetExceeded, Run
 from nodl.infer.interpreter.tables import new_run
 from nodl.infer.models.foreign import is_node_class
 from nodl.infer.paths import refine

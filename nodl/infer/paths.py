@@ -12,7 +12,8 @@ from dataclasses import dataclass, replace
 
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord
 from nodl.infer.interpreter.conditions import OPPOSITE
-from nodl.infer.interpreter.run import Decisions, Run, TooManyPaths
+from nodl.infer.interpreter.decisions import Decisions, TooManyPaths
+from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Piece, Text, make_text, pieces_of
 
 MAX_STEPS = 40_000  # of all paths together; a larger program is not followed path by path

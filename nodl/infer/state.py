@@ -11,18 +11,8 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Sequence
 
-from nodl.infer.values import (
-    ABSENT,
-    BOTTOM,
-    Cells,
-    FieldCells,
-    HeapObject,
-    LocalCells,
-    Value,
-    contains,
-    join,
-    widen,
-)
+from nodl.infer.values import ABSENT, BOTTOM, Cells, FieldCells, HeapObject, LocalCells, Value, contains, join
+from nodl.infer.widening import widen
 
 Alternative = Callable[[], bool]  # runs one branch; tells whether its end can be reached
 Written = dict[tuple[int, object], tuple[Cells, object, Value]]  # by cell: its value at the end of a branch

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from nodl.infer.text import Text, common_text
@@ -308,150 +307,10 @@ class Instance(HeapObject):
         self.site = site
 
 
-class BoundMethod:
-    __slots__ = ("function", "receiver")
-
-    def __init__(self, function: FunctionValue, receiver: object) -> None:
-        self.function = function
-        self.receiver = receiver
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, BoundMethod)
-            and other.function is self.function
-            and other.receiver is self.receiver
-        )
-
-    def __hash__(self) -> int:
-        return hash((id(self.function), id(self.receiver)))
-
-
-class NativeMethod:
-    """Attribute ``name`` of a string, container or modelled object."""
-
-    __slots__ = ("name", "receiver")
-
-    def __init__(self, receiver: object, name: str) -> None:
-        self.receiver = receiver
-        self.name = name
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, NativeMethod)
-            and other.name == self.name
-            and type(other.receiver) is type(self.receiver)
-            and other.receiver == self.receiver
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.receiver, self.name))
-
-
-class ForeignMethod:
-    """Method ``name`` that ``receiver`` inherits from the foreign class ``path``."""
-
-    __slots__ = ("name", "path", "receiver")
-
-    def __init__(self, path: str, receiver: object, name: str) -> None:
-        self.path = path
-        self.receiver = receiver
-        self.name = name
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, ForeignMethod)
-            and other.receiver is self.receiver
-            and other.name == self.name
-            and other.path == self.path
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.path, id(self.receiver), self.name))
-
-
-@dataclass(frozen=True, slots=True)
-class Partial:
-    function: Value
-    positional: tuple[Value, ...]
-    keywords: tuple[tuple[str, Value], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Getter:
-    """``operator.methodcaller``, ``attrgetter`` and ``itemgetter`` with what they were given."""
-
-    kind: str
-    positional: tuple[Value, ...]
-    keywords: tuple[tuple[str, Value], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class SuperProxy:
-    """``super()`` inside a method of ``owner`` for object ``receiver``."""
-
-    owner: ClassValue
-    receiver: object
-
-
-@dataclass(frozen=True, slots=True)
-class PropertyValue:
-    """``cached``: read once, then an attribute of the object."""
-
-    getter: Value
-    setter: Value = BOTTOM
-    deleter: Value = BOTTOM
-    cached: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class ClassMethod:
-    function: Value
-    static: bool
-
-
-@dataclass(frozen=True, slots=True)
-class PartialMethod:
-    """``functools.partialmethod``: bound like a function, with arguments of its own."""
-
-    partial: Partial
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Variables:
-    """The dictionary of an object's or a module's variables: ``vars(x)``, ``x.__dict__``, ``globals()``."""
-
-    owner: HeapObject
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Variables) and other.owner is self.owner
-
-    def __hash__(self) -> int:
-        return id(self.owner)
-
-    def named(self) -> dict[str, Value]:
-        """What is certainly or perhaps set, by name."""
-        return {
-            name: value
-            for name, value in self.owner.cells.items()
-            if isinstance(name, str) and not name.startswith("[")
-        }
-
-
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
-_COMPARED_IN_C = frozenset(
-    {
-        str,
-        Text,
-        External,
-        Instance,
-        Sequence,
-        Dictionary,
-        FunctionValue,
-        ClassValue,
-        ModuleValue,
-        NativeObject,
-    }
-)
+_COMPARED_IN_C = frozenset({
+    str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue, NativeObject,
+})  # fmt: skip
 
 
 def join(left: Value, right: Value) -> Value:
@@ -515,42 +374,6 @@ def _join_items(items: list[Items]) -> Items:
         else:
             joined = Items(None, join(joined.any_element(), other.any_element()))
     return joined
-
-
-def widen(old: Value, new: Value, texts_too: bool) -> Value:
-    """``join`` for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
-    if any(type(atom) is Unknown for atom in old):  # it may be any number or text already
-        covered = (int, float, str, Text) if texts_too else (int, float)
-        new = tuple(atom for atom in new if not isinstance(atom, covered) or contains(old, atom))
-    joined = join(old, new)
-    if joined is old:
-        return old
-    widened = _widened(old, joined, texts_too)
-    return old if all(contains(old, atom) for atom in widened) else widened
-
-
-def _widened(old: Value, joined: Value, texts_too: bool) -> Value:
-    if isinstance(joined[0], Items) and old and isinstance(old[0], Items):
-        return (_widen_items(old[0], joined[0], texts_too),)
-    if any(type(atom) in (int, float) and not contains(old, atom) for atom in joined):
-        if not old:
-            return joined
-        joined = join(tuple(atom for atom in joined if type(atom) not in (int, float)), ANY)
-    texts = [atom for atom in joined if isinstance(atom, str | Text)]
-    kept = [atom for atom in joined if not isinstance(atom, str | Text)]
-    if texts_too and any(isinstance(atom, Sequence) and not contains(old, atom) for atom in kept):
-        kept = [atom for atom in kept if not isinstance(atom, Sequence)]
-        return join((*kept, *texts), unknown(TOO_MANY))  # containers in containers, without end
-    if texts_too and len(texts) > 1 and any(not contains(old, text) for text in texts):
-        return join(tuple(kept), (widened_texts(texts),))
-    return joined
-
-
-def _widen_items(old: Items, new: Items, texts_too: bool) -> Items:
-    """Elements widen one by one while the length stays; later, and when it changes, all together."""
-    if old.exact is not None and new.exact is not None and not texts_too:
-        return Items(tuple(widen(a, b, texts_too) for a, b in zip(old.exact, new.exact, strict=True)))
-    return Items(None, widen(old.any_element(), new.any_element(), texts_too))
 
 
 def present(value: Value) -> Value:

@@ -6,8 +6,10 @@ import ast
 
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.iterate import elements
-from nodl.infer.interpreter.run import Arguments, Frame, Run
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import PropertyValue, Variables
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -22,10 +24,8 @@ from nodl.infer.values import (
     Items,
     Key,
     ModuleValue,
-    PropertyValue,
     Sequence,
     Value,
-    Variables,
     join,
 )
 

@@ -6,7 +6,19 @@ import ast
 
 from nodl.infer.interpreter import imports, special
 from nodl.infer.interpreter.define import linearized
-from nodl.infer.interpreter.run import Arguments, AttributeReader, Call, Frame, Run
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter.run import AttributeReader, Run
+from nodl.infer.methods import (
+    BoundMethod,
+    ClassMethod,
+    ForeignMethod,
+    NativeMethod,
+    Partial,
+    PartialMethod,
+    PropertyValue,
+    SuperProxy,
+    Variables,
+)
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
 from nodl.infer.values import (
@@ -14,25 +26,16 @@ from nodl.infer.values import (
     ANY,
     BOTTOM,
     RESULT,
-    BoundMethod,
-    ClassMethod,
     ClassValue,
     Dictionary,
     External,
-    ForeignMethod,
     FunctionValue,
     Instance,
     ModuleValue,
-    NativeMethod,
     NativeObject,
-    Partial,
-    PartialMethod,
-    PropertyValue,
     Sequence,
-    SuperProxy,
     Unknown,
     Value,
-    Variables,
     external,
     join,
     unknown,

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field
 
 from nodl.infer.interpreter import generators
 from nodl.infer.interpreter.define import foreign_bases, linearized, methods_in
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.iterate import elements, enum_members
-from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Caller, Frame, Run
+from nodl.infer.interpreter.run import MAX_DEPTH, Caller, Run
+from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Getter, NativeMethod, Partial
 from nodl.infer.models import foreign
 from nodl.infer.values import (
     ANY,
@@ -19,27 +21,21 @@ from nodl.infer.values import (
     OF_A_NODE,
     OTHER,
     TOO_MANY,
-    BoundMethod,
-    ClassMethod,
     ClassValue,
     Dictionary,
     External,
-    ForeignMethod,
     FunctionValue,
-    Getter,
     Instance,
     Items,
     Key,
     LocalCells,
-    NativeMethod,
     NativeObject,
-    Partial,
     Unknown,
     Value,
     join,
     unknown,
-    widen,
 )
+from nodl.infer.widening import widen
 
 MAX_ROUNDS = 8
 MAX_RECURSION = 24  # calls of a function inside itself that are followed one by one

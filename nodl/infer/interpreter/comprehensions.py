@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import decide, narrowed
+from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.loops import MAX_UNROLLED
-from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.values import (
     ABSENT,
     BOTTOM,

@@ -9,7 +9,8 @@ import ast
 from collections.abc import Callable
 
 from nodl.infer.interpreter import special
-from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.interpreter.frames import Frame
+from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Text, input_of
 from nodl.infer.values import (
     BOTTOM,

@@ -5,15 +5,14 @@ from __future__ import annotations
 import ast
 from dataclasses import replace
 
-from nodl.infer.interpreter.run import Arguments, Frame, Run
+from nodl.infer.interpreter.frames import Arguments, Frame
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import BoundMethod, ClassMethod, PropertyValue
 from nodl.infer.values import (
-    BoundMethod,
-    ClassMethod,
     ClassValue,
     External,
     FunctionValue,
     Instance,
-    PropertyValue,
     Unknown,
     Value,
     external,

@@ -9,10 +9,12 @@ from nodl.infer.interpreter import comprehensions, special
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, truth, truth_of
 from nodl.infer.interpreter.define import make_function
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.iterate import elements, values_of
 from nodl.infer.interpreter.operators import binary, f_string
 from nodl.infer.interpreter.raising import throw
-from nodl.infer.interpreter.run import Arguments, Call, Evaluator, Frame, Run
+from nodl.infer.interpreter.run import Evaluator, Run
+from nodl.infer.methods import NativeMethod, SuperProxy, Variables
 from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
     ABSENT,
@@ -29,13 +31,10 @@ from nodl.infer.values import (
     Instance,
     Items,
     Key,
-    NativeMethod,
     NativeObject,
     Sequence,
-    SuperProxy,
     Unknown,
     Value,
-    Variables,
     external,
     join,
     present,

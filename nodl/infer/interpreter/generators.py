@@ -16,8 +16,9 @@ from typing import Any
 from nodl.infer.interpreter import loops
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import decide
+from nodl.infer.interpreter.frames import Call, Frame
 from nodl.infer.interpreter.raising import Raised
-from nodl.infer.interpreter.run import Call, Frame, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.models.concrete import NotConcrete, from_python, to_python
 from nodl.infer.values import NONE, FunctionValue, LocalCells, NativeObject, Value
 

@@ -7,7 +7,8 @@ import itertools
 from collections.abc import Iterator
 
 from nodl.infer.interpreter import special
-from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
     ANY,

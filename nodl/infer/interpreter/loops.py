@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterator
 
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import decide, narrowed
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.iterate import elements, lose
-from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.models.concrete import NotConcrete, is_usable, pulled
 from nodl.infer.values import (
     Items,

@@ -11,8 +11,9 @@ from collections.abc import Sequence as Sequences
 from pathlib import PurePath
 
 from nodl.infer.interpreter import special
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.raising import throw
-from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenate, concatenations, make_text
 from nodl.infer.values import (
     ANY,

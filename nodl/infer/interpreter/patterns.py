@@ -6,7 +6,8 @@ import ast
 
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.define import linearized
-from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.interpreter.frames import Frame
+from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,

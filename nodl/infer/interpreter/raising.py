@@ -10,7 +10,8 @@ import ast
 import builtins
 
 from nodl.infer.interpreter.define import linearized
-from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.interpreter.frames import Frame
+from nodl.infer.interpreter.run import Run
 from nodl.infer.values import (
     ClassValue,
     External,

@@ -8,36 +8,33 @@ from __future__ import annotations
 
 import ast
 import itertools
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from nodl.infer.findings import Findings, OptionDefaults
+from nodl.infer.interpreter.decisions import Decisions
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy, Variables
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.state import State
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
-    BoundMethod,
-    ClassMethod,
     ClassValue,
     Dictionary,
     External,
     FieldCells,
-    ForeignMethod,
     FunctionValue,
     HeapObject,
     Instance,
     Items,
     LocalCells,
     ModuleValue,
-    Partial,
     Sequence,
-    SuperProxy,
     Unknown,
     Value,
-    Variables,
     join,
 )
 from nodl.source_ref import SourceRef
@@ -46,7 +43,6 @@ from nodl.source_ref import SourceRef
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
 MAX_STEPS = 800_000
 MAX_DEPTH = 120  # analysed calls inside calls
-MAX_FORKS = 4  # undecided tests of which each outcome is followed by itself
 MAX_FOLLOWED_STEPS = 100_000  # after these, loops and recursion are joined
 MAX_TURNS = 3_000  # of loops that are followed turn by turn, in one run
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
@@ -60,104 +56,6 @@ _FUNCTIONS = frozenset({FunctionValue, BoundMethod, Partial})
 
 class BudgetExceeded(Exception):
     """The run was given up; what it found so far is kept, with a gap that says so."""
-
-
-class Frame:
-    """The variables of a running function, class body or module."""
-
-    __slots__ = (
-        "again",
-        "cells",
-        "closure",
-        "depth",
-        "early",
-        "forks",
-        "function",
-        "globals",
-        "is_class",
-        "is_comprehension",
-        "jump",
-        "loop_forks",
-        "module",
-        "nonlocals",
-        "raised",
-        "returned",
-        "unsettled",
-        "yielded",
-    )  # fmt: skip
-
-    def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
-        self.module = module
-        self.cells = cells
-        self.closure = closure
-        self.depth = depth  # of branches when the frame was entered
-        self.function: FunctionValue | None = None
-        self.returned: Value = BOTTOM
-        self.yielded: Value | None = None
-        self.early = False  # some path left before the end
-        self.unsettled = False  # a break or continue that may have happened, since the loop asked last
-        self.jump = ""  # the break or continue that certainly ended the latest statement
-        self.raised = False  # some path ended in an exception
-        self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
-        self.loop_forks = 0
-        self.again = False  # the cells also hold an earlier call, whose inner functions live on
-        self.is_class = False
-        self.is_comprehension = False
-        self.globals: set[str] = set()
-        self.nonlocals: set[str] = set()
-
-    @property
-    def captured(self) -> bool:
-        return type(self.cells) is LocalCells and self.cells.shared
-
-    def capture(self) -> None:
-        """Inner functions can see the cells, and those around them, from now on."""
-        frame: Frame | None = self
-        while frame is not None and not frame.captured:
-            if type(frame.cells) is LocalCells:
-                frame.cells.shared = True
-            frame = frame.closure
-
-
-@dataclass(slots=True)
-class Arguments:
-    """The arguments of a call. ``more``: further positional ones of unknown number."""
-
-    positional: list[Value] = field(default_factory=list)
-    keywords: dict[str, Value] = field(default_factory=dict)
-    more: Value = BOTTOM
-    more_keywords: Value = BOTTOM
-
-    def at(self, index: int, name: str | None = None) -> Value | None:
-        """The argument at ``index`` or called ``name``; ``None`` when it is not given."""
-        if 0 <= index < len(self.positional):
-            return self.positional[index]
-        if name is not None and name in self.keywords:
-            return self.keywords[name]
-        found = join(self.more if index >= 0 else BOTTOM, self.more_keywords)
-        return found or None
-
-    def shifted(self, count: int = 1) -> Arguments:
-        return Arguments(self.positional[count:], self.keywords, self.more, self.more_keywords)
-
-    def preceded(self, *first: Value) -> Arguments:
-        return Arguments([*first, *self.positional], self.keywords, self.more, self.more_keywords)
-
-    def all_values(self) -> Iterable[Value]:
-        return (*self.positional, *self.keywords.values(), self.more, self.more_keywords)
-
-
-@dataclass(slots=True)
-class Call:
-    """A call as the models of libraries see it."""
-
-    args: Arguments
-    node: ast.AST
-    frame: Frame
-
-    @property
-    def source(self) -> SourceRef:
-        return SourceRef(self.frame.module.source.path, getattr(self.node, "lineno", 0))
 
 
 Evaluator = Callable[["Run", Any, Frame], Value]
@@ -175,30 +73,6 @@ class Tables:
     may_fail: Callable[[object], bool]  # whether the call that gave this object of a library may have raised
     keeps_off: Callable[[str], bool]  # whether a library leaves the program's classes and objects alone
     creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
-
-
-class TooManyPaths(Exception):
-    """The program has more undecided tests in a row than are followed one by one."""
-
-
-@dataclass(slots=True)
-class Decisions:
-    """Outcomes of the undecided tests on one path through the program, in their order."""
-
-    outcomes: list[bool]
-    conditions: list[object] = field(default_factory=list)  # what the test asks of a parameter, or None
-    taken: int = 0
-
-    def next(self, condition: object) -> bool:
-        """The outcome of the next test. Raises ``TooManyPaths``."""
-        if self.taken == MAX_FORKS:
-            raise TooManyPaths
-        if self.taken == len(self.outcomes):
-            self.outcomes.append(True)
-        outcome = self.outcomes[self.taken]
-        self.conditions.append(condition)
-        self.taken += 1
-        return outcome
 
 
 class Run:

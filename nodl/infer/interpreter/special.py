@@ -5,17 +5,10 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter.define import linearized
-from nodl.infer.interpreter.run import Arguments, Frame, Run
-from nodl.infer.values import (
-    ANY,
-    BOTTOM,
-    BoundMethod,
-    ClassValue,
-    FunctionValue,
-    Instance,
-    Value,
-    join,
-)
+from nodl.infer.interpreter.frames import Arguments, Frame
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import BoundMethod
+from nodl.infer.values import ANY, BOTTOM, ClassValue, FunctionValue, Instance, Value, join
 
 OPERATORS: dict[type, str] = {
     ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv", ast.Mod: "mod",

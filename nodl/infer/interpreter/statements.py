@@ -11,6 +11,7 @@ from nodl.infer.interpreter import imports, loops, patterns, special
 from nodl.infer.interpreter.assign import assign, assign_unknown, delete
 from nodl.infer.interpreter.conditions import decide, forked, narrowed
 from nodl.infer.interpreter.define import define_class, define_function
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.iterate import lose
 from nodl.infer.interpreter.operators import binary_operation
 from nodl.infer.interpreter.raising import (
@@ -21,13 +22,13 @@ from nodl.infer.interpreter.raising import (
     throw,
     throw_value,
 )
-from nodl.infer.interpreter.run import Arguments, Call, Executor, Frame, Run
+from nodl.infer.interpreter.run import Executor, Run
+from nodl.infer.methods import BoundMethod
 from nodl.infer.models.concrete import NotConcrete
 from nodl.infer.values import (
     ANY,
     BOTTOM,
     NONE,
-    BoundMethod,
     ClassValue,
     External,
     Instance,

@@ -10,11 +10,13 @@ from nodl.infer.interpreter.assign import store_attribute
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.define import complete_class, linearized
 from nodl.infer.interpreter.expressions import copy_dictionary
+from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.iterate import elements, keys_of
 from nodl.infer.interpreter.operators import as_texts, formatted, text_value
 from nodl.infer.interpreter.raising import throw
-from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import BoundMethod, PropertyValue, Variables
 from nodl.infer.text import Text, input_of, with_edit
 from nodl.infer.values import (
     ANY,
@@ -23,7 +25,6 @@ from nodl.infer.values import (
     NONE,
     OF_A_NODE,
     OTHER,
-    BoundMethod,
     ClassValue,
     Dictionary,
     External,
@@ -33,11 +34,9 @@ from nodl.infer.values import (
     Items,
     Key,
     ModuleValue,
-    PropertyValue,
     Sequence,
     Unknown,
     Value,
-    Variables,
     constant_strings,
     join,
     present,

@@ -16,24 +16,20 @@ from pathlib import PurePosixPath
 from types import GeneratorType
 from typing import Any
 
+from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.raising import throw
-from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Getter, NativeMethod, Partial
 from nodl.infer.text import MAX_LENGTH
 from nodl.infer.values import (
     ANY,
-    BoundMethod,
-    ClassMethod,
     ClassValue,
     Dictionary,
     External,
-    ForeignMethod,
     FunctionValue,
-    Getter,
     Items,
     Key,
-    NativeMethod,
     NativeObject,
-    Partial,
     Sequence,
     Value,
     unknown,

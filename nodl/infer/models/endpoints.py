@@ -7,7 +7,8 @@ service, below its name.
 from __future__ import annotations
 
 from nodl.infer.findings import FoundEndpoint, NodeRecord
-from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.interpreter.frames import Call
+from nodl.infer.interpreter.run import Run
 from nodl.infer.models.signatures import COMMON_CALLBACKS
 from nodl.infer.text import Text, concatenate
 from nodl.infer.values import (

@@ -11,9 +11,11 @@ import sys
 from pathlib import PurePosixPath
 
 from nodl.infer.interpreter.assign import plain_store
+from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import lose
 from nodl.infer.interpreter.raising import is_builtin_exception
-from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import ForeignMethod, NativeMethod
 from nodl.infer.models import builtin, concrete, endpoints, files, named_tuples, native, pure, ros, stdlib
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
@@ -23,9 +25,7 @@ from nodl.infer.values import (
     RESULT,
     ClassValue,
     External,
-    ForeignMethod,
     Instance,
-    NativeMethod,
     NativeObject,
     Unknown,
     Value,

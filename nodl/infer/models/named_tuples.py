@@ -10,8 +10,9 @@ import keyword
 from collections.abc import Callable, Sequence
 
 from nodl.infer.interpreter.define import define_class
+from nodl.infer.interpreter.frames import Call, Frame
 from nodl.infer.interpreter.iterate import elements
-from nodl.infer.interpreter.run import Call, Frame, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.values import BOTTOM, ClassValue, Instance, LocalCells, Value, external, sole, unknown
 
 _UNKNOWN = "the class made by namedtuple()"

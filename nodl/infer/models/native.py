@@ -8,9 +8,11 @@ from collections.abc import Callable
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.comprehensions import store_item
 from nodl.infer.interpreter.expressions import copy_dictionary, variable
+from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements, keys_of, values_of
 from nodl.infer.interpreter.operators import joined, str_format, text_value
-from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import Variables
 from nodl.infer.models import concrete
 from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, input_of, make_text, with_edit
 from nodl.infer.values import (
@@ -26,7 +28,6 @@ from nodl.infer.values import (
     Key,
     Sequence,
     Value,
-    Variables,
     join,
     present,
     sole,

@@ -7,9 +7,10 @@ from collections.abc import Callable
 
 from nodl.infer.findings import FoundEndpoint, NodeRecord
 from nodl.infer.interpreter.conditions import truth
+from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import as_texts, text_value
-from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.models.endpoints import endpoint_object
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.ros_arguments import ros_arguments

@@ -6,9 +6,11 @@ import os.path
 from collections.abc import Callable
 
 from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import as_texts, text_value
-from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import Getter, Partial, PartialMethod
 from nodl.infer.models import builtin
 from nodl.infer.text import Input, concatenations, make_text
 from nodl.infer.values import (
@@ -20,12 +22,9 @@ from nodl.infer.values import (
     ClassValue,
     Dictionary,
     External,
-    Getter,
     Instance,
     Items,
     Key,
-    Partial,
-    PartialMethod,
     Sequence,
     Value,
     constant_strings,

@@ -1,0 +1,31 @@
+"""The undecided tests on one path through a program, each of them with an outcome."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+MAX_FORKS = 4  # undecided tests of which each outcome is followed by itself
+
+
+class TooManyPaths(Exception):
+    """The program has more undecided tests in a row than are followed one by one."""
+
+
+@dataclass(slots=True)
+class Decisions:
+    """Outcomes of the undecided tests on one path through the program, in their order."""
+
+    outcomes: list[bool]
+    conditions: list[object] = field(default_factory=list)  # what the test asks of a parameter, or None
+    taken: int = 0
+
+    def next(self, condition: object) -> bool:
+        """The outcome of the next test. Raises ``TooManyPaths``."""
+        if self.taken == MAX_FORKS:
+            raise TooManyPaths
+        if self.taken == len(self.outcomes):
+            self.outcomes.append(True)
+        outcome = self.outcomes[self.taken]
+        self.conditions.append(condition)
+        self.taken += 1
+        return outcome

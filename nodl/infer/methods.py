@@ -1,0 +1,136 @@
+"""What is called or read through something else: bound methods, partial functions, properties, ``vars(x)``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from nodl.infer.values import BOTTOM, ClassValue, FunctionValue, HeapObject, Value
+
+
+class BoundMethod:
+    __slots__ = ("function", "receiver")
+
+    def __init__(self, function: FunctionValue, receiver: object) -> None:
+        self.function = function
+        self.receiver = receiver
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, BoundMethod)
+            and other.function is self.function
+            and other.receiver is self.receiver
+        )
+
+    def __hash__(self) -> int:
+        return hash((id(self.function), id(self.receiver)))
+
+
+class NativeMethod:
+    """Attribute ``name`` of a string, container or modelled object."""
+
+    __slots__ = ("name", "receiver")
+
+    def __init__(self, receiver: object, name: str) -> None:
+        self.receiver = receiver
+        self.name = name
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, NativeMethod)
+            and other.name == self.name
+            and type(other.receiver) is type(self.receiver)
+            and other.receiver == self.receiver
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.receiver, self.name))
+
+
+class ForeignMethod:
+    """Method ``name`` that ``receiver`` inherits from the foreign class ``path``."""
+
+    __slots__ = ("name", "path", "receiver")
+
+    def __init__(self, path: str, receiver: object, name: str) -> None:
+        self.path = path
+        self.receiver = receiver
+        self.name = name
+
+    def __eq__(self, other: object) -> bool:
+        return (
+            isinstance(other, ForeignMethod)
+            and other.receiver is self.receiver
+            and other.name == self.name
+            and other.path == self.path
+        )
+
+    def __hash__(self) -> int:
+        return hash((self.path, id(self.receiver), self.name))
+
+
+@dataclass(frozen=True, slots=True)
+class Partial:
+    function: Value
+    positional: tuple[Value, ...]
+    keywords: tuple[tuple[str, Value], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Getter:
+    """``operator.methodcaller``, ``attrgetter`` and ``itemgetter`` with what they were given."""
+
+    kind: str
+    positional: tuple[Value, ...]
+    keywords: tuple[tuple[str, Value], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class SuperProxy:
+    """``super()`` inside a method of ``owner`` for object ``receiver``."""
+
+    owner: ClassValue
+    receiver: object
+
+
+@dataclass(frozen=True, slots=True)
+class PropertyValue:
+    """``cached``: read once, then an attribute of the object."""
+
+    getter: Value
+    setter: Value = BOTTOM
+    deleter: Value = BOTTOM
+    cached: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ClassMethod:
+    function: Value
+    static: bool
+
+
+@dataclass(frozen=True, slots=True)
+class PartialMethod:
+    """``functools.partialmethod``: bound like a function, with arguments of its own."""
+
+    partial: Partial
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Variables:
+    """The dictionary of an object's or a module's variables: ``vars(x)``, ``x.__dict__``, ``globals()``."""
+
+    owner: HeapObject
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Variables) and other.owner is self.owner
+
+    def __hash__(self) -> int:
+        return id(self.owner)
+
+    def named(self) -> dict[str, Value]:
+        """What is certainly or perhaps set, by name."""
+        return {
+            name: value
+            for name, value in self.owner.cells.items()
+            if isinstance(name, str) and not name.startswith("[")
+        }
