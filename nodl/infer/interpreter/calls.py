@@ -1,4 +1,4 @@
-"""Calls of analysed functions and classes: binding arguments, running bodies, recursion, memory."""
+"""Calls of analysed functions: running bodies, recursion, memory."""
 
 from __future__ import annotations
 
@@ -7,30 +7,19 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from nodl.infer.interpreter import generators
-from nodl.infer.interpreter.define import foreign_bases, linearized, methods_in
-from nodl.infer.interpreter.frames import Arguments, Call, Frame
-from nodl.infer.interpreter.iterate import elements, enum_members
-from nodl.infer.interpreter.run import MAX_DEPTH, Caller, Run
-from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Getter, NativeMethod, Partial
-from nodl.infer.models import foreign
+from nodl.infer.interpreter.binding import bind
+from nodl.infer.interpreter.frames import Call, Frame
+from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.run import MAX_DEPTH, Run
+from nodl.infer.methods import BoundMethod
 from nodl.infer.values import (
     ANY,
     BOTTOM,
-    COMMAND_LINE,
     NONE,
-    OF_A_NODE,
-    OTHER,
-    TOO_MANY,
-    ClassValue,
-    Dictionary,
-    External,
     FunctionValue,
-    Instance,
     Items,
-    Key,
     LocalCells,
     NativeObject,
-    Unknown,
     Value,
     join,
     unknown,
@@ -39,9 +28,6 @@ from nodl.infer.widening import widen
 
 MAX_ROUNDS = 8
 MAX_RECURSION = 24  # calls of a function inside itself that are followed one by one
-_OF_EXECUTORS = frozenset({"add_node", "remove_node", "wake"})  # of rclpy, whichever object it is
-_CHANGES = frozenset({"append", "extend", "insert", "remove", "pop", "clear"})
-_MISSING = unknown("an argument that the caller does not give")
 
 
 Body = Callable[[Run, FunctionValue, LocalCells, Call], Value]
@@ -233,247 +219,6 @@ def _widen_parameters(run: Run, summary: Summary, cells: LocalCells) -> None:
             run.rounds += 1
 
 
-# --- binding ----------------------------------------------------------------------------------------------
-
-
-def bind(run: Run, function: FunctionValue, call: Call) -> LocalCells:
-    """The parameters' values; what the caller does not give takes its default."""
-    given, parameters = call.args, function.node.args
-    names = [parameter.arg for parameter in (*parameters.posonlyargs, *parameters.args)]
-    cells = LocalCells()
-    first_default = len(names) - len(function.defaults)
-    used: set[str] = set()
-    for index, name in enumerate(names):
-        default = function.defaults[index - first_default] if index >= first_default else None
-        if index < len(given.positional):
-            cells[name] = given.positional[index]
-        else:
-            cells[name] = _named(name, given, default, join(given.more, given.more_keywords))
-            used.add(name)
-    for parameter, default in zip(parameters.kwonlyargs, function.kw_defaults, strict=True):
-        cells[parameter.arg] = _named(parameter.arg, given, default, given.more_keywords)
-        used.add(parameter.arg)
-    if parameters.vararg:
-        rest = tuple(given.positional[len(names) :])
-        items = Items(None, join(given.more, Items(rest).any_element())) if given.more else Items(rest)
-        cells[parameters.vararg.arg] = run.sequence(parameters.vararg, "tuple", items)
-    if parameters.kwarg:
-        cells[parameters.kwarg.arg] = _keywords(run, parameters.kwarg, given, used)
-    return cells
-
-
-def _named(name: str, given: Arguments, default: Value | None, more: Value) -> Value:
-    if name in given.keywords:
-        return given.keywords[name]
-    if default is not None:
-        return join(default, more)
-    return more or _MISSING
-
-
-def _keywords(run: Run, node: ast.AST, given: Arguments, used: set[str]) -> Value:
-    obj = run.allocate(node, "dict", Dictionary)
-    for name, value in given.keywords.items():
-        if name not in used:
-            run.state.store(obj, Key(name), value)
-    if given.more_keywords:
-        run.state.store(obj, OTHER, given.more_keywords)
-    return (obj,)
-
-
-# --- callables --------------------------------------------------------------------------------------------
-
-
-def _call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
+def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
     shifted = Call(call.args.preceded((method.receiver,)), call.node, call.frame)
     return call_function(run, method.function, shifted)
-
-
-def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
-    args = call.args.preceded(*partial.positional)
-    args = Arguments(
-        args.positional, {**dict(partial.keywords), **args.keywords}, args.more, args.more_keywords
-    )
-    return run.call(partial.function, args, call.node, call.frame)
-
-
-def _call_getter(run: Run, getter: Getter, call: Call) -> Value:
-    """``operator.methodcaller('m', ...)(x)`` is ``x.m(...)``."""
-    owner = call.args.at(0) or ANY
-    found: list[Value] = []
-    for given in getter.positional[: 1 if getter.kind == "methodcaller" else None]:
-        if getter.kind == "itemgetter":
-            item = run.attribute(owner, "__getitem__", call.node, call.frame)
-            found.append(run.call(item, Arguments([given]), call.node, call.frame))
-            continue
-        text = given[0] if len(given) == 1 and isinstance(given[0], str) else None
-        if text is None:
-            run.gap(call.node, call.frame, "an attribute whose name is made at run time is used")
-            return ANY
-        value = owner
-        for step in text.split("."):
-            value = run.attribute(value, step, call.node, call.frame)
-        found.append(value)
-    if getter.kind == "methodcaller":
-        args = Arguments(list(getter.positional[1:]), dict(getter.keywords))
-        return run.call(found[0], args, call.node, call.frame)
-    return found[0] if len(found) == 1 else run.tuple_of(tuple(found))
-
-
-def _call_instance(run: Run, instance: Instance, call: Call) -> Value:
-    if isinstance(instance.cls, External):
-        run.escape(call.args)
-        return ANY
-    return run.call(
-        run.attribute((instance,), "__call__", call.node, call.frame), call.args, call.node, call.frame
-    )
-
-
-def _call_class_method(run: Run, method: ClassMethod, call: Call) -> Value:
-    return run.call(method.function, call.args, call.node, call.frame)
-
-
-def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
-    if atom.why == TOO_MANY:
-        run.gap(call.node, call.frame, "one of too many functions is called here")
-    function = call.node.func if isinstance(call.node, ast.Call) else None
-    if atom.why == COMMAND_LINE and isinstance(function, ast.Attribute) and function.attr in _CHANGES:
-        run.gap(call.node, call.frame, "the command line is changed in code")
-    if isinstance(function, ast.Attribute) and function.attr in _OF_EXECUTORS:
-        return (atom,)
-    if atom.why == OF_A_NODE:
-        run.gap(call.node, call.frame, "a method of the node whose name is made at run time is called here")
-    run.escape(call.args)
-    return (atom,)
-
-
-def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
-    """A new object: its constructor is the first one in the method resolution order."""
-    for base in linearized(cls):
-        if isinstance(base, ClassValue):
-            run.instantiated.setdefault(base.node)
-    found = _member_by_value(run, cls, call)
-    if found:
-        return found
-    made = _made_by_new(run, cls, call)
-    if made is not None:
-        return made
-    return (initialise(run, cls, new_instance(run, cls, call), call),)
-
-
-def _member_by_value(run: Run, cls: ClassValue, call: Call) -> Value:
-    """``Side('l')`` of an enumeration: the member with this value; nothing where that is not known."""
-    if not any(isinstance(base, External) and base.path.startswith("enum.") for base in linearized(cls)):
-        return BOTTOM
-    wanted = call.args.at(0)
-    members = enum_members(run, cls, call.node, call.frame).exact
-    if wanted is None or len(wanted) != 1 or members is None or len(call.args.positional) != 1:
-        return BOTTOM
-    for member in members:
-        atom = member[0]
-        if (
-            isinstance(atom, Instance)
-            and atom.cells.get("_value_") == wanted
-            and isinstance(wanted[0], str | int)
-        ):
-            return member
-    return BOTTOM
-
-
-def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
-    """What the program's own ``__new__`` gives, initialised where it is an object of the class."""
-    for base in linearized(cls):
-        if isinstance(base, ClassValue) and "__new__" in base.cells:
-            constructors = tuple(
-                each
-                for atom in base.cells["__new__"]
-                for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
-            )
-            shifted = call.args.preceded((cls,))
-            made = run.call(constructors, shifted, call.node, call.frame)
-            for atom in made:
-                if (
-                    isinstance(atom, Instance)
-                    and isinstance(atom.cls, ClassValue)
-                    and cls in linearized(atom.cls)
-                ):
-                    initialise(run, atom.cls, atom, call)
-            return made
-    return None
-
-
-def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
-    """``object.__new__(cls)``."""
-    site = (call.frame.module.source.path, getattr(call.node, "lineno", 0))
-    instance = run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
-    assert isinstance(instance, Instance)
-    return instance
-
-
-def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> Instance:
-    """Call the constructor: the first one in the method resolution order."""
-    _expect_callbacks(run, cls, instance)
-    for base in linearized(cls):
-        if isinstance(base, ClassValue):
-            if "__del__" in base.cells:
-                run.register_callback(run.attribute((instance,), "__del__", call.node, call.frame), 0)
-            if base.fields is not None and "__init__" not in base.cells:
-                _fill_fields(run, base, instance, call)
-                break
-            constructor = base.cells.get("__init__")
-            if constructor:
-                for atom in constructor:
-                    if isinstance(atom, FunctionValue):
-                        _call_bound(run, BoundMethod(atom, instance), call)
-                break
-        else:
-            if isinstance(base, External) and base.path in ("builtins.object", "typing.Generic", "abc.ABC"):
-                continue
-            path = base.path if isinstance(base, External) else ""
-            run.call_atom(ForeignMethod(path, instance, "__init__"), call)
-            break
-    return instance
-
-
-def _fill_fields(run: Run, cls: ClassValue, instance: object, call: Call) -> None:
-    assert isinstance(instance, Instance)
-    for index, (name, default) in enumerate(cls.fields or ()):
-        value = call.args.at(index, name)
-        run.state.store(instance, name, value if value is not None else default or _MISSING)
-    after = run.attribute((instance,), "__post_init__", call.node, call.frame)
-    if isinstance(after[0], BoundMethod):
-        run.call(after, Arguments(), call.node, call.frame)
-
-
-def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
-    """A foreign base class calls the methods that override its own; which ones, only its model knows."""
-    seen: set[object] = set()
-    bases = foreign_bases(cls)
-    hooks = [foreign.hooks_of(base) for base in bases]
-    if not hooks:
-        return
-    every = any(names is None for names in hooks)
-    wanted = frozenset().union(*(names for names in hooks if names is not None))
-    for base in linearized(cls):
-        if not isinstance(base, ClassValue):
-            continue
-        for name, value in list(base.cells.items()):
-            if name in seen or name == "__init__" or not isinstance(name, str):
-                continue
-            if every or name in wanted:
-                seen.add(name)
-                run.register_callback(methods_in(value, instance, cls), None)
-
-
-CALLABLES: dict[type, Caller] = {
-    FunctionValue: call_function,
-    BoundMethod: _call_bound,
-    Partial: _call_partial,
-    Getter: _call_getter,
-    Instance: _call_instance,
-    ClassMethod: _call_class_method,
-    ClassValue: instantiate,
-    Unknown: _call_unknown,
-    External: foreign.call_external,
-    ForeignMethod: foreign.call_foreign_method,
-    NativeMethod: foreign.call_native,
-}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from nodl.infer.interpreter.attributes import ATTRIBUTES
-from nodl.infer.interpreter.calls import CALLABLES
+from nodl.infer.interpreter.callables import CALLABLES
 from nodl.infer.interpreter.expressions import EXPRESSIONS
 from nodl.infer.interpreter.run import Run, Tables
 from nodl.infer.interpreter.statements import STATEMENTS

@@ -434,9 +434,9 @@ def _object_new(run: Run, call: Call) -> Value:
 
 
 def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
-    from nodl.infer.interpreter import calls
+    from nodl.infer.interpreter import instantiation
 
-    return calls.new_instance(run, cls, call)
+    return instantiation.new_instance(run, cls, call)
 
 
 def _nothing(run: Run, call: Call) -> Value:

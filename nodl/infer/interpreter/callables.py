@@ -1,0 +1,100 @@
+"""What happens when a value is called, by its kind."""
+
+from __future__ import annotations
+
+import ast
+
+from nodl.infer.interpreter.calls import call_bound, call_function
+from nodl.infer.interpreter.frames import Arguments, Call
+from nodl.infer.interpreter.instantiation import instantiate
+from nodl.infer.interpreter.run import Caller, Run
+from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Getter, NativeMethod, Partial
+from nodl.infer.models import foreign
+from nodl.infer.values import (
+    ANY,
+    COMMAND_LINE,
+    OF_A_NODE,
+    TOO_MANY,
+    ClassValue,
+    External,
+    FunctionValue,
+    Instance,
+    Unknown,
+    Value,
+)
+
+_OF_EXECUTORS = frozenset({"add_node", "remove_node", "wake"})  # of rclpy, whichever object it is
+_CHANGES = frozenset({"append", "extend", "insert", "remove", "pop", "clear"})
+
+
+def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
+    args = call.args.preceded(*partial.positional)
+    args = Arguments(
+        args.positional, {**dict(partial.keywords), **args.keywords}, args.more, args.more_keywords
+    )
+    return run.call(partial.function, args, call.node, call.frame)
+
+
+def _call_getter(run: Run, getter: Getter, call: Call) -> Value:
+    """``operator.methodcaller('m', ...)(x)`` is ``x.m(...)``."""
+    owner = call.args.at(0) or ANY
+    found: list[Value] = []
+    for given in getter.positional[: 1 if getter.kind == "methodcaller" else None]:
+        if getter.kind == "itemgetter":
+            item = run.attribute(owner, "__getitem__", call.node, call.frame)
+            found.append(run.call(item, Arguments([given]), call.node, call.frame))
+            continue
+        text = given[0] if len(given) == 1 and isinstance(given[0], str) else None
+        if text is None:
+            run.gap(call.node, call.frame, "an attribute whose name is made at run time is used")
+            return ANY
+        value = owner
+        for step in text.split("."):
+            value = run.attribute(value, step, call.node, call.frame)
+        found.append(value)
+    if getter.kind == "methodcaller":
+        args = Arguments(list(getter.positional[1:]), dict(getter.keywords))
+        return run.call(found[0], args, call.node, call.frame)
+    return found[0] if len(found) == 1 else run.tuple_of(tuple(found))
+
+
+def _call_instance(run: Run, instance: Instance, call: Call) -> Value:
+    if isinstance(instance.cls, External):
+        run.escape(call.args)
+        return ANY
+    return run.call(
+        run.attribute((instance,), "__call__", call.node, call.frame), call.args, call.node, call.frame
+    )
+
+
+def _call_class_method(run: Run, method: ClassMethod, call: Call) -> Value:
+    return run.call(method.function, call.args, call.node, call.frame)
+
+
+def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
+    if atom.why == TOO_MANY:
+        run.gap(call.node, call.frame, "one of too many functions is called here")
+    function = call.node.func if isinstance(call.node, ast.Call) else None
+    if atom.why == COMMAND_LINE and isinstance(function, ast.Attribute) and function.attr in _CHANGES:
+        run.gap(call.node, call.frame, "the command line is changed in code")
+    if isinstance(function, ast.Attribute) and function.attr in _OF_EXECUTORS:
+        return (atom,)
+    if atom.why == OF_A_NODE:
+        run.gap(call.node, call.frame, "a method of the node whose name is made at run time is called here")
+    run.escape(call.args)
+    return (atom,)
+
+
+CALLABLES: dict[type, Caller] = {
+    FunctionValue: call_function,
+    BoundMethod: call_bound,
+    Partial: _call_partial,
+    Getter: _call_getter,
+    Instance: _call_instance,
+    ClassMethod: _call_class_method,
+    ClassValue: instantiate,
+    Unknown: _call_unknown,
+    External: foreign.call_external,
+    ForeignMethod: foreign.call_foreign_method,
+    NativeMethod: foreign.call_native,
+}

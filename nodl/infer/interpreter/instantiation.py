@@ -1,0 +1,138 @@
+"""Objects made of the program's classes: constructors, ``__new__``, dataclasses, members of enumerations."""
+
+from __future__ import annotations
+
+from nodl.infer.interpreter.binding import MISSING
+from nodl.infer.interpreter.calls import call_bound
+from nodl.infer.interpreter.define import foreign_bases, linearized, methods_in
+from nodl.infer.interpreter.frames import Arguments, Call
+from nodl.infer.interpreter.iterate import enum_members
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod
+from nodl.infer.models import foreign
+from nodl.infer.values import (
+    BOTTOM,
+    ClassValue,
+    External,
+    FunctionValue,
+    Instance,
+    Value,
+)
+
+
+def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
+    """A new object: its constructor is the first one in the method resolution order."""
+    for base in linearized(cls):
+        if isinstance(base, ClassValue):
+            run.instantiated.setdefault(base.node)
+    found = _member_by_value(run, cls, call)
+    if found:
+        return found
+    made = _made_by_new(run, cls, call)
+    if made is not None:
+        return made
+    return (initialise(run, cls, new_instance(run, cls, call), call),)
+
+
+def _member_by_value(run: Run, cls: ClassValue, call: Call) -> Value:
+    """``Side('l')`` of an enumeration: the member with this value; nothing where that is not known."""
+    if not any(isinstance(base, External) and base.path.startswith("enum.") for base in linearized(cls)):
+        return BOTTOM
+    wanted = call.args.at(0)
+    members = enum_members(run, cls, call.node, call.frame).exact
+    if wanted is None or len(wanted) != 1 or members is None or len(call.args.positional) != 1:
+        return BOTTOM
+    for member in members:
+        atom = member[0]
+        if (
+            isinstance(atom, Instance)
+            and atom.cells.get("_value_") == wanted
+            and isinstance(wanted[0], str | int)
+        ):
+            return member
+    return BOTTOM
+
+
+def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
+    """What the program's own ``__new__`` gives, initialised where it is an object of the class."""
+    for base in linearized(cls):
+        if isinstance(base, ClassValue) and "__new__" in base.cells:
+            constructors = tuple(
+                each
+                for atom in base.cells["__new__"]
+                for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
+            )
+            shifted = call.args.preceded((cls,))
+            made = run.call(constructors, shifted, call.node, call.frame)
+            for atom in made:
+                if (
+                    isinstance(atom, Instance)
+                    and isinstance(atom.cls, ClassValue)
+                    and cls in linearized(atom.cls)
+                ):
+                    initialise(run, atom.cls, atom, call)
+            return made
+    return None
+
+
+def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
+    """``object.__new__(cls)``."""
+    site = (call.frame.module.source.path, getattr(call.node, "lineno", 0))
+    instance = run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
+    assert isinstance(instance, Instance)
+    return instance
+
+
+def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> Instance:
+    """Call the constructor: the first one in the method resolution order."""
+    _expect_callbacks(run, cls, instance)
+    for base in linearized(cls):
+        if isinstance(base, ClassValue):
+            if "__del__" in base.cells:
+                run.register_callback(run.attribute((instance,), "__del__", call.node, call.frame), 0)
+            if base.fields is not None and "__init__" not in base.cells:
+                _fill_fields(run, base, instance, call)
+                break
+            constructor = base.cells.get("__init__")
+            if constructor:
+                for atom in constructor:
+                    if isinstance(atom, FunctionValue):
+                        call_bound(run, BoundMethod(atom, instance), call)
+                break
+        else:
+            if isinstance(base, External) and base.path in ("builtins.object", "typing.Generic", "abc.ABC"):
+                continue
+            path = base.path if isinstance(base, External) else ""
+            run.call_atom(ForeignMethod(path, instance, "__init__"), call)
+            break
+    return instance
+
+
+def _fill_fields(run: Run, cls: ClassValue, instance: object, call: Call) -> None:
+    assert isinstance(instance, Instance)
+    for index, (name, default) in enumerate(cls.fields or ()):
+        value = call.args.at(index, name)
+        run.state.store(instance, name, value if value is not None else default or MISSING)
+    after = run.attribute((instance,), "__post_init__", call.node, call.frame)
+    if isinstance(after[0], BoundMethod):
+        run.call(after, Arguments(), call.node, call.frame)
+
+
+def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
+    """A foreign base class calls the methods that override its own; which ones, only its model knows."""
+    seen: set[object] = set()
+    bases = foreign_bases(cls)
+    hooks = [foreign.hooks_of(base) for base in bases]
+    if not hooks:
+        return
+    every = any(names is None for names in hooks)
+    wanted = frozenset().union(*(names for names in hooks if names is not None))
+    for base in linearized(cls):
+        if not isinstance(base, ClassValue):
+            continue
+        for name, value in list(base.cells.items()):
+            if name in seen or name == "__init__" or not isinstance(name, str):
+                continue
+            if every or name in wanted:
+                seen.add(name)
+                run.register_callback(methods_in(value, instance, cls), None)
