@@ -142,7 +142,7 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
 def _store_slice(
     run: Run, owner: object, bounds: ast.Slice, value: Value, certain: bool, frame: Frame
 ) -> None:
-    from nodl.infer.interpreter.expressions import slice_of
+    from nodl.infer.interpreter.subscripts import slice_of
 
     if not isinstance(owner, Sequence):
         run.escape_value(value)

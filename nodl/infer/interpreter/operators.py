@@ -1,26 +1,21 @@
-"""Operators and text building: ``+``, ``%``, f-strings, ``format``, ``join``."""
+"""Operators: ``+``, ``%``, arithmetic, unions."""
 
 from __future__ import annotations
 
 import ast
 import operator
-import re
-import string
-from collections.abc import Callable, Iterable
-from collections.abc import Sequence as Sequences
-from pathlib import PurePath
+from collections.abc import Callable
 
 from nodl.infer.interpreter import special
+from nodl.infer.interpreter.formatting import as_texts, percent
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Run
-from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenate, concatenations, make_text
+from nodl.infer.text import Hole, Text, TextAtom, concatenate, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
-    RESULT,
     Dictionary,
-    External,
     Instance,
     Items,
     NativeObject,
@@ -29,7 +24,6 @@ from nodl.infer.values import (
     Value,
     join,
     sole,
-    unknown,
 )
 
 _ARITHMETIC: dict[type, Callable[[object, object], object]] = {
@@ -210,194 +204,3 @@ def _added_sequences(run: Run, node: ast.AST, left: Value, right: Value, sequenc
     if any(not isinstance(atom, Sequence) for atom in (*left, *right)):
         element = join(element, ANY)
     return run.sequence(node, kind, Items(None, element))
-
-
-# --- text ---------------------------------------------------------------------------------------------------
-
-
-def as_texts(value: Value, convert: bool = True) -> list[TextAtom]:
-    """The texts that formatting ``value`` may give."""
-    texts = list(dict.fromkeys(_text_of_atom(atom) for atom in value))
-    if not texts:
-        return [make_text((Hole("a value that is never set"),))]
-    return texts if len(texts) <= 32 else [common_text(texts, "too many possible values")]
-
-
-def _text_of_atom(atom: object) -> TextAtom:
-    if isinstance(atom, str | Text):
-        return atom
-    if isinstance(atom, int | float | type(None)):
-        return str(atom)
-    if isinstance(atom, Unknown):
-        return make_text((Hole(atom.why),))
-    if isinstance(atom, External):
-        return make_text((Hole(f"a result of {atom.path.removesuffix(RESULT)}"),))
-    if isinstance(atom, NativeObject) and isinstance(atom.object, PurePath):
-        return str(atom.object)
-    if isinstance(atom, Instance) and "_value_" in atom.cells:
-        value = sole(atom.cells["_value_"])
-        if isinstance(value, str):
-            return value
-    return make_text((Hole("the text of an object"),))
-
-
-def text_value(texts: Iterable[TextAtom]) -> Value:
-    """A value of ``texts``; a text that is one hole is simply unknown."""
-    result: Value = BOTTOM
-    for text in texts:
-        if isinstance(text, Text) and text.is_hole:
-            hole = text.pieces[0]
-            assert isinstance(hole, Hole)
-            result = join(result, unknown(hole.why))
-        else:
-            result = join(result, (text,))
-    return result
-
-
-def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
-    operands: list[list[TextAtom]] = []
-    for part in node.values:
-        if isinstance(part, ast.Constant):
-            operands.append([str(part.value)])
-        elif isinstance(part, ast.FormattedValue):
-            operands.append(_formatted(run, part, frame))
-    return text_value(concatenations(operands))
-
-
-def _formatted(run: Run, part: ast.FormattedValue, frame: Frame) -> list[TextAtom]:
-    value = run.evaluate(part.value, frame)
-    spec: Value = ("",) if part.format_spec is None else run.evaluate(part.format_spec, frame)
-    said = special.spoken(run, value, part, frame, spec if part.conversion == -1 else None)
-    if said is not value and part.conversion == -1:
-        return as_texts(said)
-    value = said
-    if part.conversion not in (-1, 115):  # !r and !a quote their argument
-        return [make_text((Hole("text made with !r"),))]
-    if part.format_spec is None:
-        return as_texts(value)
-    known = sole(spec)
-    return formatted(value, known if isinstance(known, str) else None)
-
-
-_WIDE = re.compile(r"\d{4}")  # a width or precision that makes texts of no use, and of any size
-
-
-def formatted(value: Value, spec: str | None) -> list[TextAtom]:
-    """``format(value, spec)`` for constants; what depends on the rest is a hole."""
-    if spec == "":
-        return as_texts(value)
-    texts: list[TextAtom] = []
-    for atom in value:
-        if spec is not None and isinstance(atom, str | int | float) and not _WIDE.search(spec):
-            try:
-                texts.append(format(atom, spec))
-                continue
-            except (ValueError, TypeError, OverflowError):
-                continue  # an error at run time, no text
-        texts.append(make_text((Hole("formatted text"),)))
-    return texts or [make_text((Hole("formatted text"),))]
-
-
-def percent(left: Value, right: Value) -> Value:
-    """``'text %s' % values``."""
-    results: list[TextAtom] = []
-    for atom in left:
-        if isinstance(atom, str):
-            results.extend(_percent_one(atom, right))
-        elif isinstance(atom, Text):
-            results.append(make_text((Hole("a format that is not known"),)))
-    return text_value(results) or ANY
-
-
-_DIRECTIVE = re.compile(r"%(?:\((?P<key>[^)]{0,200})\))?(?P<flags>[#0\- +]*\d*(?:\.\d+)?)(?P<type>[a-zA-Z%])")
-
-
-def _percent_one(template: str, right: Value) -> list[TextAtom]:
-    atom = sole(right)
-    positional: tuple[Value, ...] | None = (right,)
-    if isinstance(atom, Sequence) and atom.kind == "tuple":
-        positional = atom.items.exact
-    operands: list[Sequences[TextAtom]] = []
-    position = used = 0
-    for match in _DIRECTIVE.finditer(template):
-        operands.append([template[position : match.start()]])
-        position = match.end()
-        if match["type"] == "%":
-            operands.append(["%"])
-            continue
-        if match["key"] is not None:
-            value = _mapping_item(atom, match["key"])
-        elif positional is not None and used < len(positional):
-            value = positional[used]
-        else:
-            value = ANY
-        used += 1
-        operands.append(_percent_text(match, value))
-    operands.append([template[position:]])
-    return concatenations(operands)
-
-
-def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
-    if match["type"] == "s" and not match["flags"]:
-        return as_texts(value)
-    texts: list[TextAtom] = []
-    for atom in value:
-        if isinstance(atom, str | int | float) and not _WIDE.search(match["flags"]):
-            try:
-                texts.append(f"%{match['flags']}{match['type']}" % atom)
-                continue
-            except (TypeError, ValueError, OverflowError):
-                continue
-        texts.append(make_text((Hole("formatted text"),)))
-    return texts or [make_text((Hole("formatted text"),))]
-
-
-def _mapping_item(atom: object, key: str) -> Value:
-    return (atom.held(key)[0] or ANY) if isinstance(atom, Dictionary) else ANY
-
-
-def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
-    """``template.format(...)``."""
-    if not isinstance(template, str):
-        return [make_text((Hole("a format that is not known"),))]
-    operands: list[Sequences[TextAtom]] = []
-    automatic = 0
-    try:
-        fields = list(string.Formatter().parse(template))
-    except ValueError:
-        return [make_text((Hole("an invalid format"),))]
-    for literal, name, spec, conversion in fields:
-        operands.append([literal])
-        if name is None:
-            continue
-        if name == "":
-            name = str(automatic)
-            automatic += 1
-        value = _format_argument(name, args)
-        operands.append(
-            formatted(value, spec or "")
-            if not conversion and "{" not in (spec or "")
-            else [make_text((Hole("formatted text"),))]
-        )
-    return concatenations(operands)
-
-
-def _format_argument(name: str, args: Arguments) -> Value:
-    if name.isdigit():
-        return args.at(int(name)) or ANY
-    return args.at(-1, name) or ANY
-
-
-def joined(separators: Value, items: Items) -> list[TextAtom]:
-    """``separator.join(items)``."""
-    separator_texts = [atom for atom in separators if isinstance(atom, str | Text)]
-    if items.exact is None or len(items.exact) > 32 or not separator_texts:
-        return [make_text((Hole("joined texts"),))]
-    results: list[TextAtom] = []
-    for separator in separator_texts:
-        operands: list[Sequences[TextAtom]] = []
-        for index, element in enumerate(items.exact):
-            operands.append([separator] if index else [""])
-            operands.append(as_texts(element))
-        results.extend(concatenations(operands))
-    return results

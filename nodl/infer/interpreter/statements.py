@@ -3,38 +3,27 @@
 from __future__ import annotations
 
 import ast
-import io
 from collections.abc import Callable
-from typing import Any
 
 from nodl.infer.interpreter import imports, loops, patterns, special
-from nodl.infer.interpreter.assign import assign, assign_unknown, delete
+from nodl.infer.interpreter.assign import assign, delete
 from nodl.infer.interpreter.conditions import decide, forked, narrowed
 from nodl.infer.interpreter.define import define_class, define_function
-from nodl.infer.interpreter.frames import Arguments, Call, Frame
-from nodl.infer.interpreter.iterate import lose
+from nodl.infer.interpreter.frames import Arguments, Frame
+from nodl.infer.interpreter.handling import run_try
+from nodl.infer.interpreter.managers import run_with
 from nodl.infer.interpreter.operators import binary_operation
 from nodl.infer.interpreter.raising import (
-    Raised,
-    Unwinding,
-    catches,
-    handled_value,
     throw,
     throw_value,
 )
 from nodl.infer.interpreter.run import Executor, Run
-from nodl.infer.methods import BoundMethod
-from nodl.infer.models.concrete import NotConcrete
 from nodl.infer.values import (
     ANY,
-    BOTTOM,
     NONE,
     ClassValue,
     External,
-    Instance,
-    NativeObject,
     Sequence,
-    Unknown,
     Value,
     join,
     sole,
@@ -157,201 +146,6 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
     return False
 
 
-def _try(run: Run, node: Any, frame: Frame) -> bool:
-    """Handlers run after a certain exception, or after any prefix of a body that may have raised one."""
-    mark = run.state.mark()
-    before = Unwinding(run, frame)
-    risks = run.risks
-    raised = None
-    run.state.depth += 1
-    run.tries += 1
-    run.try_forks = run.state.forks
-    tries = run.tries
-    try:
-        passes = run.execute(node.body, frame)
-    except Raised as found:
-        raised, passes = found, False
-    jump = frame.jump
-    before.restore(run, frame)
-    frame.jump = jump if raised is None else ""
-    run.tries = tries - 1
-    if passes and node.orelse:
-        passes = run.execute(node.orelse, frame)
-    try:
-        if raised is not None and run.risks - risks <= raised_risks(raised):
-            passes = _handled(run, node.handlers, raised, frame)
-        elif raised is not None or run.risks != risks:
-            passes = _perhaps_handled(run, node, passes, mark, frame)
-    except Raised:
-        if node.finalbody:
-            run.execute(node.finalbody, frame)
-        raise
-    if node.finalbody:
-        if not passes:
-            jump = frame.jump
-            run.state.join_seen(mark)
-            done = run.execute(node.finalbody, frame)
-            frame.jump = jump if done else frame.jump
-            return False
-        passes = run.execute(node.finalbody, frame)
-    return passes
-
-
-def raised_risks(raised: Raised) -> int:
-    """A certain exception is itself one risk."""
-    return 1
-
-
-def _handled(run: Run, handlers: list[ast.ExceptHandler], raised: Raised, frame: Frame) -> bool:
-    """The handler that certainly catches the exception, or the exception again."""
-    for handler in handlers:
-        outcome = catches(handled_value(run, handler, frame), raised)
-        if outcome is None:
-            break
-        if outcome:
-            return _run_handler(run, handler, raised.value, frame)
-    else:
-        raise raised
-    return run.state.branches([_handler_of(run, handler, raised.value, frame) for handler in handlers])
-
-
-def _handler_of(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> Callable[[], bool]:
-    return lambda: _run_handler(run, handler, value, frame)
-
-
-def _run_handler(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> bool:
-    if handler.name:
-        run.assign_name(handler.name, value, frame)
-    outer = frame.cells.get("[exception]")
-    run.assign_name("[exception]", value, frame)
-    passes = run.execute(handler.body, frame)
-    if outer is not None:
-        run.assign_name("[exception]", outer, frame)
-    return passes
-
-
-def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame) -> bool:
-    """Each handler may run: it sees every value written on the way through the body."""
-
-    def no_exception() -> bool:
-        return passes
-
-    def handler_of(handler: ast.ExceptHandler) -> Any:
-        def handle() -> bool:
-            run.state.join_seen(mark)
-            return _run_handler(run, handler, ANY, frame)
-
-        return handle
-
-    if not node.handlers:
-        return passes
-    jump = frame.jump
-    result = run.state.branches([no_exception, *(handler_of(handler) for handler in node.handlers)])
-    if not passes:
-        if jump:
-            frame.unsettled = True  # the jump of the body may happen, or a handler runs instead
-        else:
-            frame.early = True
-    return result
-
-
-def _with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
-    managers: list[Value] = []
-    for item in node.items:
-        manager = run.evaluate(item.context_expr, frame)
-        managers.append(manager)
-        entered = _entered(run, manager, node, frame)
-        if item.optional_vars is not None:
-            assign(run, item.optional_vars, entered, frame)
-    swallows = any(_may_swallow(atom) for manager in managers for atom in manager)
-    if swallows:
-        return _swallowing(run, node, managers, frame)
-    before = frame.raised
-    frame.raised = False
-    mark = run.state.mark()
-    passes = run.execute(node.body, frame)
-    if not passes and frame.raised and any(_is_unknown(atom) for manager in managers for atom in manager):
-        run.state.join_seen(mark)  # a manager that is not known may swallow an exception
-        passes = True
-    frame.raised = before or frame.raised
-    _exited(run, managers, node, frame)
-    return passes
-
-
-def _is_unknown(atom: object) -> bool:
-    return not isinstance(atom, External) or not atom.path.startswith(_PLAIN_MANAGERS)
-
-
-_PLAIN_MANAGERS = ("threading.", "builtins.open", "rclpy.", "multiprocessing.")
-
-
-def _may_swallow(atom: object) -> bool:
-    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
-        leave = special.method(atom, "__exit__")
-        nodes = [each.function.node for each in leave if isinstance(each, BoundMethod)]
-        return any(isinstance(part, ast.Return) and part.value for each in nodes for part in ast.walk(each))
-    return isinstance(atom, Unknown) and "contextlib.suppress" in atom.why
-
-
-def _swallowing(run: Run, node: ast.With | ast.AsyncWith, managers: list[Value], frame: Frame) -> bool:
-    """``contextlib.suppress``, or a manager of the program that may return true: the body up to an exception."""
-    mark = run.state.mark()
-    before = Unwinding(run, frame)
-    risks = run.risks
-    run.tries += 1
-    run.try_forks = run.state.forks
-    tries = run.tries
-    run.state.depth += 1
-    try:
-        passes = run.execute(node.body, frame)
-        certain = False
-    except Raised:
-        passes, certain = True, run.risks - risks <= 1
-    before.restore(run, frame)
-    run.tries = tries - 1
-    if not certain and run.risks != risks:
-        run.state.join_seen(mark)
-        passes = True
-    _exited(run, managers, node, frame)
-    return passes
-
-
-def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
-    result: Value = ()
-    for atom in manager:
-        if isinstance(atom, Instance):
-            enter = run.attribute((atom,), "__enter__", node, frame)
-            result = join(result, run.call(enter, Arguments(), node, frame))
-        elif isinstance(atom, Sequence) and atom.kind == "generator":
-            result = join(result, atom.items.any_element())
-        elif isinstance(atom, NativeObject) and isinstance(atom.object, io.IOBase):
-            result = join(result, (atom,))
-        elif isinstance(atom, NativeObject):
-            result = join(result, _advanced(run, atom, node, frame) or NONE)
-        else:
-            result = join(result, ANY)
-    return result or ANY
-
-
-def _advanced(run: Run, atom: NativeObject, node: ast.AST, frame: Frame) -> Value:
-    """One step of the generator behind a ``contextlib.contextmanager``."""
-    try:
-        return next(loops.stream(run, (atom,), Call(Arguments(), node, frame)), BOTTOM)
-    except (NotConcrete, TypeError):
-        return lose(run, atom)
-
-
-def _exited(run: Run, managers: list[Value], node: ast.AST, frame: Frame) -> None:
-    """``__exit__`` without an exception, and perhaps with one."""
-    for atom in (atom for manager in reversed(managers) for atom in manager):
-        leave = special.method(atom, "__exit__") or special.method(atom, "__aexit__")
-        if isinstance(atom, NativeObject) and not isinstance(atom.object, io.IOBase):
-            _advanced(run, atom, node, frame)
-        if leave:
-            run.call(leave, Arguments([NONE, NONE, NONE]), node, frame)
-            run.register_callback(leave, 3)
-
-
 def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
     return _cases(run, node.cases, run.evaluate(node.subject, frame), frame)
 
@@ -415,9 +209,9 @@ STATEMENTS: dict[type, Executor] = {
     ast.Raise: _raise,
     ast.Break: _jump,
     ast.Continue: _jump,
-    ast.Try: _try,
-    ast.With: _with,
-    ast.AsyncWith: _with,
+    ast.Try: run_try,
+    ast.With: run_with,
+    ast.AsyncWith: run_with,
     ast.Match: _match,
     ast.Global: _global,
     ast.Nonlocal: _nonlocal,
@@ -430,6 +224,4 @@ STATEMENTS: dict[type, Executor] = {
     ast.ImportFrom: imports.run_import_from,
 }
 if hasattr(ast, "TryStar"):  # Python 3.11
-    STATEMENTS[ast.TryStar] = _try
-
-__all__ = ["STATEMENTS", "assign_unknown"]
+    STATEMENTS[ast.TryStar] = run_try

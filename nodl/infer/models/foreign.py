@@ -16,7 +16,19 @@ from nodl.infer.interpreter.iterate import lose
 from nodl.infer.interpreter.raising import is_builtin_exception
 from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import ForeignMethod, NativeMethod
-from nodl.infer.models import builtin, concrete, endpoints, files, named_tuples, native, pure, ros, stdlib
+from nodl.infer.models import (
+    builtin,
+    concrete,
+    endpoints,
+    files,
+    named_tuples,
+    native,
+    pure,
+    ros,
+    ros_nodes,
+    ros_parameters,
+    stdlib,
+)
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
 from nodl.infer.values import (
@@ -197,7 +209,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
         return model(run, receiver, call)
     if path in endpoints.CLASSES:
         return endpoints.method(run, receiver, name, call)
-    if path == ros.PARAMETER_CLASS:
+    if path == ros_parameters.PARAMETER_CLASS:
         return (receiver,) if name == "get_parameter_value" else ANY
     if name == "__init__":
         _initialise_other_bases(run, receiver, path, call)
@@ -205,7 +217,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     if path == "builtins.object" or name in ("__setattr__", "__getattribute__", "__delattr__"):
         return _object_method(run, receiver, name, call)
     if name in NODE_ENDPOINTS and len(call.args.positional) + len(call.args.keywords) >= 2:
-        record = ros.record_of_instance(run, receiver, call)
+        record = ros_nodes.record_of_instance(run, receiver, call)
         if not record.created:
             why = f"the class derives from {path or 'a class that is not known'}, which is not analysed"
             record.gaps.setdefault((call.source, why))
@@ -239,11 +251,11 @@ def _object_method(run: Run, receiver: Instance, name: str, call: Call) -> Value
 
 def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: Call) -> Value:
     if name == "__init__":
-        ros.initialise_node(run, receiver, path, call)
+        ros_nodes.initialise_node(run, receiver, path, call)
         return ANY
     model = ros.NODE_METHODS.get(name)
     if model is not None:
-        return model(run, ros.record_of_instance(run, receiver, call), call)
+        return model(run, ros_nodes.record_of_instance(run, receiver, call), call)
     run.escape(call.args, opened=False, objects=name in ("add_waitable", "add_rate"))
     return result_of(path)
 
@@ -258,7 +270,7 @@ def _initialise_other_bases(run: Run, receiver: Instance, path: str, call: Call)
     after = paths[paths.index(path) + 1 :] if path in paths else []
     for other in after:
         if is_node_class(other):
-            ros.initialise_node(run, receiver, other, call)
+            ros_nodes.initialise_node(run, receiver, other, call)
             return
 
 
@@ -278,7 +290,7 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
             _common_callback(run, name, call)
             return ANY
         if len(call.args.positional) + len(call.args.keywords) >= 2:
-            record = ros.records_of(run, (receiver,), call)[0]
+            record = ros_nodes.records_of(run, (receiver,), call)[0]
             return ros.NODE_METHODS[name](run, record, call)
         return ANY
     return native.call_method(run, receiver, name, call)
@@ -325,7 +337,7 @@ _PARAMETER_VALUES = frozenset(
 
 def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
     """An attribute of an object whose class is foreign."""
-    if path == ros.PARAMETER_CLASS and name in _PARAMETER_VALUES:
+    if path == ros_parameters.PARAMETER_CLASS and name in _PARAMETER_VALUES:
         return obj.cells.get("value", ANY)
     if path in endpoints.CLASSES and name in endpoints.NAMES:
         return obj.cells.get("name", ANY)
@@ -351,7 +363,7 @@ def hooks_of(base: object) -> frozenset[str] | None:
     if not isinstance(base, External):
         return None
     if is_node_class(base.path):
-        return LIFECYCLE_HOOKS if ros.is_lifecycle(base.path) else frozenset()
+        return LIFECYCLE_HOOKS if ros_nodes.is_lifecycle(base.path) else frozenset()
     if base.path in stdlib.HOOKS:
         return stdlib.HOOKS[base.path]
     return None

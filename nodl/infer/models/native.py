@@ -7,11 +7,12 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.comprehensions import store_item
-from nodl.infer.interpreter.expressions import copy_dictionary, variable
+from nodl.infer.interpreter.expressions import copy_dictionary
+from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements, keys_of, values_of
-from nodl.infer.interpreter.operators import joined, str_format, text_value
 from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.subscripts import variable
 from nodl.infer.methods import Variables
 from nodl.infer.models import concrete
 from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, input_of, make_text, with_edit

@@ -6,12 +6,15 @@ import os.path
 from collections.abc import Callable
 
 from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements
-from nodl.infer.interpreter.operators import as_texts, text_value
 from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import Getter, Partial, PartialMethod
-from nodl.infer.models import builtin
+from nodl.infer.models import builtin, options
+from nodl.infer.models.iterables import MAX_RANGE
+from nodl.infer.models.library_objects import library_instance
+from nodl.infer.models.reflection import import_dynamic
 from nodl.infer.text import Input, concatenations, make_text
 from nodl.infer.values import (
     ABSENT,
@@ -36,70 +39,6 @@ from nodl.infer.values import (
 
 Model = Callable[[Run, Call], Value]
 Method = Callable[[Run, Instance, Call], Value]
-
-PARSER = "argparse.ArgumentParser"
-NAMESPACE = "argparse.Namespace"
-
-
-# --- argparse -----------------------------------------------------------------------------------------------
-
-
-def _parser(run: Run, call: Call) -> Value:
-    return (_library_instance(run, call, PARSER),)
-
-
-def _library_instance(run: Run, call: Call, path: str) -> Instance:
-    site = (call.source.file, call.source.line)
-    instance = run.allocate(call.node, path, lambda: Instance(External(path), site))
-    assert isinstance(instance, Instance)
-    return instance
-
-
-def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
-    flags = [flag for value in call.args.positional for flag in constant_strings(value)]
-    if not flags:
-        return ANY
-    long = next((flag for flag in flags if flag.startswith("--")), flags[0])
-    dest = sole(call.args.keywords.get("dest", (long.lstrip("-").replace("-", "_"),)))
-    default = call.args.keywords.get("default", BOTTOM)
-    name = long if long.startswith("-") else f"<{long}>"
-    run.options.declare(name, tuple(atom for atom in default if atom is not None))
-    if isinstance(dest, str):
-        owner = parser.cells.get("parser", (parser,))[0]
-        assert isinstance(owner, Instance)
-        run.state.store(owner, "dest " + dest, (make_text((Input(name, run.options),)),))
-    return ANY
-
-
-def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
-    for dest, value in call.args.keywords.items():
-        cell = "dest " + dest
-        run.state.store(parser, cell, join(parser.cells.get(cell, BOTTOM), value))
-    return NONE
-
-
-def _argument_group(run: Run, parser: Instance, call: Call) -> Value:
-    return (parser,)
-
-
-def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
-    namespace = _library_instance(run, call, NAMESPACE)
-    run.state.store(namespace, "parser", (parser,))
-    return (namespace,)
-
-
-def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
-    namespace = _parse_args(run, parser, call)
-    rest = run.sequence(call.node, "list", Items(None, unknown("command line arguments")))
-    return run.tuple_of((namespace, rest))
-
-
-def _namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
-    found: Value = BOTTOM
-    for parser in namespace.cells.get("parser", BOTTOM):
-        if isinstance(parser, Instance):
-            found = join(found, parser.cells.get("dest " + name, BOTTOM))
-    return found or unknown(f"the command line option {name}")
 
 
 # --- environment, paths ---------------------------------------------------------------------------------------
@@ -174,7 +113,7 @@ def _thread(run: Run, call: Call) -> Value:
     """``Thread(target=f, args=(...))``: calls ``f`` with these arguments, some time later."""
     target = call.args.at(1, "target") or NONE
     _register_with(run, target, call.args.keywords.get("args"), call.args.keywords.get("kwargs"), call)
-    return (_library_instance(run, call, "threading.Thread"),)
+    return (library_instance(run, call, "threading.Thread"),)
 
 
 def _register_with(run: Run, target: Value, args: Value | None, kwargs: Value | None, call: Call) -> None:
@@ -225,7 +164,7 @@ def _default_dict(run: Run, call: Call) -> Value:
 
 
 def _simple_namespace(run: Run, call: Call) -> Value:
-    instance = _library_instance(run, call, "types.SimpleNamespace")
+    instance = library_instance(run, call, "types.SimpleNamespace")
     for name, value in call.args.keywords.items():
         run.state.store(instance, name, value)
     return (instance,)
@@ -259,7 +198,7 @@ def _product(run: Run, call: Call) -> Value:
     columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
     rows: list[tuple[Value, ...]] = [()]
     for column in columns:
-        if column.exact is None or len(rows) * len(column.exact) > builtin.MAX_RANGE:
+        if column.exact is None or len(rows) * len(column.exact) > MAX_RANGE:
             row = tuple(each.any_element() or ANY for each in columns)
             return run.sequence(call.node, "list", Items(None, run.tuple_of(row)))
         rows = [(*row, item) for row in rows for item in column.exact]
@@ -313,7 +252,7 @@ def _file_contents(run: Run, call: Call) -> Value:
 
 
 FUNCTIONS: dict[str, Model] = {
-    "argparse.ArgumentParser": _parser,
+    "argparse.ArgumentParser": options.made_parser,
     "os.getenv": _environment,
     "os.environ.get": _environment,
     "os.environ.setdefault": _set_default_environment,
@@ -342,7 +281,7 @@ FUNCTIONS: dict[str, Model] = {
     "itertools.chain": _chain,
     "itertools.product": _product,
     "random.choice": builtin.FUNCTIONS["builtins.next"],
-    "importlib.import_module": builtin.import_dynamic,
+    "importlib.import_module": import_dynamic,
     "atexit.register": _register,
     "yaml.safe_load": _file_contents,
     "yaml.load": _file_contents,
@@ -350,13 +289,7 @@ FUNCTIONS: dict[str, Model] = {
 }
 
 METHODS: dict[tuple[str, str], Method] = {
-    (PARSER, "add_argument"): _add_argument,
-    (PARSER, "set_defaults"): _set_defaults,
-    (PARSER, "add_argument_group"): _argument_group,
-    (PARSER, "add_mutually_exclusive_group"): _argument_group,
-    (PARSER, "parse_args"): _parse_args,
-    (PARSER, "parse_known_args"): _parse_known_args,
-    (PARSER, "parse_intermixed_args"): _parse_args,
+    **options.METHODS,
     ("threading.Thread", "__init__"): _thread_init,
     ("multiprocessing.Process", "__init__"): _thread_init,
 }
@@ -367,7 +300,7 @@ def _field(run: Run, obj: Instance, name: str) -> Value:
 
 
 OPEN_ATTRIBUTES: dict[str, Callable[[Run, Instance, str], Value]] = {
-    NAMESPACE: _namespace_attribute,
+    options.NAMESPACE: options.namespace_attribute,
     "types.SimpleNamespace": _field,
 }
 

@@ -1,0 +1,118 @@
+"""``try``: handlers run after a certain exception, or where one may have been raised."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable
+from typing import Any
+
+from nodl.infer.interpreter.frames import Frame
+from nodl.infer.interpreter.raising import (
+    Raised,
+    Unwinding,
+    catches,
+    handled_value,
+)
+from nodl.infer.interpreter.run import Run
+from nodl.infer.values import (
+    ANY,
+    Value,
+)
+
+
+def run_try(run: Run, node: Any, frame: Frame) -> bool:
+    """Handlers run after a certain exception, or after any prefix of a body that may have raised one."""
+    mark = run.state.mark()
+    before = Unwinding(run, frame)
+    risks = run.risks
+    raised = None
+    run.state.depth += 1
+    run.tries += 1
+    run.try_forks = run.state.forks
+    tries = run.tries
+    try:
+        passes = run.execute(node.body, frame)
+    except Raised as found:
+        raised, passes = found, False
+    jump = frame.jump
+    before.restore(run, frame)
+    frame.jump = jump if raised is None else ""
+    run.tries = tries - 1
+    if passes and node.orelse:
+        passes = run.execute(node.orelse, frame)
+    try:
+        if raised is not None and run.risks - risks <= raised_risks(raised):
+            passes = _handled(run, node.handlers, raised, frame)
+        elif raised is not None or run.risks != risks:
+            passes = _perhaps_handled(run, node, passes, mark, frame)
+    except Raised:
+        if node.finalbody:
+            run.execute(node.finalbody, frame)
+        raise
+    if node.finalbody:
+        if not passes:
+            jump = frame.jump
+            run.state.join_seen(mark)
+            done = run.execute(node.finalbody, frame)
+            frame.jump = jump if done else frame.jump
+            return False
+        passes = run.execute(node.finalbody, frame)
+    return passes
+
+
+def raised_risks(raised: Raised) -> int:
+    """A certain exception is itself one risk."""
+    return 1
+
+
+def _handled(run: Run, handlers: list[ast.ExceptHandler], raised: Raised, frame: Frame) -> bool:
+    """The handler that certainly catches the exception, or the exception again."""
+    for handler in handlers:
+        outcome = catches(handled_value(run, handler, frame), raised)
+        if outcome is None:
+            break
+        if outcome:
+            return _run_handler(run, handler, raised.value, frame)
+    else:
+        raise raised
+    return run.state.branches([_handler_of(run, handler, raised.value, frame) for handler in handlers])
+
+
+def _handler_of(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> Callable[[], bool]:
+    return lambda: _run_handler(run, handler, value, frame)
+
+
+def _run_handler(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> bool:
+    if handler.name:
+        run.assign_name(handler.name, value, frame)
+    outer = frame.cells.get("[exception]")
+    run.assign_name("[exception]", value, frame)
+    passes = run.execute(handler.body, frame)
+    if outer is not None:
+        run.assign_name("[exception]", outer, frame)
+    return passes
+
+
+def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame) -> bool:
+    """Each handler may run: it sees every value written on the way through the body."""
+
+    def no_exception() -> bool:
+        return passes
+
+    def handler_of(handler: ast.ExceptHandler) -> Any:
+        def handle() -> bool:
+            run.state.join_seen(mark)
+            return _run_handler(run, handler, ANY, frame)
+
+        return handle
+
+    if not node.handlers:
+        return passes
+    jump = frame.jump
+    result = run.state.branches([no_exception, *(handler_of(handler) for handler in node.handlers)])
+    if not passes:
+        if jump:
+            frame.unsettled = True  # the jump of the body may happen, or a handler runs instead
+        else:
+            frame.early = True
+    return result

@@ -1,0 +1,89 @@
+"""argparse: options of the command line, with what they are by default."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nodl.infer.interpreter.frames import Call
+from nodl.infer.interpreter.run import Run
+from nodl.infer.models.library_objects import library_instance
+from nodl.infer.text import Input, make_text
+from nodl.infer.values import (
+    ANY,
+    BOTTOM,
+    NONE,
+    Instance,
+    Items,
+    Value,
+    constant_strings,
+    join,
+    sole,
+    unknown,
+)
+
+PARSER = "argparse.ArgumentParser"
+
+
+NAMESPACE = "argparse.Namespace"
+
+
+def made_parser(run: Run, call: Call) -> Value:
+    return (library_instance(run, call, PARSER),)
+
+
+def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
+    flags = [flag for value in call.args.positional for flag in constant_strings(value)]
+    if not flags:
+        return ANY
+    long = next((flag for flag in flags if flag.startswith("--")), flags[0])
+    dest = sole(call.args.keywords.get("dest", (long.lstrip("-").replace("-", "_"),)))
+    default = call.args.keywords.get("default", BOTTOM)
+    name = long if long.startswith("-") else f"<{long}>"
+    run.options.declare(name, tuple(atom for atom in default if atom is not None))
+    if isinstance(dest, str):
+        owner = parser.cells.get("parser", (parser,))[0]
+        assert isinstance(owner, Instance)
+        run.state.store(owner, "dest " + dest, (make_text((Input(name, run.options),)),))
+    return ANY
+
+
+def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
+    for dest, value in call.args.keywords.items():
+        cell = "dest " + dest
+        run.state.store(parser, cell, join(parser.cells.get(cell, BOTTOM), value))
+    return NONE
+
+
+def _argument_group(run: Run, parser: Instance, call: Call) -> Value:
+    return (parser,)
+
+
+def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
+    namespace = library_instance(run, call, NAMESPACE)
+    run.state.store(namespace, "parser", (parser,))
+    return (namespace,)
+
+
+def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
+    namespace = _parse_args(run, parser, call)
+    rest = run.sequence(call.node, "list", Items(None, unknown("command line arguments")))
+    return run.tuple_of((namespace, rest))
+
+
+def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
+    found: Value = BOTTOM
+    for parser in namespace.cells.get("parser", BOTTOM):
+        if isinstance(parser, Instance):
+            found = join(found, parser.cells.get("dest " + name, BOTTOM))
+    return found or unknown(f"the command line option {name}")
+
+
+METHODS: dict[tuple[str, str], Callable[[Run, Instance, Call], Value]] = {
+    (PARSER, "add_argument"): _add_argument,
+    (PARSER, "set_defaults"): _set_defaults,
+    (PARSER, "add_argument_group"): _argument_group,
+    (PARSER, "add_mutually_exclusive_group"): _argument_group,
+    (PARSER, "parse_args"): _parse_args,
+    (PARSER, "parse_known_args"): _parse_known_args,
+    (PARSER, "parse_intermixed_args"): _parse_args,
+}

@@ -1,0 +1,235 @@
+"""Built-in functions about attributes, classes and modules: ``getattr``, ``type``, ``vars``, imports by name."""
+
+from __future__ import annotations
+
+import ast
+
+from nodl.infer.interpreter import patterns
+from nodl.infer.interpreter.assign import store_attribute
+from nodl.infer.interpreter.define import complete_class, linearized
+from nodl.infer.interpreter.frames import Call
+from nodl.infer.interpreter.imports import import_module
+from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.raising import throw
+from nodl.infer.interpreter.run import Run
+from nodl.infer.methods import BoundMethod, PropertyValue, Variables
+from nodl.infer.text import Text
+from nodl.infer.values import (
+    ANY,
+    BOOLEAN,
+    BOTTOM,
+    NONE,
+    OF_A_NODE,
+    ClassValue,
+    Dictionary,
+    External,
+    FunctionValue,
+    HeapObject,
+    Instance,
+    ModuleValue,
+    Value,
+    constant_strings,
+    join,
+    present,
+    sole,
+    unknown,
+)
+
+
+def call_getattr(run: Run, call: Call) -> Value:
+    owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
+    there = has_attribute(run, sole(owner), sole(names))
+    if there is False:
+        default = call.args.at(2)
+        if default is not None:
+            return default
+        throw(run, AttributeError)
+    elif there:
+        return run.attribute(owner, str(sole(names)), call.node, call.frame)
+    found: Value = BOTTOM
+    for name in constant_strings(names):
+        found = join(found, run.attribute(owner, name, call.node, call.frame))
+    if len(constant_strings(names)) < len(names):
+        _any_method(run, owner, names)
+        is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
+        found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
+    default = call.args.at(2)
+    return join(found, default) if default is not None else found
+
+
+def _any_method(run: Run, owner: Value, names: Value) -> None:
+    """``getattr(self, 'on_' + x)``: any method whose name fits may be meant."""
+    prefixes = [text.pieces[0] if isinstance(text, Text) else "" for text in names]
+    for atom in owner:
+        if isinstance(atom, ModuleValue | ClassValue):
+            for name, value in list(atom.cells.items()):
+                if isinstance(name, str) and not name.startswith(("__", "[")):
+                    run.escape_value(value, opened=False)
+        if not (isinstance(atom, Instance) and isinstance(atom.cls, ClassValue)):
+            continue
+        for name, value in list(atom.cells.items()):
+            if isinstance(name, str):
+                run.escape_value(value, opened=False, objects=False)
+        for base in linearized(atom.cls):
+            for name, value in list(base.cells.items()) if isinstance(base, ClassValue) else ():
+                for prefix in prefixes:
+                    start = prefix if isinstance(prefix, str) else ""
+                    if isinstance(name, str) and name.startswith(start) and not name.startswith("__"):
+                        functions = [each for each in value if isinstance(each, FunctionValue)]
+                        bound = tuple(BoundMethod(function, atom) for function in functions)
+                        run.register_callback(bound, None)
+
+
+def call_setattr(run: Run, call: Call) -> Value:
+    owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
+    value = call.args.at(2) or ANY
+    known = constant_strings(names)
+    for name in known:
+        if len(names) > 1:
+            value = join(value, run.attribute(owner, name, call.node, call.frame))
+        store_attribute(run, owner, name, value, call.node, call.frame)
+    if len(known) < len(names):
+        run.escape_value(value)
+        for atom in owner:
+            if isinstance(atom, Instance):
+                for cell, old in list(atom.cells.items()):
+                    run.state.write(atom.cells, cell, join(old, value))
+            if isinstance(atom, ClassValue | ModuleValue | External):
+                run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
+    return NONE
+
+
+def call_hasattr(run: Run, call: Call) -> Value:
+    outcome = has_attribute(run, sole(call.args.at(0)), sole(call.args.at(1)))
+    return BOOLEAN if outcome is None else (outcome,)
+
+
+def has_attribute(run: Run, owner: object, name: object) -> bool | None:
+    """Whether the attribute is there. Once callbacks are registered, they may still set what is missing."""
+    if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
+        return None
+    held = owner.cells.get(name)
+    if held:
+        return True if present(held) is held and not owner.summary else None
+    if isinstance(owner, ModuleValue):
+        return None
+    cls = owner.cls if isinstance(owner, Instance) else owner
+    if not isinstance(cls, ClassValue):
+        return None
+    order = linearized(cls)
+    if any(isinstance(base, ClassValue) and base.cells.get(name) for base in order):
+        return True
+    plain = all(
+        isinstance(base, ClassValue)
+        and "__getattr__" not in base.cells
+        and "__getattribute__" not in base.cells
+        for base in order
+    )
+    known = (
+        plain and not run.callbacks and not run.repeated and not owner.summary and not name.startswith("__")
+    )
+    return False if known else None
+
+
+def call_isinstance(run: Run, call: Call) -> Value:
+    outcome = patterns.is_instance(call.args.at(0) or ANY, call.args.at(1) or ANY)
+    return BOOLEAN if outcome is None else (outcome,)
+
+
+def call_type(run: Run, call: Call) -> Value:
+    if len(call.args.positional) == 3:
+        return _made_class(run, call)
+    atom = sole(call.args.at(0))
+    if isinstance(atom, Instance):
+        return (atom.cls,)
+    return ANY
+
+
+def _made_class(run: Run, call: Call) -> Value:
+    """``type(name, bases, attributes)``."""
+    name, bases, space = (sole(value) for value in call.args.positional)
+    listed = elements(run, (bases,), call.node, call.frame).exact
+    if not isinstance(name, str) or listed is None or not isinstance(space, Dictionary) or space.is_open:
+        run.gap(call.node, call.frame, "a class is made at run time (type)")
+        run.escape(call.args)
+        return unknown("a class made at run time")
+    line, column = getattr(call.node, "lineno", 0), getattr(call.node, "col_offset", 0)
+    node = ast.ClassDef(name, [], [], [], [], lineno=line, col_offset=column, end_lineno=line)
+    key = call.frame.module
+    cls = run.allocate(call.node, "type", lambda: ClassValue(node, name, key, tuple(sole(b) for b in listed)))
+    assert isinstance(cls, ClassValue)
+    for entry, value, _ in space.entries():
+        run.state.store(cls, entry.constant, value)
+    complete_class(run, cls, dict(call.args.keywords), call.node, call.frame)
+    return (cls,)
+
+
+def dynamic_code(run: Run, call: Call) -> Value:
+    run.gap(call.node, call.frame, "code made at run time (eval, exec) is not analysed")
+    return unknown("the result of code made at run time")
+
+
+def import_dynamic(run: Run, call: Call) -> Value:
+    names = constant_strings(call.args.at(0) or ANY)
+    if not names:
+        run.gap(call.node, call.frame, "a module whose name is made at run time is not analysed")
+        return unknown("a module whose name is made at run time")
+    found: Value = BOTTOM
+    for name in names:
+        found = join(found, import_module(run, name, call.frame))
+    return found
+
+
+def call_vars(run: Run, call: Call) -> Value:
+    found = call.args.at(0)
+    if found is None:
+        return call_globals(run, call) if call.frame.function is None else unknown("the local variables")
+    if all(isinstance(atom, Instance | ClassValue | ModuleValue) for atom in found):
+        return tuple(Variables(atom) for atom in found if isinstance(atom, HeapObject))
+    return unknown("a dictionary of variables")
+
+
+def call_globals(run: Run, call: Call) -> Value:
+    return (Variables(call.frame.module),)
+
+
+def call_locals(run: Run, call: Call) -> Value:
+    if call.frame.function is None:
+        return call_globals(run, call)
+    for value in list(call.frame.cells.values()):
+        run.escape_value(value, opened=False, objects=False)
+    return unknown("the local variables")
+
+
+def object_new(run: Run, call: Call) -> Value:
+    """``object.__new__(cls)``: an object whose constructor has not run."""
+    made: list[object] = []
+    for atom in call.args.at(0) or ANY:
+        if isinstance(atom, ClassValue):
+            for base in linearized(atom):
+                if isinstance(base, ClassValue):
+                    run.instantiated.setdefault(base.node)
+            made.append(new_instance(run, atom, call))
+        else:
+            made.append(unknown("an object of a class that is not known")[0])
+    return tuple(made)
+
+
+def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
+    from nodl.infer.interpreter import instantiation
+
+    return instantiation.new_instance(run, cls, call)
+
+
+def nothing(run: Run, call: Call) -> Value:
+    return NONE
+
+
+def call_property(run: Run, call: Call) -> Value:
+    given = [call.args.at(index, name) for index, name in enumerate(("fget", "fset", "fdel"))]
+    getter, setter, deleter = (tuple(a for a in value or () if a is not None) for value in given)
+    return (PropertyValue(getter, setter, deleter),)
+
+
+def call_object(run: Run, call: Call) -> Value:
+    return ANY

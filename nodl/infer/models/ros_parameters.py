@@ -1,0 +1,167 @@
+"""Parameters of a node: declared, read and set by the program."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from nodl.infer.findings import NodeRecord
+from nodl.infer.interpreter.frames import Call
+from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.run import Run
+from nodl.infer.text import Input, make_text, with_edit
+from nodl.infer.values import (
+    ABSENT,
+    ANY,
+    BOTTOM,
+    OTHER,
+    OTHER_KEYS,
+    Dictionary,
+    External,
+    Instance,
+    Items,
+    Key,
+    Unknown,
+    Value,
+    constant_strings,
+    join,
+    present,
+    unknown,
+)
+
+PARAMETER_CLASS = "rclpy.parameter.Parameter"
+
+
+def parameter_object(run: Run, call: Call, value: Value, key: str = "parameter") -> Value:
+    instance = run.allocate(
+        call.node, key, lambda: Instance(External(PARAMETER_CLASS), (call.source.file, call.source.line))
+    )
+    run.state.store(instance, "value", value)
+    return (instance,)
+
+
+def _names_or_gap(run: Run, call: Call, position: int = 0) -> list[str]:
+    value = call.args.at(position, "name") or ANY
+    return constant_strings(value)
+
+
+def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
+    default = call.args.at(1, "value")
+    names = _names_or_gap(run, call)
+    for name in names:
+        record.declare(name, _default_value(default))
+    return parameter_object(run, call, _inputs(run, record, names))
+
+
+def _default_value(default: Value | None) -> Value:
+    """A declared default; a parameter type or ``None`` declares none."""
+    if default is None or all(atom is None or isinstance(atom, External) for atom in default):
+        return BOTTOM
+    return tuple(atom for atom in default if atom is not None)
+
+
+def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
+    """The values of parameters: what the program set them to, else what launch and the defaults say."""
+    if not names:
+        return unknown("a parameter whose name is not known")
+    result: Value = BOTTOM
+    for name in names:
+        held = record.cells.get(name, ABSENT)
+        result = join(result, present(held))
+        if ABSENT[0] in held:
+            result = join(result, (make_text((Input(name, record),)),))
+    return result
+
+
+def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
+    prefixes = constant_strings(call.args.at(0, "namespace") or ANY) or [""]
+    listed = call.args.at(1, "parameters") or ANY
+    found: Value = BOTTOM
+    for entry in _each(run, listed, call):
+        parts = elements(run, entry, call.node, call.frame)
+        if parts.exact is None or not parts.exact:
+            run.findings.gap(call.source, "the list of declared parameters is not known")
+            continue
+        default = parts.exact[1] if len(parts.exact) > 1 else None
+        for name in constant_strings(parts.exact[0]):
+            for prefix in prefixes:
+                full = f"{prefix}.{name}" if prefix else name
+                record.declare(full, _default_value(default))
+                found = join(found, parameter_object(run, call, _inputs(run, record, [full]), full))
+    return run.sequence(call.node, "list", Items(None, found or ANY))
+
+
+def _each(run: Run, value: Value, call: Call) -> list[Value]:
+    items = elements(run, value, call.node, call.frame)
+    return list(items.exact) if items.exact is not None else [items.any_element()]
+
+
+def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
+    return parameter_object(run, call, _inputs(run, record, _names_or_gap(run, call)))
+
+
+def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
+    names = _each(run, call.args.at(0, "names") or ANY, call)
+    found = tuple(
+        parameter_object(run, call, _inputs(run, record, constant_strings(name)), f"parameter {index}")
+        for index, name in enumerate(names)
+    )
+    return run.sequence(call.node, "list", Items(found))
+
+
+def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value:
+    """A dictionary of the parameters below a prefix, under the rest of their names."""
+    found = run.allocate(call.node, "by prefix", Dictionary)
+    assert isinstance(found, Dictionary)
+    for prefix in constant_strings(call.args.at(0, "prefix") or ANY):
+        start = f"{prefix}." if prefix else ""
+        everything = Input(f"{start}**", record)
+        value = parameter_object(run, call, (make_text((everything,)),), f"below {prefix}")
+        keys: Value = (with_edit(everything, "key", (start,)),)
+        run.state.store(found, OTHER, join(found.cells.get(OTHER, BOTTOM), value))
+        run.state.store(found, OTHER_KEYS, join(found.cells.get(OTHER_KEYS, BOTTOM), keys))
+        for name in record.parameters:
+            if name.startswith(start):
+                held = parameter_object(run, call, _inputs(run, record, [name]), name)
+                run.state.store(found, Key(name.removeprefix(start)), held)
+    return (found,) if OTHER in found.cells else unknown("parameters below a prefix that is not known")
+
+
+def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
+    names = _names_or_gap(run, call)
+    other = call.args.at(1, "alternative_value") or BOTTOM
+    default: Value = BOTTOM
+    for atom in other:
+        if isinstance(atom, Instance):
+            default = join(default, atom.cells.get("value", BOTTOM))
+    for name in names:
+        record.declare(name, _default_value(default or None))
+    return parameter_object(run, call, _inputs(run, record, names))
+
+
+def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
+    assign_parameters(run, record, call.args.at(0, "parameter_list") or ANY, call)
+    return ANY
+
+
+def assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) -> None:
+    for entry in _each(run, listed, call):
+        for atom in entry:
+            if isinstance(atom, Instance):
+                for name in constant_strings(atom.cells.get("name", BOTTOM)):
+                    value = atom.cells.get("value", ANY)
+                    record.assigned[name] = join(record.assigned.get(name, BOTTOM), value)
+                    run.state.write(record.cells, name, value)
+            elif isinstance(atom, Unknown):
+                run.findings.gap(call.source, f"parameters set in code are not known: {atom.why}")
+
+
+METHODS: dict[str, Callable[[Run, NodeRecord, Call], Value]] = {
+    "declare_parameter": _declare_parameter,
+    "declare_parameters": _declare_parameters,
+    "get_parameter": _get_parameter,
+    "get_parameters": _get_parameters,
+    "get_parameter_or": _get_parameter_or,
+    "get_parameters_by_prefix": _get_parameters_by_prefix,
+    "set_parameters": _set_parameters,
+    "set_parameters_atomically": _set_parameters,
+}
