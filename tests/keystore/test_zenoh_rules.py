@@ -126,7 +126,7 @@ def test_the_rules_of_a_subscription() -> None:
 def test_the_rules_of_a_client_and_of_a_server() -> None:
     client, server = rules(("request", "/add")), rules(("reply", "/add"))
     assert client["call"][1:] == ("ingress", ("query",), ("0/add/*/*",))
-    assert client["be answered"][1:] == ("egress", ("reply",), ("0/add/*/*",))
+    assert client["be answered"][1:] == ("egress", ("reply", "declare_queryable"), ("0/add/*/*",))
     assert server["serve"][1:] == ("ingress", ("declare_queryable", "reply"), ("0/add/*/*",))
     assert server["be called"][1:] == ("egress", ("query",), ("0/add/*/*",))
     assert not set(client) & {"serve", "be called"} and not set(server) & {"call", "be answered"}

@@ -122,9 +122,19 @@ def passes(sender: Any, key: str, heard: Heard) -> bool:
 
 
 def answers(client: Any, key: str) -> list[str]:
-    """What a call gives; ends as soon as the router knows of no (other) server."""
+    """What a query gives, sent whether or not a server is known; it ends as soon as the router knows of none."""
     replies = client.get(key, payload="request", target=zenoh.QueryTarget.ALL_COMPLETE, timeout=PATIENCE)
     return [reply.ok.payload.to_string() for reply in replies if reply.ok is not None]
+
+
+def client_of(session: Any, key: str) -> Any:
+    """As rmw_zenoh makes a client of a service."""
+    return session.declare_querier(key, target=zenoh.QueryTarget.ALL_COMPLETE, timeout=PATIENCE)
+
+
+def called(client: Any) -> list[str]:
+    """What a call of ``client_of`` gives; nothing is sent where its session knows of no server."""
+    return [reply.ok.payload.to_string() for reply in client.get(payload="request") if reply.ok is not None]
 
 
 def serving(session: Any, key: str, text: str) -> Any:

@@ -162,9 +162,10 @@ def losses(sessions: tuple[Any, Any]) -> set[Atom]:
 def services(sessions: tuple[Any, Any]) -> set[Atom]:
     giver, taker = sessions
     kept = [kit.serving(giver, topic("/service", domain), "answer") for domain in PLAIN]
+    clients = [kit.client_of(taker, topic("/service", domain)) for domain in PLAIN]
     settled(sessions)
-    assert wait_for(lambda: kit.answers(taker, topic("/service", 0)))
-    found = needed(PLAIN, lambda domain: kit.answers(taker, topic("/service", domain)))
+    assert wait_for(lambda: clients[0].matching_status.matching)
+    found = needed(PLAIN, lambda domain: kit.called(clients[domain]))
     del kept
     return found
 

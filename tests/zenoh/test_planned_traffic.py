@@ -40,9 +40,12 @@ def test_messages_of_a_topic_arrive(system: System, publisher: str, name: str, s
 @pytest.mark.parametrize(("client", "name", "server"), SERVICES)
 def test_calls_of_a_service_are_answered(system: System, client: str, name: str, server: str) -> None:
     key = topic(name, type_and_hash=kit.TRIGGER)
+    client_of_it = kit.client_of(system[client], key)
     server_of_it = serving(system[server], key, "answer")
-    assert wait_for(lambda: answers(system[client], key) == ["answer"])
+    assert wait_for(lambda: client_of_it.matching_status.matching)
+    assert kit.called(client_of_it) == ["answer"] and answers(system[client], key) == ["answer"]
     server_of_it.undeclare()
+    client_of_it.undeclare()
 
 
 def test_who_joins_late_gets_the_history_of_a_transient_local_topic(system: System) -> None:
