@@ -24,7 +24,7 @@ from launch.descriptions import Executable
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
-from enclave_launch.ros2.context import explained_of, session_of
+from enclave_launch.ros2.context import session_of
 
 ATTRIBUTE = "_enclave_launch_enclave"
 GRANT = "_enclave_launch_grant"
@@ -108,15 +108,9 @@ def _securing(prepare: Callable[..., None]) -> Callable[..., None]:
             from enclave_launch.ros2.observation import observe_executable
             from enclave_launch.security_environment import OVERRIDE
 
-            process, grant = getattr(action, GRANT, None) or (None, None)
-            if process is None or grant is None:
-                process = observe_executable(action, context)
-                grant = session.enter(process)
+            grant = getattr(action, GRANT, None) or session.enter(observe_executable(action, context))
             self.final_env.pop(OVERRIDE, None)  # rcl lets it win over --enclave
             self.final_env.update(grant.environment)
-            explained = explained_of(context)
-            if explained is not None:
-                explained.prepare(process, self)
 
     return wrapped
 

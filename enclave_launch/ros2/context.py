@@ -8,20 +8,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from enclave_launch.ros2.explained import ExplainedLaunch
     from enclave_launch.ros2.session import EnclaveSession
 
 KEY = "enclave_launch_session"
-EXPLAINED = "enclave_launch_explained"
 
 
 def session_of(context: Any) -> EnclaveSession | None:
     """None in a launch that is not secured by us."""
     session: EnclaveSession | None = context.get_locals_as_dict().get(KEY)
     return session
-
-
-def explained_of(context: Any) -> ExplainedLaunch | None:
-    """Who records the processes of this launch to explain refusals, if anybody does."""
-    explained: ExplainedLaunch | None = context.get_locals_as_dict().get(EXPLAINED)
-    return explained

@@ -28,5 +28,5 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
 
         process = observe_node(node_action, context, ros_specific_arguments)
         grant = session.enter(process, loads_components=loads_components(node_action))
-        setattr(node_action, attributes.GRANT, (process, grant))
+        setattr(node_action, attributes.GRANT, grant)
         return [[TextSubstitution(text=word)] for word in grant.arguments], ros_specific_arguments

@@ -1,7 +1,8 @@
 """The extension point ``ros2launch.option``: ``ros2 launch --secure --keystore DIR PACKAGE FILE``.
 
-The options are those of ``secure-launch`` and do the same. The launch file is resolved and provisioned before
-upstream's engine starts; then each process is held against that plan.
+The options are those of ``secure-launch`` and do the same. A secured launch is planned and run by our engine, which
+calls the user's code once for both; upstream's engine would have to call it again, with classes of its own. Without
+``--secure`` everything is upstream's.
 
 Beside ``ros2launch_security``, which also defines ``--secure``, ours wins: its options are replaced, its
 extension sees a launch that asked for no security and does nothing. The entry point's name sorts after its
@@ -19,7 +20,7 @@ from typing import Any
 
 from ros2launch.option import OptionExtension
 
-from enclave_launch.boundary.terminal import message, stdout_is_for_the_plan
+from enclave_launch.boundary.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import (
@@ -30,14 +31,13 @@ from enclave_launch.verb.options import (
     build_parser,
 )
 from enclave_launch.verb.secure_launch import only_looking, resolve_options, show_plan
-from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, PERMISSIVE_NOTICE, check_needs_secure
+from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, check_needs_secure
 
 SECURE = "secure_enclaves"
 
 
 class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without ROS
-    """Adds the options of ``secure-launch`` to ``ros2 launch`` and starts a session where ``--secure`` is
-    given."""
+    """Adds the options of ``secure-launch`` to ``ros2 launch`` and does what they ask for."""
 
     def add_arguments(self, parser: argparse.ArgumentParser, cli_name: str, *, argv: Any = None) -> None:
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
@@ -61,12 +61,13 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
             keystore = getattr(args, SECURE)
             if isinstance(keystore, str):
                 args.keystore = Path(keystore)
-            if only_looking(_with_our_defaults(args)):
-                raise SystemExit(_looked_at(_with_our_defaults(args)))
+            options = _with_our_defaults(args)
+            if only_looking(options):
+                raise SystemExit(_looked_at(options))
             if not keystore:
                 check_needs_secure(self._of_secured, vars(args).keys() & (FOR_SECURE | FOR_PLAN))
                 return (launch_description,)
-            return (_secured(launch_description, _with_our_defaults(args)),)
+            raise SystemExit(_launched(launch_description, options))
         except EnclaveLaunchError as error:
             raise RuntimeError(str(error)) from error
 
@@ -98,45 +99,33 @@ def _looked_at(args: argparse.Namespace) -> int:
     return show_plan(plan, args, keystore)
 
 
-def _secured(description: Any, args: argparse.Namespace) -> Any:
-    from enclave_launch.flow import provision, resolve
-    from enclave_launch.ros2.secured import check_installed, enclosed
-    from enclave_launch.ros2.session import EnclaveSession, PlannedDoor
-    from enclave_launch.runtime.gate import PlannedGate
-    from enclave_launch.secured import PlanProvider
-    from enclave_launch.verb.security import expiry_notices, repair_notices, security_options
+def _launched(description: Any, args: argparse.Namespace) -> int:
+    """As ``secure-launch --secure``: planned, signed and run by one engine. Gives the exit status."""
+    from enclave_launch.verb.secure_launch import start
+    from enclave_launch.verb.target import Target
 
     if args.keystore is None:
         raise UsageError(
             "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE; for one that nobody keeps, "
             'as ros2launch_security makes it: --keystore "$(mktemp -d)/ks"'
         )
-    check_installed()
-    path, arguments = target_of(args)
-    plan = resolve(path, arguments, options=resolve_options(args))
-    if args.strategy == "Permissive":
-        print(f"ros2 launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
-    launch = provision(plan, args.keystore, options=security_options(args))
-    _say(
-        *plan.warnings,
-        *repair_notices(launch),
-        *launch.report.warnings,
-        *launch.handshakes,
-        *expiry_notices(launch, args.warn_expiry),
-    )
-    gate = PlannedGate(
-        plan.evaluation.processes,
-        plan.evaluation.components,
-        PlanProvider(launch),
-        allow_late=args.allow_late,
-        say_late=_say,
-    )
-    explained = None
-    if not args.no_explain_denials:
-        from enclave_launch.ros2.explained import ExplainedLaunch
+    _check_nothing_was_added(description)
+    with safe_output():
+        return start(Target(*target_of(args)), args, os.path.abspath(args.keystore))
 
-        explained = ExplainedLaunch(plan)
-    return enclosed(description, EnclaveSession(PlannedDoor(gate)), launch, explained)
+
+def _check_nothing_was_added(description: Any) -> None:
+    """What another extension of ros2 launch put around the launch file stands in no plan."""
+    from launch.actions import IncludeLaunchDescription
+
+    added = [
+        type(each).__name__ for each in description.entities if type(each) is not IncludeLaunchDescription
+    ]
+    if added or len(description.entities) != 1:
+        raise UsageError(
+            f"another extension of ros2 launch added to this launch ({', '.join(added) or 'an include'}); a secured "
+            "launch holds what its file says: include it in the launch file, or launch without that extension's option"
+        )
 
 
 def _with_our_defaults(args: argparse.Namespace) -> argparse.Namespace:
@@ -158,8 +147,3 @@ def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...
             package_name=args.package_name, file_name=args.launch_file_name
         )
     return path, tuple(parse_launch_arguments(words))
-
-
-def _say(*texts: object) -> None:
-    for text in texts:
-        print(f"ros2 launch: warning: {message(text)}", file=sys.stderr)

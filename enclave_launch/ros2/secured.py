@@ -14,7 +14,7 @@ import atexit
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from launch import LaunchDescription
 from launch.actions import OpaqueFunction, SetEnvironmentVariable, UnsetEnvironmentVariable
@@ -27,14 +27,11 @@ from enclave_launch.plan import LaunchSource
 from enclave_launch.planner import Planner
 from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
-from enclave_launch.ros2.session import EnclaveSession, OpenDoor
+from enclave_launch.ros2.session import EnclaveSession
 from enclave_launch.ros_rules.distro import choose_release
 from enclave_launch.secured import ProvisionedLaunch, zenoh_router
 from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY, SecuritySettings
 from nodl.ament_index import search_prefixes
-
-if TYPE_CHECKING:
-    from enclave_launch.ros2.explained import ExplainedLaunch
 
 EXTENSION = "enclave_launch.ros2.node_action"
 
@@ -58,22 +55,18 @@ def secured(
     planner = Planner(LaunchSource("<program>"), finder, options.plan_options())
     nothing_yet = Evaluation((), (), distro=release.distro.value)
     launch = flow.provision(planner.plan(nothing_yet), keystore, options=security_options)
-    return enclosed(description, EnclaveSession(OpenDoor(launch)), launch)
+    return _enclosed(description, EnclaveSession(launch), launch)
 
 
-def enclosed(
-    description: LaunchDescription,
-    session: EnclaveSession,
-    launch: ProvisionedLaunch,
-    explained: ExplainedLaunch | None = None,
+def _enclosed(
+    description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch
 ) -> LaunchDescription:
-    """``description`` behind the actions that begin ``session`` and point every process at the keystore;
-    ``explained``: who explains refusals.
+    """``description`` behind the actions that begin ``session`` and point every process at the keystore.
 
     :raises RuntimeFailure: processes are on Zenoh, and no router answers or can be started.
     """
     if launch.zenoh is not None:
-        router = zenoh_router(launch, lambda text: print(f"ros2 launch: warning: {text}", file=sys.stderr))
+        router = zenoh_router(launch, lambda text: print(f"enclave-launch: warning: {text}", file=sys.stderr))
         router.__enter__()
         atexit.register(router.__exit__)  # after the last process
     actions: list[Any] = [
@@ -83,8 +76,6 @@ def enclosed(
     actions.append(UnsetEnvironmentVariable(OVERRIDE))
     actions.extend(UnsetEnvironmentVariable(name) for name in _read_secrets(launch))
     actions.append(OpaqueFunction(function=session.install))
-    if explained is not None:
-        actions.append(OpaqueFunction(function=explained.install))
     return LaunchDescription([*actions, *description.entities])
 
 

@@ -86,20 +86,21 @@ def _main(options: argparse.Namespace) -> int:
     if options.learn is not None:
         from enclave_launch.verb.learn import learn_launch
 
-        return learn_launch(target, options, lambda companion: _start(target, options, keystore, companion))
+        return learn_launch(target, options, lambda companion: start(target, options, keystore, companion))
     if options.audit:
         from enclave_launch.verb.audit import audit_launch
 
         return audit_launch(_resolve(target, options), options, _run_settings(options))
-    return _start(target, options, keystore)
+    return start(target, options, keystore)
 
 
-def _start(
+def start(
     target: Target,
     options: argparse.Namespace,
     keystore: str | None,
     companion: LaunchCompanion | None = None,
 ) -> int:
+    """Launch ``target``, secured where there is a ``keystore``, and stay until it is over. Gives the exit status."""
     if keystore is None:
         if options.watch:
             from enclave_launch.verb.watch import watch_plain_launch

@@ -56,14 +56,14 @@ class Workspace:
     def python(self, script: str, *arguments: str, prefixes: tuple[Path, ...] = ()) -> Any:
         return self._run(["-c", script, *arguments], prefixes)
 
-    def ros2_launch(self, *arguments: str, prefixes: tuple[Path, ...] = ()) -> Any:
-        return self._run([str(Path(__file__).with_name("ros2_launch.py")), *arguments], prefixes)
+    def ros2_launch(self, *arguments: str, prefixes: tuple[Path, ...] = (), stdin: str = "") -> Any:
+        return self._run([str(Path(__file__).with_name("ros2_launch.py")), *arguments], prefixes, stdin)
 
-    def _run(self, words: list[str], prefixes: tuple[Path, ...]) -> Any:
+    def _run(self, words: list[str], prefixes: tuple[Path, ...], stdin: str = "") -> Any:
         return subprocess.run(
             [sys.executable, *words],
             env=self.environment(*prefixes),
-            stdin=subprocess.DEVNULL,
+            input=stdin,
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
             text=True,

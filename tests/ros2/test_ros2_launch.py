@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -164,36 +165,101 @@ def test_a_node_without_manifest_starts_nothing(demo: Workspace) -> None:
     assert "process started" not in screen
 
 
+ONCE = """
+import os, random, socket
+from launch import Action, LaunchDescription, Substitution
+from launch.actions import ExecuteProcess, OpaqueFunction, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
+from launch.substitutions import Command, LaunchConfiguration
+from launch_ros.actions import Node
+
+HERE = os.path.dirname(os.path.abspath(__file__))
+os.makedirs(os.path.join(HERE, "by_the_module"))  # fails the second time
+WORD = input("which word? ")  # the second time there is nothing to read
+
+
+class Mine(Substitution):
+    def perform(self, context):
+        os.mkdir(os.path.join(HERE, "by_a_substitution"))
+        return "mine"
+
+
+class MyAction(Action):
+    def execute(self, context):
+        os.mkdir(os.path.join(HERE, "by_an_action"))
+
+
+def decide(context):
+    os.mkdir(os.path.join(HERE, "by_a_function"))
+    listener = socket.create_server(("127.0.0.1", 0))
+    context.launch_configurations["port"] = str(listener.getsockname()[1])
+    return [Node(package="demo", executable="talker", name=f"run{random.randrange(10**9)}", output="screen")]
+
+
+def generate_launch_description():
+    words = ["echo", "word", WORD, Mine(), Command(["mkdir -v ", os.path.join(HERE, "by_a_command")])]
+    first = ExecuteProcess(cmd=words, output="screen")
+    return LaunchDescription([
+        MyAction(),
+        OpaqueFunction(function=decide),
+        first,
+        RegisterEventHandler(OnProcessExit(target_action=first, on_exit=lambda event, context: [
+            ExecuteProcess(cmd=["echo", "after", LaunchConfiguration("port")], output="screen")])),
+    ])
+"""
+
+
+def test_the_code_of_a_launch_file_runs_once(demo: Workspace) -> None:
+    file = demo.add("once.launch.py", ONCE)
+    words = "-a", "--secure", "--keystore", str(demo.directory / "ks"), str(file)
+    ran = demo.ros2_launch(*words, stdin="hello\n")
+    assert ran.returncode == 0, ran.stdout
+    assert ran.stdout.count("which word?") == 1
+    assert "word hello mine mkdir: created directory" in ran.stdout
+    assert "enclave=/ files=6" in ran.stdout
+    assert re.search(r"after \d+", ran.stdout)
+
+
+def test_commands_and_random_names_of_an_xml_file_are_asked_once(demo: Workspace) -> None:
+    count = demo.directory / "count"
+    counter = demo.add("counted.sh", f"#!/bin/sh\necho x >> {count}\nprintf n%s $(wc -l < {count})\n")
+    counter.chmod(0o755)
+    file = demo.add(
+        "once.launch.xml",
+        f"""<launch>
+  <let name="n" value="$(command {counter})"/>
+  <node pkg="demo" exec="talker" name="$(var n)"/>
+  <node pkg="demo" exec="listener" name="$(anon ears)"/>
+</launch>""",
+    )
+    status, screen = launch(demo, "--secure", "--keystore", str(demo.directory / "ks"), str(file))
+    assert status == 0, screen
+    assert screen.count("enclave=/ files=6") == 2
+    assert count.read_text() == "x\n"
+
+
 LATE = """
-import os
 from launch import LaunchDescription
-from launch.actions import OpaqueFunction
+from launch.actions import ExecuteProcess, RegisterEventHandler
+from launch.event_handlers import OnProcessExit
 from launch_ros.actions import Node
 
 def generate_launch_description():
-    return LaunchDescription([OpaqueFunction(function=decide)])
-
-def decide(context):
-    # Another name each time it is asked: no plan can foresee it.
-    count = len(os.listdir(os.environ["SEEN"]))
-    open(os.path.join(os.environ["SEEN"], str(count)), "w").close()
-    return [Node(package="demo", executable="talker", name=f"run{count}")]
+    first = ExecuteProcess(cmd=["true"])
+    late = Node(package="demo", executable="talker", name="late", output="screen")
+    return LaunchDescription([first, RegisterEventHandler(OnProcessExit(
+        target_action=first, on_exit=lambda event, context: [late] if event.returncode == 0 else []))])
 """
 
 
 @pytest.mark.parametrize("allowed", [False, True])
-def test_a_node_that_the_plan_did_not_foresee(
-    allowed: bool, demo: Workspace, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    seen = demo.directory / "seen"
-    seen.mkdir()
-    monkeypatch.setenv("SEEN", str(seen))
+def test_a_node_that_the_plan_did_not_foresee(allowed: bool, demo: Workspace) -> None:
     file = demo.add("late.launch.py", LATE)
     options = ["--allow-late"] if allowed else []
     status, screen = launch(demo, "--secure", "--keystore", str(demo.directory / "ks"), *options, str(file))
-    assert ("refused: demo/talker" in screen) is not allowed
+    assert ("refused: demo/talker" in screen) is not allowed, screen
     assert ("was not foreseen: provisioned now" in screen) is allowed
-    assert ("process started" in screen) is allowed
+    assert ("enclave=/ files=6" in screen) is allowed
     assert (status == 0) is allowed
 
 
@@ -221,6 +287,39 @@ class SecurityNodeAction(NodeActionExtension):
         assert context.launch_configurations.get("__secure") is None
         return [], ros_specific_arguments
 '''
+
+
+ADDING = """
+from launch import LaunchDescription
+from launch.actions import LogInfo
+from ros2launch.option import OptionExtension
+
+
+class AddingOption(OptionExtension):
+    def add_arguments(self, parser, cli_name, *, argv=None):
+        pass
+
+    def prelaunch(self, launch_description, args):
+        return (LaunchDescription([LogInfo(msg="added"), *launch_description.entities]),)
+"""
+
+
+def test_what_another_extension_adds_is_refused_and_launched_without_secure(demo: Workspace) -> None:
+    (demo.site / "adding_option.py").write_text(ADDING)
+    install_metadata(demo.site, "adding", {"ros2launch.option": ["adding = adding_option:AddingOption"]})
+    status, screen = launch(demo, "demo", "demo.launch.xml")
+    assert status == 0 and "added" in screen
+    words = "--secure", "--keystore", str(demo.directory / "ks"), "demo", "demo.launch.xml"
+    status, screen = launch(demo, *words)
+    assert status != 0
+    assert "another extension of ros2 launch added to this launch (LogInfo)" in screen
+    assert "enclave=" not in screen and not (demo.directory / "ks").exists()
+
+
+def test_a_process_that_ends_badly_shows_in_the_exit_status(demo: Workspace) -> None:
+    file = demo.add("bad.launch.xml", "<launch><executable cmd='false'/></launch>")
+    status, _ = launch(demo, "--secure", "--keystore", str(demo.directory / "ks"), str(file))
+    assert status == 1
 
 
 def test_beside_ros2launch_security_ours_wins(demo: Workspace) -> None:
