@@ -22,8 +22,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
-from enclave_launch.drift.finding import Finding, Level
-from enclave_launch.drift.steady import Patience, Steady
+from enclave_launch.drift.finding import DriftFinding, Level
+from enclave_launch.drift.steady import SettlingTimes, Steady
 from enclave_launch.drift.text import finding_document, finding_text
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.run_events import ProcessStarted
@@ -48,7 +48,7 @@ class WatchOptions(NamedTuple):
     enclave_directory: Path | None = None
     accepted: tuple[str, ...] = ()
     report: Path | None = None
-    patience: Patience = Patience()
+    patience: SettlingTimes = SettlingTimes()
 
 
 class DriftWatch:
@@ -127,7 +127,7 @@ class DriftWatch:
         for each in change.over:
             self._tell("over", each)
 
-    def _tell(self, event: str, finding: Finding) -> None:
+    def _tell(self, event: str, finding: DriftFinding) -> None:
         self._say(f"drift{' is over' if event == 'over' else ''}: {finding_text(finding)}")
         if self._options.report is not None:
             row = {"time": f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}", "event": event}

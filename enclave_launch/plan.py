@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.admission import AdmissionOptions
-from enclave_launch.admission.handshakes import Member, Pair, mixed_pairs
+from enclave_launch.admission.handshakes import EnclaveProcess, Pair, mixed_pairs
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
 from enclave_launch.admission.middleware import ZENOH, middleware_of, vendor_of
 from enclave_launch.diagnostics import (
@@ -233,7 +233,7 @@ def enclave_domains(processes: Iterable[PlannedProcess]) -> dict[str, dict[int, 
 def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
     """Enclaves on Fast DDS with those on Cyclone DDS that could meet them."""
     return mixed_pairs(
-        Member(item.enclave.path, item.domain, vendor_of(item.middleware))
+        EnclaveProcess(item.enclave.path, item.domain, vendor_of(item.middleware))
         for item in processes
         if item.enclave
     )

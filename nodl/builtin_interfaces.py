@@ -20,7 +20,7 @@ from nodl.node_interface import ClientLibrary, EndpointKind
 DISTROS = ("foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical", "rolling")
 
 
-class Condition(Enum):
+class BuiltinCondition(Enum):
     """What must hold for a row; the value is the text for a reader."""
 
     ALWAYS = "every node"
@@ -40,7 +40,7 @@ class BuiltIn(NamedTuple):
     name: str
     type: str
     source: str
-    condition: Condition = Condition.ALWAYS
+    condition: BuiltinCondition = BuiltinCondition.ALWAYS
     library: ClientLibrary | None = None
     since: str = DISTROS[0]
 
@@ -59,11 +59,15 @@ _EVENT = "rcl_interfaces/msg/ParameterEvent"
 TABLE: tuple[BuiltIn, ...] = (
     BuiltIn(_P, "/rosout", "rcl_interfaces/msg/Log", "rcl logging_rosout.c"),
     BuiltIn(
-        _P, "/parameter_events", _EVENT, "rclcpp node_parameters.cpp, rclpy node.py", Condition.PARAMETERS
+        _P,
+        "/parameter_events",
+        _EVENT,
+        "rclcpp node_parameters.cpp, rclpy node.py",
+        BuiltinCondition.PARAMETERS,
     ),
     BuiltIn(_S, "/parameter_events", _EVENT, "rclcpp time_source.cpp", library=ClientLibrary.RCLCPP),
     *(
-        BuiltIn(_R, f"~/{name}", f"rcl_interfaces/srv/{type_name}", _PARAMETERS, Condition.PARAMETERS)
+        BuiltIn(_R, f"~/{name}", f"rcl_interfaces/srv/{type_name}", _PARAMETERS, BuiltinCondition.PARAMETERS)
         for name, type_name in (
             ("describe_parameters", "DescribeParameters"),
             ("get_parameter_types", "GetParameterTypes"),
@@ -78,7 +82,7 @@ TABLE: tuple[BuiltIn, ...] = (
         "~/get_type_description",
         "type_description_interfaces/srv/GetTypeDescription",
         "rcl node_type_description_service.c",
-        Condition.TYPE_DESCRIPTION,
+        BuiltinCondition.TYPE_DESCRIPTION,
         since="iron",
     ),
     BuiltIn(
@@ -86,10 +90,10 @@ TABLE: tuple[BuiltIn, ...] = (
         "/clock",
         "rosgraph_msgs/msg/Clock",
         "rclcpp time_source.cpp, rclpy time_source.py",
-        Condition.SIM_TIME,
+        BuiltinCondition.SIM_TIME,
     ),
     *(
-        BuiltIn(_R, f"~/{name}", f"lifecycle_msgs/srv/{type_name}", _LIFECYCLE, Condition.LIFECYCLE)
+        BuiltIn(_R, f"~/{name}", f"lifecycle_msgs/srv/{type_name}", _LIFECYCLE, BuiltinCondition.LIFECYCLE)
         for name, type_name in (
             ("change_state", "ChangeState"),
             ("get_state", "GetState"),
@@ -98,14 +102,16 @@ TABLE: tuple[BuiltIn, ...] = (
             ("get_transition_graph", "GetAvailableTransitions"),
         )
     ),
-    BuiltIn(_P, "~/transition_event", "lifecycle_msgs/msg/TransitionEvent", _LIFECYCLE, Condition.LIFECYCLE),
+    BuiltIn(
+        _P, "~/transition_event", "lifecycle_msgs/msg/TransitionEvent", _LIFECYCLE, BuiltinCondition.LIFECYCLE
+    ),
     *(
         BuiltIn(
             _R,
             f"~/_container/{name}",
             f"composition_interfaces/srv/{type_name}",
             _CONTAINER,
-            Condition.CONTAINER,
+            BuiltinCondition.CONTAINER,
         )
         for name, type_name in (
             ("load_node", "LoadNode"),
@@ -119,7 +125,7 @@ TABLE: tuple[BuiltIn, ...] = (
             f"~/{name}",
             f"rcl_interfaces/srv/{type_name}",
             "rclcpp node_logger_services.cpp, rclpy logging_service.py",
-            Condition.LOGGER_SERVICES,
+            BuiltinCondition.LOGGER_SERVICES,
             since="iron",
         )
         for name, type_name in (
@@ -127,13 +133,15 @@ TABLE: tuple[BuiltIn, ...] = (
             ("set_logger_levels", "SetLoggerLevels"),
         )
     ),
-    BuiltIn(_S, "/tf_static", "tf2_msgs/msg/TFMessage", "tf2_ros transform_listener", Condition.TF_LISTENER),
+    BuiltIn(
+        _S, "/tf_static", "tf2_msgs/msg/TFMessage", "tf2_ros transform_listener", BuiltinCondition.TF_LISTENER
+    ),
     BuiltIn(
         _R,
         "transform_listener_impl_*/get_type_description",
         "type_description_interfaces/srv/GetTypeDescription",
         "tf2_ros transform_listener.cpp: its helper node is named after an address, in the namespace of the process",
-        Condition.TF_LISTENER,
+        BuiltinCondition.TF_LISTENER,
         ClientLibrary.RCLCPP,
         since="iron",
     ),
@@ -143,7 +151,9 @@ TABLE: tuple[BuiltIn, ...] = (
 def built_in_interfaces(
     distro: str,
     library: ClientLibrary,
-    conditions: frozenset[Condition] = frozenset({Condition.ALWAYS, Condition.PARAMETERS}),
+    conditions: frozenset[BuiltinCondition] = frozenset(
+        {BuiltinCondition.ALWAYS, BuiltinCondition.PARAMETERS}
+    ),
 ) -> tuple[BuiltIn, ...]:
     """The rows that hold under ``conditions``. Raises ``ValueError`` for a distribution we do not know."""
     if distro not in DISTROS:

@@ -14,7 +14,7 @@ from enclave_launch.admission.middleware import Vendor
 from keystore.formats.guid_prefix import Half, guid_prefix
 
 
-class Member(NamedTuple):
+class EnclaveProcess(NamedTuple):
     """A process of an enclave: whose DDS it runs on, in which domain."""
 
     enclave: str
@@ -29,7 +29,7 @@ class Pair(NamedTuple):
     cyclone: str
 
 
-def mixed_pairs(members: Iterable[Member]) -> tuple[Pair, ...]:
+def mixed_pairs(members: Iterable[EnclaveProcess]) -> tuple[Pair, ...]:
     """Every pair of enclaves with a Fast and a Cyclone process in one domain, sorted."""
     everybody = tuple(members)
     pairs = {

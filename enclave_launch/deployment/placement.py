@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from enclave_launch.deployment.processes import DeployedProcess
 from enclave_launch.errors import UsageError
-from enclave_launch.review.information_flow import FlowGraph, Step
+from enclave_launch.review.information_flow import FlowGraph, FlowStep
 from keystore.errors import InvalidInputError
 from keystore.formats.hosts import Hosts, refuse_host_name
 
@@ -68,12 +68,12 @@ def _host_of(process: DeployedProcess, hosts: Hosts) -> str | None:
     return process.machine
 
 
-def flows_between_hosts(placement: Placement, graph: FlowGraph) -> Iterator[tuple[str, str, Step]]:
+def flows_between_hosts(placement: Placement, graph: FlowGraph) -> Iterator[tuple[str, str, FlowStep]]:
     """(host, other host, what flows), in the order of the hosts: what the network between them must carry."""
     homes = placement.homes()
     order = list(placement.hosts)
     found = [
-        (one, two, Step(source, target, hops))
+        (one, two, FlowStep(source, target, hops))
         for source, targets in graph.items()
         for target, hops in targets.items()
         for one in homes.get(source, ())

@@ -36,7 +36,7 @@ class Declared:
 
 
 @dataclass(slots=True)
-class Summary:
+class DeclaredArguments:
     """What a description declares by name, and the argument names of all includes in it.
 
     A ``None`` among the names: that include has a name which needs a context.
@@ -83,11 +83,11 @@ def _known(names: list[str | None]) -> list[str]:
     return [name for name in names if name is not None]
 
 
-def _summarize(description: LaunchDescription) -> Summary:
-    known: Summary | None = getattr(description, "argument_summary", None)
+def _summarize(description: LaunchDescription) -> DeclaredArguments:
+    known: DeclaredArguments | None = getattr(description, "argument_summary", None)
     if known is not None:
         return known
-    summary = Summary()
+    summary = DeclaredArguments()
     for entity, conditional in _walk(description.describe_sub_entities(), False):
         if isinstance(entity, DeclareLaunchArgument):
             conditional = conditional or entity.condition is not None
@@ -99,7 +99,7 @@ def _summarize(description: LaunchDescription) -> Summary:
     return summary
 
 
-def _add_include(summary: Summary, include: IncludeLaunchDescription) -> None:
+def _add_include(summary: DeclaredArguments, include: IncludeLaunchDescription) -> None:
     names = include.argument_names_without_context()
     given: list[str | None] = [None] if names is None else list(names)
     nested = current_host().loads.summary(include.launch_description_source, _summarize)

@@ -12,14 +12,14 @@ if TYPE_CHECKING:
     from enclave_launch.description.action import Action
     from enclave_launch.description.actions.arguments import DeclareLaunchArgument
     from enclave_launch.description.actions.includes import IncludeLaunchDescription
-    from enclave_launch.description.argument_scan import Summary
+    from enclave_launch.description.argument_scan import DeclaredArguments
     from enclave_launch.description.launch_context import LaunchContext
 
 
 class LaunchDescription(LaunchDescriptionEntity):
     """Visited, it gives its entities. ``deprecated_reason`` is warned about at each visit."""
 
-    argument_summary: Summary | None = None  # of a file whose arguments were collected before
+    argument_summary: DeclaredArguments | None = None  # of a file whose arguments were collected before
 
     def __init__(
         self,

@@ -16,7 +16,7 @@ from enclave_launch.description.upstream_paths import GATES, PATHS
 _OURS = "enclave_launch.description."
 
 
-class Row(NamedTuple):
+class UpstreamModule(NamedTuple):
     """One module of upstream's: where its names are, and which of them its package has as well."""
 
     module: str
@@ -94,12 +94,12 @@ def _unambiguous_names() -> dict[str, str]:
     return {name: min(modules) for name, modules in found.items() if len(modules) == 1}
 
 
-def _row(text: str) -> Row:
+def _row(text: str) -> UpstreamModule:
     module, _, names = text.partition(": ")
     shared, _, own = names.partition("|")
     if own.strip() == "*":
         own = " ".join(name for name in dir(import_module(_OURS + module)) if not name.startswith("_"))
-    return Row(module, tuple(shared.split()), tuple(own.split()))
+    return UpstreamModule(module, tuple(shared.split()), tuple(own.split()))
 
 
 def _modules_below(name: str) -> set[str]:

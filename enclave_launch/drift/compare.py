@@ -13,10 +13,10 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_launch.drift.expected import Expected, ExpectedNode
-from enclave_launch.drift.finding import Certainty, Finding, Kind, Level, finding
-from enclave_launch.review.document import Grant, Operation
+from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level, finding
+from enclave_launch.review.document import GrantedName, Operation
 from keystore.formats.permissions_patterns import covers
-from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, Interface
+from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
 from nodl.graph.quality import unmet
 from nodl.graph.seen import SeenEndpoint
 from nodl.graph.text import participant_text
@@ -53,7 +53,9 @@ class Circumstances(NamedTuple):
     forged: tuple[str, ...] = ()
 
 
-def compare(expected: Expected, graph: Graph, circumstances: Circumstances | None = None) -> list[Finding]:
+def compare(
+    expected: Expected, graph: Graph, circumstances: Circumstances | None = None
+) -> list[DriftFinding]:
     """Every difference, in the order of processes and names."""
     circumstances = circumstances or Circumstances()
     return list(_Comparison(expected, graph, circumstances).findings())
@@ -68,7 +70,7 @@ class _Comparison:
         self._forged = circumstances.forged
         self._processes = [each for each in graph.processes if not self._all_accepted(each)]
 
-    def findings(self) -> Iterator[Finding]:
+    def findings(self) -> Iterator[DriftFinding]:
         for text in self._forged:
             yield finding(Kind.FORGED_LIST, text.split()[1], text)
         for process in self._processes:
@@ -84,7 +86,7 @@ class _Comparison:
 
     # one participant
 
-    def _of_process(self, process: GraphProcess) -> Iterator[Finding]:
+    def _of_process(self, process: GraphProcess) -> Iterator[DriftFinding]:
         unproved = list(self._unproved(process)) if self._security else []
         yield from unproved
         if unproved:
@@ -102,7 +104,7 @@ class _Comparison:
         for node in process.nodes:
             yield from self._of_node(node, process, enclave)
 
-    def _unproved(self, process: GraphProcess) -> Iterator[Finding]:
+    def _unproved(self, process: GraphProcess) -> Iterator[DriftFinding]:
         assert self._security is not None
         seen = process.participant
         if not seen.claims_security:
@@ -131,7 +133,7 @@ class _Comparison:
         unnamed = bool(namespaces) and namespaces <= self._expected.unnamed
         return unnamed or (enclave in self._expected.opaque)
 
-    def _unplanned(self, process: GraphProcess, enclave: str) -> Finding:
+    def _unplanned(self, process: GraphProcess, enclave: str) -> DriftFinding:
         names = ", ".join(sorted(node.fqn for node in process.nodes))
         if not names:
             return self._nameless(process, enclave)
@@ -145,7 +147,7 @@ class _Comparison:
             kind, process, text, subject=names, enclave=enclave, remedy=f"stop it, {_OR_PLAN_IT}"
         )
 
-    def _nameless(self, process: GraphProcess, enclave: str) -> Finding:
+    def _nameless(self, process: GraphProcess, enclave: str) -> DriftFinding:
         """Without endpoints it can do nothing: an observer, or what is just starting."""
         topics = sorted({endpoint.topic for endpoint in process.endpoints})
         has = f"with {', '.join(topics[:5])}" if topics else "without endpoints"
@@ -155,7 +157,7 @@ class _Comparison:
             topics and process.participant.pid in self._strangers
         ):  # whatever name it will have, it is not ours
             return self._about(
-                Kind.UNPLANNED_PROCESS, process, text, enclave=enclave, certainty=Certainty.FACT
+                Kind.UNPLANNED_PROCESS, process, text, enclave=enclave, certainty=FindingCertainty.FACT
             )
         return self._about(Kind.UNPLANNED_PROCESS, process, text, level=level, enclave=enclave)
 
@@ -168,7 +170,7 @@ class _Comparison:
             found = next((each for each in patterns if covers(each.fqn, node.fqn)), None)
         return found
 
-    def _of_node(self, node: GraphNode, process: GraphProcess, enclave: str) -> Iterator[Finding]:
+    def _of_node(self, node: GraphNode, process: GraphProcess, enclave: str) -> Iterator[DriftFinding]:
         planned = self._planned(node)
         if planned is None:
             if (
@@ -200,7 +202,9 @@ class _Comparison:
         ]
         return bool(node.interfaces) and all(_granted(_grant(each), granted) for each in node.interfaces)
 
-    def _beyond(self, node: GraphNode, planned: ExpectedNode, process: GraphProcess) -> Iterator[Finding]:
+    def _beyond(
+        self, node: GraphNode, planned: ExpectedNode, process: GraphProcess
+    ) -> Iterator[DriftFinding]:
         grants = [each.grant for each in planned.interfaces]
         types = {each.grant: each.type for each in planned.interfaces if each.type}
         for interface in node.interfaces:
@@ -221,7 +225,9 @@ class _Comparison:
                 text = f"{node.fqn}: {grant} has the type {interface.type}, planned is {types[grant]}"
                 yield self._about(Kind.TYPE_DIFFERS, process, text, subject=node.fqn, name=interface.name)
 
-    def _absent(self, node: GraphNode, planned: ExpectedNode, process: GraphProcess) -> Iterator[Finding]:
+    def _absent(
+        self, node: GraphNode, planned: ExpectedNode, process: GraphProcess
+    ) -> Iterator[DriftFinding]:
         if any(each.by is not Attribution.LIST for each in node.interfaces) and len(process.nodes) > 1:
             return  # what is whose is not known
         there = {_grant(each) for each in node.interfaces if each.complete}
@@ -239,7 +245,7 @@ class _Comparison:
 
     # all together
 
-    def _counts(self) -> Iterator[Finding]:
+    def _counts(self) -> Iterator[DriftFinding]:
         if self._security is not None and not self._security.authenticated:
             return  # nobody's nodes are seen
         running = Counter(node.fqn for process in self._processes for node in process.nodes)
@@ -257,7 +263,7 @@ class _Comparison:
                 )
                 yield finding(Kind.REPEATED_NODE, fqn, text, enclave=planned.enclave, who=where)
 
-    def _meeting(self) -> Iterator[Finding]:
+    def _meeting(self) -> Iterator[DriftFinding]:
         by_topic: dict[str, tuple[list[_End], list[_End]]] = {}
         for end in self._ends():
             by_topic.setdefault(end.endpoint.topic, ([], []))[end.endpoint.writes].append(end)
@@ -289,8 +295,8 @@ class _Comparison:
         level: Level = Level.ALARM,
         enclave: str = "",
         remedy: str = "",
-        certainty: Certainty | None = None,
-    ) -> Finding:
+        certainty: FindingCertainty | None = None,
+    ) -> DriftFinding:
         who = participant_text(process)
         return finding(
             kind,
@@ -311,7 +317,7 @@ class _End(NamedTuple):
     endpoint: SeenEndpoint
 
 
-def _between(topic: str, writer: _End, reader: _End) -> Iterator[Finding]:
+def _between(topic: str, writer: _End, reader: _End) -> Iterator[DriftFinding]:
     """Why data does not go from one to the other, though both are on one topic."""
     types = ros_type(writer.endpoint.type), ros_type(reader.endpoint.type)
     subject = f"{writer.owner} -> {reader.owner}"
@@ -325,11 +331,11 @@ def _between(topic: str, writer: _End, reader: _End) -> Iterator[Finding]:
         yield finding(Kind.QOS_DOES_NOT_MEET, subject, text, name=topic, who=who)
 
 
-def _grant(interface: Interface) -> Grant:
-    return Grant(OPERATIONS[interface.kind], interface.name)
+def _grant(interface: SeenInterface) -> GrantedName:
+    return GrantedName(OPERATIONS[interface.kind], interface.name)
 
 
-def _granted(grant: Grant, grants: Iterable[Grant]) -> bool:
+def _granted(grant: GrantedName, grants: Iterable[GrantedName]) -> bool:
     return any(
         each.operation == grant.operation and (each.name == grant.name or _covers(each.name, grant.name))
         for each in grants

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from enclave_launch.review.document import Grant
+from enclave_launch.review.document import GrantedName
 
 _UNSPECIFIED = "<node_name_unspecified>"
 _NO_NAMESPACE = "<node_namespace_unspecified>"
@@ -18,7 +18,7 @@ _LIFECYCLE = "/change_state"
 class ExpectedInterface(NamedTuple):
     """``certain``: a node that runs has it."""
 
-    grant: Grant
+    grant: GrantedName
     type: str
     certain: bool
 
@@ -120,4 +120,4 @@ def _described(
 def _interface(fields: Mapping[str, Any], stated: bool) -> ExpectedInterface:
     wildcard = any(character in fields["name"] for character in "*?[")
     certain = stated and not fields["built_in"] and not fields["note"] and not wildcard
-    return ExpectedInterface(Grant(fields["operation"], fields["name"]), fields["type"], certain)
+    return ExpectedInterface(GrantedName(fields["operation"], fields["name"]), fields["type"], certain)

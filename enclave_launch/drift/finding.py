@@ -39,7 +39,7 @@ class Level(str, Enum):
         return self.value
 
 
-class Certainty(Enum):
+class FindingCertainty(Enum):
     """When a finding may be told: discovery comes in pieces."""
 
     FACT = "what was announced says so"
@@ -47,7 +47,7 @@ class Certainty(Enum):
     ABSENCE = "unless it comes later"
 
 
-class Finding(NamedTuple):
+class DriftFinding(NamedTuple):
     """``subject``: the node or participant it is about, ``name`` the topic, service or action; ``who``: where it was
     seen, for a person (a pid, a host). Two findings with one ``key`` are the same at two moments."""
 
@@ -55,7 +55,7 @@ class Finding(NamedTuple):
     subject: str
     name: str
     text: str
-    certainty: Certainty = Certainty.FACT
+    certainty: FindingCertainty = FindingCertainty.FACT
     level: Level = Level.ALARM
     enclave: str = ""
     who: str = ""
@@ -67,11 +67,11 @@ class Finding(NamedTuple):
 
 
 _CERTAINTY = {
-    Kind.UNPLANNED_PROCESS: Certainty.WHEN_SETTLED,
-    Kind.NOT_AUTHENTICATED: Certainty.WHEN_SETTLED,
-    Kind.REPEATED_NODE: Certainty.WHEN_SETTLED,
-    Kind.MISSING_NODE: Certainty.ABSENCE,
-    Kind.MISSING_ENDPOINT: Certainty.ABSENCE,
+    Kind.UNPLANNED_PROCESS: FindingCertainty.WHEN_SETTLED,
+    Kind.NOT_AUTHENTICATED: FindingCertainty.WHEN_SETTLED,
+    Kind.REPEATED_NODE: FindingCertainty.WHEN_SETTLED,
+    Kind.MISSING_NODE: FindingCertainty.ABSENCE,
+    Kind.MISSING_ENDPOINT: FindingCertainty.ABSENCE,
 }
 """Of the kinds that discovery could still take back: nodes are named after participants, and who was killed is there
 until its lease ends (10 s on Cyclone DDS, 20 s on Fast DDS), so that a respawned process overlaps with it."""
@@ -87,8 +87,8 @@ def finding(
     enclave: str = "",
     who: str = "",
     remedy: str = "",
-    certainty: Certainty | None = None,
-) -> Finding:
+    certainty: FindingCertainty | None = None,
+) -> DriftFinding:
     """With the certainty that its kind has, where none is given."""
-    certainty = certainty or _CERTAINTY.get(kind, Certainty.FACT)
-    return Finding(kind, subject, name, text, certainty, level, enclave, who, remedy)
+    certainty = certainty or _CERTAINTY.get(kind, FindingCertainty.FACT)
+    return DriftFinding(kind, subject, name, text, certainty, level, enclave, who, remedy)

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from enclave_launch.drift.finding import Finding, Level
+from enclave_launch.drift.finding import DriftFinding, Level
 from nodl.graph.model import Graph
 
 VERSION = 1
 
 
-def finding_text(finding: Finding) -> str:
+def finding_text(finding: DriftFinding) -> str:
     """One line."""
     who = f" ({finding.who})" if finding.who and finding.who != finding.subject else ""
     subject = f"{finding.subject}: " if finding.subject == finding.who else ""
@@ -19,7 +19,7 @@ def finding_text(finding: Finding) -> str:
     return f"{finding.level}: {finding.kind}: {subject}{finding.text}{who}{remedy}"
 
 
-def drift_text(findings: Sequence[Finding], graph: Graph) -> str:
+def drift_text(findings: Sequence[DriftFinding], graph: Graph) -> str:
     """A report: what is different, alarms first, and what was looked at."""
     ordered = sorted(findings, key=lambda each: (each.level is Level.NOTE, each.kind.value, each.subject))
     seen = f"{len(graph.processes)} participants, {sum(1 for _ in graph.nodes)} nodes"
@@ -28,7 +28,7 @@ def drift_text(findings: Sequence[Finding], graph: Graph) -> str:
     return "\n".join([*map(finding_text, ordered), f"{summary}; seen: {seen}"]) + "\n"
 
 
-def drift_document(findings: Iterable[Finding], graph: Graph) -> dict[str, Any]:
+def drift_document(findings: Iterable[DriftFinding], graph: Graph) -> dict[str, Any]:
     """``drift`` is what the exit status says: whether there is an alarm."""
     rows = [finding_document(each) for each in findings]
     return {
@@ -40,7 +40,7 @@ def drift_document(findings: Iterable[Finding], graph: Graph) -> dict[str, Any]:
     }
 
 
-def finding_document(finding: Finding) -> dict[str, Any]:
+def finding_document(finding: DriftFinding) -> dict[str, Any]:
     """As plain values."""
     fields = finding._asdict()
     del fields["certainty"]

@@ -23,12 +23,12 @@ from typing import NamedTuple, TypeAlias
 
 MAX_NESTING = 128  # where upstream ends in a RecursionError, too
 
-TemplatePart: TypeAlias = "str | Call"
+TemplatePart: TypeAlias = "str | SubstitutionCall"
 Template: TypeAlias = tuple[TemplatePart, ...]
 
 
 @dataclass(frozen=True, slots=True)
-class Call:
+class SubstitutionCall:
     """``$(name arg ...)``. ``rule``: upstream's grammar rule, which tells the quotes it stands in."""
 
     name: str
@@ -99,7 +99,7 @@ def parse_template(text: str) -> Template:
 def called_names(template: Template) -> Iterator[str]:
     """Names of all calls, arguments included."""
     for part in template:
-        if isinstance(part, Call):
+        if isinstance(part, SubstitutionCall):
             yield part.name
             for argument in part.args:
                 yield from called_names(argument)
@@ -170,7 +170,7 @@ class _Scanner:
                 break
         return tuple(parts)
 
-    def call(self, context: _Context) -> Call:
+    def call(self, context: _Context) -> SubstitutionCall:
         if self.depth == MAX_NESTING:
             raise TemplateSyntaxError(
                 f"substitutions are nested more than {MAX_NESTING} deep in '{self.text[:80]}...'", self.text
@@ -178,7 +178,7 @@ class _Scanner:
         plain = _PLAIN_CALL.match(self.text, self.position)
         if plain is not None:
             self.position = plain.end()
-            return Call(plain[1], tuple((arg,) for arg in plain[2].split(" ")[1:]), context.rule)
+            return SubstitutionCall(plain[1], tuple((arg,) for arg in plain[2].split(" ")[1:]), context.rule)
         self.position += 2
         self.depth += 1
         name = _NAME.match(self.text, self.position)
@@ -193,7 +193,7 @@ class _Scanner:
             raise self.unexpected("one space and an argument, or ')'")
         self.position += 1
         self.depth -= 1
-        return Call(name.group(), tuple(args), context.rule)
+        return SubstitutionCall(name.group(), tuple(args), context.rule)
 
     def argument(self, context: _Context) -> Template:
         quoted = _QUOTED.get(self.peek()) if context.may_quote else None
@@ -222,13 +222,13 @@ class _Scanner:
 
 
 def _print_part(part: TemplatePart, context: _Context) -> str:
-    if isinstance(part, Call):
+    if isinstance(part, SubstitutionCall):
         return _print_call(part, context)
     escaped = part.replace("\\", "\\\\").replace("$(", "\\$(")
     return escaped.replace(context.quote, "\\" + context.quote) if context.quote else escaped
 
 
-def _print_call(call: Call, context: _Context) -> str:
+def _print_call(call: SubstitutionCall, context: _Context) -> str:
     return "$(" + " ".join([call.name, *(_print_argument(arg, context) for arg in call.args)]) + ")"
 
 
@@ -240,7 +240,7 @@ def _print_argument(argument: Template, context: _Context) -> str:
     special = "\\()" + (context.quote or "\"'")
     return "".join(
         _print_call(part, context)
-        if isinstance(part, Call)
+        if isinstance(part, SubstitutionCall)
         else "".join("\\" + character if character in special else character for character in part)
         for part in argument
     )

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from enclave_launch.host.environment import environment_snapshot
 
 if TYPE_CHECKING:
-    from enclave_launch.description.argument_scan import Summary
+    from enclave_launch.description.argument_scan import DeclaredArguments
     from enclave_launch.description.launch_description import LaunchDescription
     from enclave_launch.description.sources import LaunchDescriptionSource
 
@@ -29,13 +29,13 @@ class LoadCache:
 
     def __init__(self) -> None:
         self._seen: dict[str, str] | None = None
-        self._summaries: dict[Key, Summary | None] = {}
+        self._summaries: dict[Key, DeclaredArguments | None] = {}
         self._unvisited: dict[Key, LaunchDescription] = {}
         self._in_progress: list[Key] = []
 
     def summary(
-        self, source: LaunchDescriptionSource, summarize: Callable[[LaunchDescription], Summary]
-    ) -> Summary | None:
+        self, source: LaunchDescriptionSource, summarize: Callable[[LaunchDescription], DeclaredArguments]
+    ) -> DeclaredArguments | None:
         """What ``source`` declares; ``None`` when it cannot be loaded without a context.
 
         Raises ``CyclicIncludeError`` where upstream runs out of stack.
@@ -51,8 +51,11 @@ class LoadCache:
         return self._summaries[key]
 
     def _summarize(
-        self, key: Key, source: LaunchDescriptionSource, summarize: Callable[[LaunchDescription], Summary]
-    ) -> Summary | None:
+        self,
+        key: Key,
+        source: LaunchDescriptionSource,
+        summarize: Callable[[LaunchDescription], DeclaredArguments],
+    ) -> DeclaredArguments | None:
         if key in self._in_progress:
             cycle = [location for _, location in [*self._in_progress[self._in_progress.index(key) :], key]]
             raise CyclicIncludeError("launch files include each other without end: " + " -> ".join(cycle))

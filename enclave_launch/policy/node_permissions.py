@@ -24,7 +24,7 @@ from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
-from nodl.builtin_interfaces import Condition, built_in_interfaces
+from nodl.builtin_interfaces import BuiltinCondition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import MAX_NAME_LENGTH, InvalidNameError, join, validate_namespace, validate_node_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind
@@ -291,7 +291,7 @@ class _Collector:
 
 @lru_cache(maxsize=256)
 def _built_in_rows(
-    distro: str, library: ClientLibrary, conditions: frozenset[Condition]
+    distro: str, library: ClientLibrary, conditions: frozenset[BuiltinCondition]
 ) -> tuple[tuple[Operation, str, str], ...]:
     """Operation, name as the client library writes it, and the row for a reader."""
     rows = built_in_interfaces(distro, library, conditions)

@@ -11,12 +11,12 @@ from typing import NamedTuple
 
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
-from enclave_launch.recording.grants import WORDS, Grants, Need
+from enclave_launch.recording.grants import WORDS, Need, PlannedGrants
 from enclave_launch.recording.recording import Recording, Unrecorded
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import RunEvent
 from keystore.formats.policy import Operation, Rule
-from nodl.record.asked import Role, asked_endpoint, role_of
+from nodl.record.asked import EndpointRole, asked_endpoint, role_of
 from nodl.record.lines import EndpointMade, Line
 
 
@@ -57,7 +57,7 @@ class Audit:
     """Follows one recording."""
 
     def __init__(self, plan: LaunchPlan) -> None:
-        self._grants = Grants(plan)
+        self._grants = PlannedGrants(plan)
         self._launch: LaunchControl | None = None
         self._recording: Recording | None = None
         self._asked: set[Need] = set()
@@ -119,7 +119,7 @@ class Audit:
 
 def _by(who: str, line: EndpointMade) -> str:
     role = role_of(line)
-    return who if role is Role.OWN else f"the library ({role.value}); the node: {who}"
+    return who if role is EndpointRole.OWN else f"the library ({role.value}); the node: {who}"
 
 
 def _used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bool:

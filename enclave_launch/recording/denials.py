@@ -16,12 +16,12 @@ from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
-from enclave_launch.recording.grants import WORDS, Description, Grants, Need
+from enclave_launch.recording.grants import WORDS, Description, Need, PlannedGrants
 from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
-from nodl.record.asked import REFUSED, Asked, Role, asked_endpoint, role_of
+from nodl.record.asked import REFUSED, Asked, EndpointRole, asked_endpoint, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade
 
@@ -97,7 +97,7 @@ class Explainer:
     def __init__(self, plan: LaunchPlan) -> None:
         self.denials: list[Denial] = []
         self.not_joined: list[NotJoined] = []
-        self._grants = Grants(plan)
+        self._grants = PlannedGrants(plan)
         self._on_zenoh = {item.process.process_name for item in plan.processes if item.middleware == ZENOH}
         self._launch: LaunchControl | None = None
         self._recording: Recording | None = None
@@ -150,7 +150,7 @@ class Explainer:
                 self._launch.say("WARNING", text)
 
     def _endpoint(self, line: EndpointMade, process: RecordedProcess, node: RecordedNode) -> None:
-        if role_of(line) is Role.PART_OF_ACTION:
+        if role_of(line) is EndpointRole.PART_OF_ACTION:
             return  # the action's own line follows
         asked = asked_endpoint(process, node, line)
         need = self._grants.need(process, node, asked) if asked is not None else None
@@ -166,7 +166,7 @@ class Explainer:
         """A Zenoh router refuses without a word to the node: what was made and is not granted is told here."""
         assert self._recording is not None
         process, node = self._recording.record.node_of(line)
-        if _name(process) not in self._on_zenoh or role_of(line) is Role.PART_OF_ACTION:
+        if _name(process) not in self._on_zenoh or role_of(line) is EndpointRole.PART_OF_ACTION:
             return
         asked = asked_endpoint(process, node, line)
         need = self._grants.need(process, node, asked) if asked is not None else None

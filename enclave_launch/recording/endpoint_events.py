@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from enclave_launch.runtime.companion import LaunchControl
-from enclave_launch.runtime.run_events import Endpoint, EndpointCreated, EndpointRefused, RunEvent
+from enclave_launch.runtime.run_events import AskedEndpoint, EndpointCreated, EndpointRefused, RunEvent
 from nodl.record.asked import Asked, asked_endpoint
 from nodl.record.assembly import RecordedNode
 from nodl.record.lines import EndpointMade, Line
@@ -47,8 +47,8 @@ class EndpointEvents:
     def closed(self) -> None: ...
 
 
-def _endpoint(asked: Asked, node: RecordedNode, line: EndpointMade) -> Endpoint:
+def _endpoint(asked: Asked, node: RecordedNode, line: EndpointMade) -> AskedEndpoint:
     component = f"{node.component.package}/{node.component.plugin}" if node.component else ""
-    return Endpoint(
+    return AskedEndpoint(
         node.fqn or line.fqn, asked.kind, asked.final or asked.written, asked.written, asked.type, component
     )

@@ -64,7 +64,7 @@ class Description(NamedTuple):
         return f"{origin}{self.node.interface.source}"
 
 
-class Grants:
+class PlannedGrants:
     """Answers for one plan."""
 
     def __init__(self, plan: LaunchPlan) -> None:

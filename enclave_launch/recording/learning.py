@@ -25,7 +25,7 @@ from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import RunEvent
 from nodl.record.assembly import Record, read_record
 from nodl.record.learning import Learnt, LearntNode, learn
-from nodl.record.lines import EndpointMade, Line, NodeMade, Run, StateEntered
+from nodl.record.lines import EndpointMade, Line, NodeMade, RecordedRun, StateEntered
 from nodl.record.manifest import manifest_file_name, manifest_text
 
 RECORDS = "records"
@@ -100,11 +100,11 @@ class LearntFolder(NamedTuple):
     notes: tuple[str, ...]
 
 
-def new_run(launch_file: str, distro: str, isolation: str, *, secured: bool = False) -> Run:
+def new_run(launch_file: str, distro: str, isolation: str, *, secured: bool = False) -> RecordedRun:
     """Named by the time, so that runs sort in the order in which they were made."""
     now = datetime.now(timezone.utc)
     identifier = f"{now:%Y%m%dT%H%M%S}-{os.getpid():x}{int(now.microsecond / 1000):03x}"
-    return Run(identifier, launch_file, distro, isolation, now.isoformat(timespec="seconds"), secured)
+    return RecordedRun(identifier, launch_file, distro, isolation, now.isoformat(timespec="seconds"), secured)
 
 
 def prepare_folder(folder: Path) -> None:
@@ -118,7 +118,7 @@ def prepare_folder(folder: Path) -> None:
         raise ManifestError(f"{records}: cannot be written: {error.strerror}; nothing was started") from error
 
 
-def keep_record(folder: Path, run: Run, data: bytes) -> Path:
+def keep_record(folder: Path, run: RecordedRun, data: bytes) -> Path:
     """The record of ``run`` in the folder. Raises ``ManifestError`` where it cannot be written."""
     path = folder / RECORDS / f"{run.id}.record"
     _write(path, data)

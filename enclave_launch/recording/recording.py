@@ -30,7 +30,15 @@ from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec
 from enclave_launch.runtime.run_events import LaunchOver, ProcessExited, ProcessStarted, RunEvent
 from nodl.record.assembly import Record
-from nodl.record.lines import Complaint, Line, LineReader, LoadedComponent, Run, StartedProcess, line_text
+from nodl.record.lines import (
+    Complaint,
+    Line,
+    LineReader,
+    LoadedComponent,
+    RecordedRun,
+    StartedProcess,
+    line_text,
+)
 
 INTERVAL = 0.1
 """Seconds between two looks at the record."""
@@ -67,7 +75,7 @@ class Recording:
 
     def __init__(
         self,
-        run: Run,
+        run: RecordedRun,
         listeners: Sequence[Listener] = (),
         markers: MarkerRun | None = None,
         *,
@@ -210,7 +218,7 @@ class Recording:
                 f"the recorder does not work here: {said}; set TMPDIR to a folder from which programs may be run"
             )
 
-    def _write(self, line: Run | StartedProcess | LoadedComponent) -> None:
+    def _write(self, line: RecordedRun | StartedProcess | LoadedComponent) -> None:
         """What cannot be written must not disturb the launch; it is told once."""
         if self._folder is None:
             return
@@ -239,7 +247,7 @@ class Recording:
         self.data += new
         now = time.monotonic()
         for line in self._reader.feed(new):
-            if not isinstance(line, Run):
+            if not isinstance(line, RecordedRun):
                 self.record.add(line)
                 self._untold.append((now, line))
         self._tell(now)
@@ -256,7 +264,7 @@ class Recording:
                 self._untold.append((since, line))
 
     def _has_origin(self, line: Line) -> bool:
-        if isinstance(line, Run | StartedProcess | LoadedComponent):
+        if isinstance(line, RecordedRun | StartedProcess | LoadedComponent):
             return True
         process = self.record.process_of(line.pid)
         return process is not None and process.started is not None

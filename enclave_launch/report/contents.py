@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from enclave_launch.report.graph import Graph, Use, plan_graph, short_path
+from enclave_launch.report.graph import ChannelUse, EnclaveGraph, plan_graph, short_path
 from enclave_launch.report.review_text import Judged
 from enclave_launch.review.checks.keystore import Ending
 from enclave_launch.review.document import PlanDocument, Told, plan_from_document
-from enclave_launch.review.information_flow import Step, flow_graph, opened_by_sharing, reached_from
+from enclave_launch.review.information_flow import FlowStep, flow_graph, opened_by_sharing, reached_from
 
 
 class Count(NamedTuple):
@@ -25,7 +25,7 @@ class Influence(NamedTuple):
     """Direct ways out of an enclave, and how many enclaves it reaches over any number of hops."""
 
     enclave: str
-    steps: tuple[Step, ...]
+    steps: tuple[FlowStep, ...]
     reached: int
 
 
@@ -33,16 +33,16 @@ class ReportContents(NamedTuple):
     """``endings`` is ``None`` where no keystore was asked."""
 
     title: str
-    graph: Graph
+    graph: EnclaveGraph
     judged: Judged
     influences: tuple[Influence, ...]
     opened: tuple[tuple[str, str, str], ...]
     counts: tuple[Count, ...]
     endings: tuple[Ending, ...] | None = None
 
-    def uses_of(self) -> dict[str, list[Use]]:
+    def uses_of(self) -> dict[str, list[ChannelUse]]:
         """Enclave -> what it may do, in the graph's order."""
-        found: dict[str, list[Use]] = {path: [] for path in self.graph.enclaves}
+        found: dict[str, list[ChannelUse]] = {path: [] for path in self.graph.enclaves}
         for use in self.graph.uses:
             found[use.enclave].append(use)
         return found
@@ -76,7 +76,7 @@ def _short(told: Told, root: str) -> Told:
 def _influences(plan: PlanDocument) -> Iterator[Influence]:
     graph = flow_graph(plan)
     for source, targets in graph.items():
-        steps = tuple(Step(source, target, hops) for target, hops in targets.items())
+        steps = tuple(FlowStep(source, target, hops) for target, hops in targets.items())
         yield Influence(source, steps, len(reached_from(graph, source)))
 
 

@@ -10,7 +10,7 @@ import html
 from collections.abc import Iterator
 
 from enclave_launch.boundary.terminal import printable
-from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, Graph, Use
+from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, ChannelUse, EnclaveGraph
 from enclave_launch.review.document import Kind
 
 _DOT_SHAPES: dict[Kind, str] = {"topic": "ellipse", "service": "box", "action": "hexagon"}
@@ -21,7 +21,7 @@ _MERMAID_SHAPES: dict[Kind, tuple[str, str]] = {
 }
 
 
-def dot(graph: Graph) -> str:
+def dot(graph: EnclaveGraph) -> str:
     """A digraph with a cluster for each enclave."""
     lines = ["digraph launch {", "  rankdir=LR; compound=true; node [fontname=sans]; edge [fontname=sans];"]
     for number, (enclave, members) in enumerate(_groups(graph)):
@@ -40,7 +40,7 @@ def dot(graph: Graph) -> str:
     return "\n".join([*lines, "}"]) + "\n"
 
 
-def mermaid(graph: Graph) -> str:
+def mermaid(graph: EnclaveGraph) -> str:
     """A flowchart with a subgraph for each enclave."""
     lines = ["flowchart LR"]
     for number, (enclave, members) in enumerate(_groups(graph)):
@@ -57,7 +57,7 @@ def mermaid(graph: Graph) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _groups(graph: Graph) -> Iterator[tuple[str, list[int]]]:
+def _groups(graph: EnclaveGraph) -> Iterator[tuple[str, list[int]]]:
     members: dict[str, list[int]] = {path: [] for path in graph.enclaves}
     for number, member in enumerate(graph.members):
         members.setdefault(member.enclave, []).append(number)
@@ -68,23 +68,23 @@ def _label(enclave: str) -> str:
     return "without an enclave" if enclave == NO_ENCLAVE else f"enclave {enclave}"
 
 
-def _own(graph: Graph) -> list[Use]:
+def _own(graph: EnclaveGraph) -> list[ChannelUse]:
     return [use for use in graph.uses if not use.built_in]
 
 
-def _shown(graph: Graph) -> list[int]:
+def _shown(graph: EnclaveGraph) -> list[int]:
     return sorted({use.channel for use in _own(graph)})
 
 
-def _holds_policy(graph: Graph, enclave: str) -> bool:
+def _holds_policy(graph: EnclaveGraph, enclave: str) -> bool:
     return any(use.member is None and use.enclave == enclave for use in graph.uses)
 
 
-def _number(graph: Graph, enclave: str) -> int:
+def _number(graph: EnclaveGraph, enclave: str) -> int:
     return graph.enclaves.index(enclave)
 
 
-def _arrows(graph: Graph) -> Iterator[tuple[str, str]]:
+def _arrows(graph: EnclaveGraph) -> Iterator[tuple[str, str]]:
     for use in _own(graph):
         member = f"e{_number(graph, use.enclave)}" if use.member is None else f"n{use.member}"
         ends = (member, f"c{use.channel}")

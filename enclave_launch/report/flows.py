@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from enclave_launch.review.document import PlanDocument
-from enclave_launch.review.information_flow import FlowGraph, Step, opened_by_sharing, reached_from
+from enclave_launch.review.information_flow import FlowGraph, FlowStep, opened_by_sharing, reached_from
 
 MOST_WAYS = 3  # named for each step
 
 
-def paths_text(source: str, target: str, paths: Sequence[Sequence[Step]]) -> str:
+def paths_text(source: str, target: str, paths: Sequence[Sequence[FlowStep]]) -> str:
     """The shortest ways from one enclave to another, or that there is none."""
     if not paths:
         return f"nothing flows from {source} to {target}, over any number of enclaves\n"
@@ -22,7 +22,7 @@ def paths_text(source: str, target: str, paths: Sequence[Sequence[Step]]) -> str
     return "\n".join(lines[:-1]) + "\n"
 
 
-def step_text(step: Step) -> str:
+def step_text(step: FlowStep) -> str:
     """``/camera -> /planner by topic /image``."""
     ways = [str(hop) for hop in step.hops[:MOST_WAYS]]
     more = len(step.hops) - len(ways)

@@ -31,7 +31,7 @@ class UseReason(NamedTuple):
     built_in: bool
 
 
-class Member(NamedTuple):
+class NodeMember(NamedTuple):
     """A node in its enclave. ``known`` is false for a program whose interfaces nobody knows: what it may need is a gap.
 
     ``launched_at``: file and line of the launch file, empty where that is not known.
@@ -60,7 +60,7 @@ class Channel(NamedTuple):
         return any(character in self.name for character in "*?[")
 
 
-class Use(NamedTuple):
+class ChannelUse(NamedTuple):
     """What one member does with one channel, both by number; ``member`` is ``None`` where only the enclave's policy
     says so and no node of it asks for it."""
 
@@ -76,19 +76,19 @@ class Use(NamedTuple):
         return bool(self.reasons) and all(reason.built_in for reason in self.reasons)
 
 
-class Graph(NamedTuple):
+class EnclaveGraph(NamedTuple):
     """Everything sorted by name; ``uses`` by enclave, member, operation and name."""
 
     enclaves: tuple[str, ...]
-    members: tuple[Member, ...]
+    members: tuple[NodeMember, ...]
     channels: tuple[Channel, ...]
-    uses: tuple[Use, ...]
+    uses: tuple[ChannelUse, ...]
 
 
 _Key = tuple[str, "int | None", Operation, str]
 
 
-def plan_graph(document: Mapping[str, Any], root: str = "") -> Graph:
+def plan_graph(document: Mapping[str, Any], root: str = "") -> EnclaveGraph:
     """Of the dry run's JSON; files below ``root`` get the names that a person there would type."""
     members = tuple(sorted(_members(document, root)))
     reasons: dict[_Key, list[UseReason]] = dict(_reasons(document, members, root))
@@ -99,10 +99,10 @@ def plan_graph(document: Mapping[str, Any], root: str = "") -> Graph:
     channels = _channels(reasons)
     number_of = {(channel.kind, channel.name): number for number, channel in enumerate(channels)}
     uses = tuple(
-        Use(member, enclave, number_of[KIND_OF[operation], name], operation, tuple(why))
+        ChannelUse(member, enclave, number_of[KIND_OF[operation], name], operation, tuple(why))
         for (enclave, member, operation, name), why in sorted(reasons.items(), key=_order)
     )
-    return Graph(tuple(sorted(document["enclaves"])), members, channels, uses)
+    return EnclaveGraph(tuple(sorted(document["enclaves"])), members, channels, uses)
 
 
 def _order(item: tuple[_Key, list[UseReason]]) -> tuple[str, int, int, str]:
@@ -115,7 +115,7 @@ def short_path(path: str, root: str) -> str:
     return path.removeprefix(os.path.join(root, "")) if root.strip("/") else path
 
 
-def _members(document: Mapping[str, Any], root: str) -> Iterator[Member]:
+def _members(document: Mapping[str, Any], root: str) -> Iterator[NodeMember]:
     launched = (*document["processes"], *document["components"])
     places = {
         item["fqn"].replace(UNSPECIFIED_NODE_NAMESPACE, ""): _place(item, root)
@@ -123,13 +123,13 @@ def _members(document: Mapping[str, Any], root: str) -> Iterator[Member]:
         if item["fqn"]
     }
     for node in document["nodes"]:
-        yield Member(node["fqn"], node["enclave"], node["program"], places.get(node["fqn"], ""))
+        yield NodeMember(node["fqn"], node["enclave"], node["program"], places.get(node["fqn"], ""))
     for path, enclave in document["enclaves"].items():
         for name in enclave.get("permissions_unknown", ()):
-            yield Member(name, path, "interfaces unknown", places.get(name, ""), known=False)
+            yield NodeMember(name, path, "interfaces unknown", places.get(name, ""), known=False)
     for process in document["processes"]:
         if process["enclave"] is None:
-            yield Member(
+            yield NodeMember(
                 process["fqn"] or process["executable"],
                 NO_ENCLAVE,
                 "runs unsecured",
@@ -144,7 +144,7 @@ def _place(item: Mapping[str, Any], root: str) -> str:
 
 
 def _reasons(
-    document: Mapping[str, Any], members: tuple[Member, ...], root: str
+    document: Mapping[str, Any], members: tuple[NodeMember, ...], root: str
 ) -> Iterator[tuple[_Key, list[UseReason]]]:
     number_of = {
         (member.enclave, member.name): number for number, member in enumerate(members) if member.known

@@ -12,7 +12,7 @@ from enclave_launch.boundary.terminal import printable
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.diagrams import mermaid
 from enclave_launch.report.flows import step_text
-from enclave_launch.report.graph import Graph, Use
+from enclave_launch.report.graph import ChannelUse, EnclaveGraph
 from enclave_launch.report.reasons import evidence_text
 
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~&])")
@@ -73,7 +73,7 @@ def _findings(contents: ReportContents) -> Iterator[str]:
     yield from _table(("severity", "rule", "place", "what", "what to do"), rows)
 
 
-def _enclave(graph: Graph, enclave: str, uses: list[Use]) -> Iterator[str]:
+def _enclave(graph: EnclaveGraph, enclave: str, uses: list[ChannelUse]) -> Iterator[str]:
     yield from ("", f"### {code(enclave)}", "")
     own = [use for use in uses if not use.built_in]
     if own:

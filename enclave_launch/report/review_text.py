@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from enclave_launch.review.document import OPERATIONS, Grant, PlanDocument, Told
+from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument, Told
 from enclave_launch.review.similarity import Merge, Split
 
 Judged = Sequence[tuple[Told, "str | None"]]
@@ -17,7 +17,7 @@ def plan_text(plan: PlanDocument) -> str:
 
 def _enclave(plan: PlanDocument, path: str) -> Iterator[str]:
     nodes = plan.nodes_of(path)
-    asked = frozenset[Grant]().union(*(node.own for node in nodes))
+    asked = frozenset[GrantedName]().union(*(node.own for node in nodes))
     shown = asked if nodes else plan.enclaves[path]
     yield f"enclave {path}"
     yield from (f"  node {node.fqn}  ({node.program})" for node in nodes)
@@ -77,7 +77,7 @@ def _split(split: Split) -> Iterator[str]:
     yield from (f"  {node} would lose: {_names(saved)}" for node, saved in split.saved)
 
 
-def _names(grants: Sequence[Grant]) -> str:
+def _names(grants: Sequence[GrantedName]) -> str:
     return ", ".join(map(str, grants))
 
 

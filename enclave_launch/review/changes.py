@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from enclave_launch.review.document import Grant, PlanDocument
+from enclave_launch.review.document import GrantedName, PlanDocument
 from enclave_launch.review.information_flow import FlowGraph, flow_graph
 
 
@@ -19,9 +19,9 @@ class EnclaveChange(NamedTuple):
     """
 
     enclave: str
-    added: tuple[Grant, ...]
-    removed: tuple[Grant, ...]
-    built_in: frozenset[Grant]
+    added: tuple[GrantedName, ...]
+    removed: tuple[GrantedName, ...]
+    built_in: frozenset[GrantedName]
     is_new: bool = False
     is_gone: bool = False
 
@@ -90,9 +90,9 @@ def _enclave_changes(before: PlanDocument, after: PlanDocument) -> list[EnclaveC
     return found
 
 
-def _built_in(plan: PlanDocument, enclave: str) -> frozenset[Grant]:
+def _built_in(plan: PlanDocument, enclave: str) -> frozenset[GrantedName]:
     nodes = plan.nodes_of(enclave)
-    own, everywhere = frozenset[Grant](), frozenset[Grant]()
+    own, everywhere = frozenset[GrantedName](), frozenset[GrantedName]()
     return everywhere.union(*(node.built_in for node in nodes)) - own.union(*(node.own for node in nodes))
 
 

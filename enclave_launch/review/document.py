@@ -34,7 +34,7 @@ KIND_OF: Mapping[str, Kind] = {
 """What a name is that an operation is about."""
 
 
-class Grant(NamedTuple):
+class GrantedName(NamedTuple):
     """One permission: an operation on a final name, which may hold wildcards."""
 
     operation: Operation
@@ -53,12 +53,12 @@ class NodeView(NamedTuple):
     fqn: str
     enclave: str
     program: str
-    own: frozenset[Grant]
-    built_in: frozenset[Grant]
+    own: frozenset[GrantedName]
+    built_in: frozenset[GrantedName]
     unit: str
 
     @property
-    def grants(self) -> frozenset[Grant]:
+    def grants(self) -> frozenset[GrantedName]:
         return self.own | self.built_in
 
 
@@ -77,17 +77,17 @@ class Told(NamedTuple):
 class PlanDocument(NamedTuple):
     """``enclaves``: path -> all that DDS lets it do, the union of its nodes."""
 
-    enclaves: Mapping[str, frozenset[Grant]]
+    enclaves: Mapping[str, frozenset[GrantedName]]
     nodes: tuple[NodeView, ...]
     told: tuple[Told, ...]
 
     def nodes_of(self, enclave: str) -> tuple[NodeView, ...]:
         return tuple(node for node in self.nodes if node.enclave == enclave)
 
-    def units_of(self, enclave: str) -> dict[str, frozenset[Grant]]:
+    def units_of(self, enclave: str) -> dict[str, frozenset[GrantedName]]:
         """What can have an enclave of its own: each node that the launch file starts, with what it and the helpers in
         its process ask for."""
-        units: dict[str, frozenset[Grant]] = {}
+        units: dict[str, frozenset[GrantedName]] = {}
         for node in self.nodes_of(enclave):
             units[node.unit] = units.get(node.unit, frozenset()) | node.own
         return units
@@ -102,9 +102,11 @@ def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
     )
 
 
-def grants_of(lists: Mapping[str, Sequence[str]]) -> frozenset[Grant]:
+def grants_of(lists: Mapping[str, Sequence[str]]) -> frozenset[GrantedName]:
     """Of the contract's six lists of names; what else the mapping holds is left alone."""
-    return frozenset(Grant(operation, name) for operation in OPERATIONS for name in lists.get(operation, ()))
+    return frozenset(
+        GrantedName(operation, name) for operation in OPERATIONS for name in lists.get(operation, ())
+    )
 
 
 def _nodes(document: Mapping[str, Any]) -> Iterator[NodeView]:
@@ -134,9 +136,9 @@ def _node(node: Mapping[str, Any], unit: str) -> NodeView:
     )
 
 
-def _grants(interfaces: Iterable[Mapping[str, Any]], *, built_in: bool) -> frozenset[Grant]:
+def _grants(interfaces: Iterable[Mapping[str, Any]], *, built_in: bool) -> frozenset[GrantedName]:
     return frozenset(
-        Grant(interface["operation"], interface["name"])
+        GrantedName(interface["operation"], interface["name"])
         for interface in interfaces
         if interface["built_in"] is built_in
     )

@@ -19,8 +19,8 @@ from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
 from enclave_launch.errors import UsageError
-from enclave_launch.review.document import Grant, PlanDocument, Told, plan_from_document
-from enclave_launch.review.information_flow import Step, flow_graph, shortest_paths
+from enclave_launch.review.document import GrantedName, PlanDocument, Told, plan_from_document
+from enclave_launch.review.information_flow import FlowStep, flow_graph, shortest_paths
 
 _TAKES: Mapping[str, bool] = {"subscribe": True, "serve_services": True, "serve_actions": True}
 
@@ -61,7 +61,7 @@ class Broken(NamedTuple):
     rule: Never
     source: str
     target: str
-    steps: tuple[Step, ...]
+    steps: tuple[FlowStep, ...]
 
 
 def read_expectations(content: Any, place: str) -> Expectations:
@@ -139,7 +139,7 @@ def broken_rules(plan: PlanDocument, rules: Iterable[Never]) -> tuple[list[Broke
     return broken, idle
 
 
-def _way(graph: Any, source: str, target: str) -> tuple[str, str, tuple[Step, ...]] | None:
+def _way(graph: Any, source: str, target: str) -> tuple[str, str, tuple[FlowStep, ...]] | None:
     if source == target:
         return source, target, ()
     paths = shortest_paths(graph, source, target)
@@ -158,7 +158,7 @@ def _enclaves_receiving(plan: PlanDocument, pattern: str) -> list[str]:
     )
 
 
-def _receives(grant: Grant, pattern: str) -> bool:
+def _receives(grant: GrantedName, pattern: str) -> bool:
     return grant.operation in _TAKES and fnmatchcase(grant.name, pattern)
 
 

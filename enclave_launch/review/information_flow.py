@@ -16,7 +16,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
-from enclave_launch.review.document import Grant, Operation, PlanDocument
+from enclave_launch.review.document import GrantedName, Operation, PlanDocument
 from keystore.formats.permissions_patterns import can_meet
 from nodl.remap import ACTION_SERVICES, ACTION_TOPICS
 
@@ -46,7 +46,7 @@ class Hop(NamedTuple):
         return f"answers of {what}" if verb == "serve" else what
 
 
-class Step(NamedTuple):
+class FlowStep(NamedTuple):
     """From one enclave to the next, by any of ``hops``."""
 
     source: str
@@ -64,13 +64,13 @@ def flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
     return _graph(grants)
 
 
-def shortest_paths(graph: FlowGraph, source: str, target: str) -> list[tuple[Step, ...]]:
+def shortest_paths(graph: FlowGraph, source: str, target: str) -> list[tuple[FlowStep, ...]]:
     """All shortest ways from ``source`` to ``target``, sorted; empty when there is none."""
     distances = _distances(graph, source)
     if target not in distances or source == target:
         return []
     return [
-        tuple(Step(one, two, graph[one][two]) for one, two in pairwise(path))
+        tuple(FlowStep(one, two, graph[one][two]) for one, two in pairwise(path))
         for path in _paths_back(graph, distances, target)
     ]
 
@@ -86,7 +86,7 @@ def opened_by_sharing(plan: PlanDocument) -> list[tuple[str, str, str]]:
     In an enclave of its own the first node could not pass anything on to the second. Nodes of one process count as
     one: no enclave separates them.
     """
-    units: dict[str, frozenset[Grant]] = {}
+    units: dict[str, frozenset[GrantedName]] = {}
     for enclave in plan.enclaves:
         for unit, own in plan.units_of(enclave).items():
             units[unit] = units.get(unit, frozenset()) | own
@@ -104,17 +104,17 @@ def opened_by_sharing(plan: PlanDocument) -> list[tuple[str, str, str]]:
     return opened
 
 
-def _flowing(plan: PlanDocument, enclave: str, built_in: bool) -> frozenset[Grant]:
+def _flowing(plan: PlanDocument, enclave: str, built_in: bool) -> frozenset[GrantedName]:
     if built_in:
         return plan.enclaves[enclave]
     nodes = plan.nodes_of(enclave)
-    everywhere = frozenset[Grant]().union(*(node.built_in for node in nodes)) - frozenset[Grant]().union(
-        *(node.own for node in nodes)
-    )
+    everywhere = frozenset[GrantedName]().union(*(node.built_in for node in nodes)) - frozenset[
+        GrantedName
+    ]().union(*(node.own for node in nodes))
     return plan.enclaves[enclave] - everywhere
 
 
-def _graph(grants: Mapping[str, Iterable[Grant]]) -> FlowGraph:
+def _graph(grants: Mapping[str, Iterable[GrantedName]]) -> FlowGraph:
     parts = {holder: [part for grant in own for part in _parts(grant)] for holder, own in grants.items()}
     takers = _Takers({holder: [part for part, _ in own] for holder, own in parts.items()})
     graph: dict[str, dict[str, tuple[Hop, ...]]] = {}
@@ -122,7 +122,7 @@ def _graph(grants: Mapping[str, Iterable[Grant]]) -> FlowGraph:
         hops: dict[str, set[Hop]] = {}
         for part, grant in own:
             if part.operation in _MEETS:
-                for target in takers.of(Grant(_MEETS[part.operation], part.name)):
+                for target in takers.of(GrantedName(_MEETS[part.operation], part.name)):
                     hops.setdefault(target, set()).add(Hop(*grant))
         graph[source] = {
             target: tuple(sorted(ways)) for target, ways in sorted(hops.items()) if target != source
@@ -130,28 +130,28 @@ def _graph(grants: Mapping[str, Iterable[Grant]]) -> FlowGraph:
     return graph
 
 
-def _parts(grant: Grant) -> list[tuple[Grant, Grant]]:
+def _parts(grant: GrantedName) -> list[tuple[GrantedName, GrantedName]]:
     """What ``grant`` is made of, each part with ``grant`` itself: topics and services stand for themselves."""
     if grant.operation not in _PARTS_OF_ACTIONS:
         return [(grant, grant)]
     service, topic = _PARTS_OF_ACTIONS[grant.operation]
     return [
-        *((Grant(service, f"{grant.name}/_action/{part}"), grant) for part in ACTION_SERVICES),
-        *((Grant(topic, f"{grant.name}/_action/{part}"), grant) for part in ACTION_TOPICS),
+        *((GrantedName(service, f"{grant.name}/_action/{part}"), grant) for part in ACTION_SERVICES),
+        *((GrantedName(topic, f"{grant.name}/_action/{part}"), grant) for part in ACTION_TOPICS),
     ]
 
 
 class _Takers:
     """Who holds a grant that meets another: a look-up, and a comparison only where wildcards are."""
 
-    def __init__(self, grants: Mapping[str, Iterable[Grant]]) -> None:
-        self._holders: dict[Grant, set[str]] = {}
+    def __init__(self, grants: Mapping[str, Iterable[GrantedName]]) -> None:
+        self._holders: dict[GrantedName, set[str]] = {}
         for holder, own in grants.items():
             for grant in own:
                 self._holders.setdefault(grant, set()).add(holder)
         self._patterns = [grant for grant in self._holders if _is_pattern(grant.name)]
 
-    def of(self, wanted: Grant) -> set[str]:
+    def of(self, wanted: GrantedName) -> set[str]:
         candidates = self._holders if _is_pattern(wanted.name) else self._patterns
         met = [
             grant

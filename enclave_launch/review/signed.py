@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from enclave_launch.review.document import Grant, Operation, PlanDocument
+from enclave_launch.review.document import GrantedName, Operation, PlanDocument
 from keystore.formats.permissions_names import add_dds_topics, ros_rules
 from keystore.formats.policy import Operation as Rules
 from keystore.formats.policy import Rule
@@ -24,7 +24,7 @@ _RULES: Mapping[Operation, Rules] = {
 _OPERATIONS: Mapping[Rules, Operation] = {rule: operation for operation, rule in _RULES.items()}
 
 
-def as_signed(grants: Iterable[Grant]) -> frozenset[Grant]:
+def as_signed(grants: Iterable[GrantedName]) -> frozenset[GrantedName]:
     """``grants`` through DDS topics and back."""
     publish: set[str] = set()
     subscribe: set[str] = set()
@@ -33,9 +33,9 @@ def as_signed(grants: Iterable[Grant]) -> frozenset[Grant]:
     return grants_of_rules(ros_rules(publish, subscribe)[0])
 
 
-def grants_of_rules(rules: Iterable[Rule]) -> frozenset[Grant]:
+def grants_of_rules(rules: Iterable[Rule]) -> frozenset[GrantedName]:
     """Rules of a policy, read back from signed permissions, as the plan names them."""
-    return frozenset(Grant(_OPERATIONS[rule.operation], rule.expression) for rule in rules)
+    return frozenset(GrantedName(_OPERATIONS[rule.operation], rule.expression) for rule in rules)
 
 
 def plan_as_signed(plan: PlanDocument) -> PlanDocument:
@@ -43,6 +43,6 @@ def plan_as_signed(plan: PlanDocument) -> PlanDocument:
     return plan._replace(enclaves={path: as_signed(grants) for path, grants in plan.enclaves.items()})
 
 
-def keystore_as_plan(signed: Mapping[str, frozenset[Grant]], plan: PlanDocument) -> PlanDocument:
+def keystore_as_plan(signed: Mapping[str, frozenset[GrantedName]], plan: PlanDocument) -> PlanDocument:
     """The keystore's enclaves with the nodes that ``plan`` has in them: a keystore knows no nodes."""
     return PlanDocument(signed, tuple(node for node in plan.nodes if node.enclave in signed), ())

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 from itertools import combinations
 from typing import NamedTuple
 
-from enclave_launch.review.document import Grant, PlanDocument
+from enclave_launch.review.document import GrantedName, PlanDocument
 
 
 class Merge(NamedTuple):
@@ -19,7 +19,7 @@ class Merge(NamedTuple):
     one: str
     two: str
     similarity: float
-    excess: tuple[tuple[str, tuple[Grant, ...]], ...]
+    excess: tuple[tuple[str, tuple[GrantedName, ...]], ...]
 
     @property
     def cost(self) -> int:
@@ -30,7 +30,7 @@ class Split(NamedTuple):
     """``saved``: for each node of the enclave what it may do today and neither it nor its process asks for."""
 
     enclave: str
-    saved: tuple[tuple[str, tuple[Grant, ...]], ...]
+    saved: tuple[tuple[str, tuple[GrantedName, ...]], ...]
 
     @property
     def gain(self) -> int:
@@ -61,20 +61,20 @@ def splits(plan: PlanDocument) -> list[Split]:
     return sorted(found, key=lambda split: (-split.gain, split.enclave))
 
 
-def _asked_for(plan: PlanDocument, enclave: str) -> frozenset[Grant]:
+def _asked_for(plan: PlanDocument, enclave: str) -> frozenset[GrantedName]:
     return _union(node.own for node in plan.nodes_of(enclave))
 
 
-def _union(sets: Iterable[frozenset[Grant]]) -> frozenset[Grant]:
-    return frozenset[Grant]().union(*sets)
+def _union(sets: Iterable[frozenset[GrantedName]]) -> frozenset[GrantedName]:
+    return frozenset[GrantedName]().union(*sets)
 
 
-def _similarity(one: frozenset[Grant], two: frozenset[Grant]) -> float:
+def _similarity(one: frozenset[GrantedName], two: frozenset[GrantedName]) -> float:
     return len(one & two) / len(one | two)
 
 
 def _excess(
-    own: dict[str, frozenset[Grant]], one: str, two: str
-) -> tuple[tuple[str, tuple[Grant, ...]], ...]:
+    own: dict[str, frozenset[GrantedName]], one: str, two: str
+) -> tuple[tuple[str, tuple[GrantedName, ...]], ...]:
     gains = ((one, tuple(sorted(own[two] - own[one]))), (two, tuple(sorted(own[one] - own[two]))))
     return tuple(gain for gain in gains if gain[1])

@@ -102,7 +102,7 @@ def _looked_at(args: argparse.Namespace) -> int:
 def _launched(description: Any, args: argparse.Namespace) -> int:
     """As ``secure-launch --secure``: planned, signed and run by one engine. Gives the exit status."""
     from enclave_launch.verb.secure_launch import start
-    from enclave_launch.verb.target import Target
+    from enclave_launch.verb.target import LaunchTarget
 
     if args.keystore is None:
         raise UsageError(
@@ -111,7 +111,7 @@ def _launched(description: Any, args: argparse.Namespace) -> int:
         )
     _check_nothing_was_added(description)
     with safe_output():
-        return start(Target(*target_of(args)), args, os.path.abspath(args.keystore))
+        return start(LaunchTarget(*target_of(args)), args, os.path.abspath(args.keystore))
 
 
 def _check_nothing_was_added(description: Any) -> None:

@@ -129,9 +129,9 @@ class LiveProcess:
             return lambda event: isinstance(event, cls) and event.process_matcher(self._action)
 
         return [
-            Reaction(ShutdownProcess, addressed(ShutdownProcess), lambda _: self._end(quiet=False)),
-            Reaction(SignalProcess, addressed(SignalProcess), self._on_signal),
-            Reaction(ProcessStdin, lambda event: event.action is self._action, self._on_stdin),
+            CalledAtEvent(ShutdownProcess, addressed(ShutdownProcess), lambda _: self._end(quiet=False)),
+            CalledAtEvent(SignalProcess, addressed(SignalProcess), self._on_signal),
+            CalledAtEvent(ProcessStdin, lambda event: event.action is self._action, self._on_stdin),
             OnShutdown(on_shutdown=self._on_shutdown),
         ]
 
@@ -159,7 +159,7 @@ class LiveProcess:
         self._log.log(level, self.process.process_name, message)
 
 
-class Reaction(EventHandler):
+class CalledAtEvent(EventHandler):
     """Calls a function at an event; there is nothing to visit."""
 
     def __init__(self, cls: type, matcher: Callable[[Any], bool], react: Callable[[Any], None]) -> None:

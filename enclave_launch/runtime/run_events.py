@@ -53,7 +53,7 @@ class ProcessOver(NamedTuple):
     failed: bool
 
 
-class Endpoint(NamedTuple):
+class AskedEndpoint(NamedTuple):
     """What a node asked rcl for. ``node`` and ``name`` are final, after all rules; ``written`` as the source has it.
 
     ``component``: ``package/plugin`` of the composable node that asked, empty for nodes of the program itself. An
@@ -74,7 +74,7 @@ class EndpointCreated(NamedTuple):
 
     name: str
     pid: int
-    endpoint: Endpoint
+    endpoint: AskedEndpoint
 
 
 class EndpointRefused(NamedTuple):
@@ -82,7 +82,7 @@ class EndpointRefused(NamedTuple):
 
     name: str
     pid: int
-    endpoint: Endpoint
+    endpoint: AskedEndpoint
     reason: tuple[str, ...]
 
 

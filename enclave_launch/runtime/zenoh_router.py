@@ -45,7 +45,7 @@ class RouterPlace(NamedTuple):
     differences: Callable[[], Sequence[str]]
 
 
-class Answer(Enum):
+class RouterAnswer(Enum):
     """Who answers where the router should be."""
 
     NOBODY = "nobody"
@@ -60,7 +60,7 @@ def find_router(prefixes: Sequence[str]) -> str | None:
     return next((path for path in candidates if os.access(path, os.X_OK)), None)
 
 
-def who_answers(place: RouterPlace, timeout: float = 5.0) -> Answer:
+def who_answers(place: RouterPlace, timeout: float = 5.0) -> RouterAnswer:
     """Connect with TLS, and judge who is there by the certificate that is presented."""
     context = ssl.create_default_context(cafile=place.authorities)
     host, port = place.address
@@ -70,13 +70,13 @@ def who_answers(place: RouterPlace, timeout: float = 5.0) -> Answer:
             with context.wrap_socket(plain, server_hostname=host) as secured:
                 presented = secured.getpeercert(binary_form=True)
     except ConnectionRefusedError:
-        return Answer.NOBODY
+        return RouterAnswer.NOBODY
     except (TimeoutError, ssl.SSLError, ConnectionError):
-        return Answer.STRANGER
+        return RouterAnswer.STRANGER
     except OSError:
-        return Answer.NOBODY
+        return RouterAnswer.NOBODY
     expected = ssl.PEM_cert_to_DER_cert(Path(place.certificate).read_text())
-    return Answer.PRESENT if presented == expected else Answer.EARLIER
+    return RouterAnswer.PRESENT if presented == expected else RouterAnswer.EARLIER
 
 
 class ZenohRouter:
@@ -104,7 +104,7 @@ class ZenohRouter:
 
     def __enter__(self) -> ZenohRouter:
         answer = who_answers(self._place)
-        if answer is Answer.NOBODY:
+        if answer is RouterAnswer.NOBODY:
             self._start()
         self.wait()
         return self
@@ -118,11 +118,11 @@ class ZenohRouter:
         """Until a router with the present rules answers. :raises RuntimeFailure: none does in time."""
         end = time.monotonic() + _PATIENCE
         answer = who_answers(self._place)
-        while answer is not Answer.PRESENT:
+        while answer is not RouterAnswer.PRESENT:
             if (
                 self._failed.is_set()
                 or time.monotonic() > end
-                or (answer is Answer.STRANGER and not self._thread)
+                or (answer is RouterAnswer.STRANGER and not self._thread)
             ):
                 self._stop.set()
                 raise RuntimeFailure(self._failure(answer))
@@ -130,13 +130,13 @@ class ZenohRouter:
             answer = who_answers(self._place)
         self._answered.set()
 
-    def _failure(self, answer: Answer) -> str:
+    def _failure(self, answer: RouterAnswer) -> str:
         host, port = self._place.address
         where = f"tls/{host}:{port}"
         if self._thread is not None:
             said = "".join(f"\n  {line}" for line in self._printed) or " nothing"
             return f"the Zenoh router {self._program} does not answer at {where}; it said:{said}"
-        if answer is Answer.EARLIER:
+        if answer is RouterAnswer.EARLIER:
             return (
                 f"the Zenoh router at {where} runs with earlier rules than those of the keystore: restart it there "
                 f"(with {CONFIGURATION}={self._place.configuration})"

@@ -24,7 +24,7 @@ from enclave_launch.recording.recording import Recording
 if TYPE_CHECKING:
     from enclave_launch.recording.markers import MarkerRun
     from enclave_launch.runtime.companion import LaunchCompanion
-    from enclave_launch.verb.target import Target
+    from enclave_launch.verb.target import LaunchTarget
 
 Start = Callable[["LaunchCompanion"], int]
 """Run the launch with a companion; gives the exit status."""
@@ -43,7 +43,7 @@ def seconds(text: str | None) -> float | None:
         raise UsageError(f"--learn-for {text}: not a duration; write for example 10s or 2m") from error
 
 
-def learn_launch(target: Target, options: argparse.Namespace, start: Start) -> int:
+def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start) -> int:
     """Record one run (and a second one for ``--learn-parameters``), then write what was learnt. Gives the exit status
     of the launch."""
     patience = seconds(options.learn_for)
@@ -68,7 +68,7 @@ def learn_launch(target: Target, options: argparse.Namespace, start: Start) -> i
 
 
 def _record(
-    target: Target,
+    target: LaunchTarget,
     options: argparse.Namespace,
     folder: Path,
     isolation: Isolation,

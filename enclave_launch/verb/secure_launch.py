@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from enclave_launch.runtime.companion import LaunchCompanion
     from enclave_launch.runtime.deadline import Deadline
     from enclave_launch.secured import ProvisionedLaunch
-    from enclave_launch.verb.target import Target
+    from enclave_launch.verb.target import LaunchTarget
 
 
 _ALLOCATIONS = 100_000
@@ -95,7 +95,7 @@ def _main(options: argparse.Namespace) -> int:
 
 
 def start(
-    target: Target,
+    target: LaunchTarget,
     options: argparse.Namespace,
     keystore: str | None,
     companion: LaunchCompanion | None = None,
@@ -115,7 +115,7 @@ def start(
     return status
 
 
-def _planned(target: Target, options: argparse.Namespace, keystore: str | None) -> LaunchPlan:
+def _planned(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> LaunchPlan:
     """The plan; with a keystore it says what is shared with other launches there."""
     plan = _resolve(target, options)
     if keystore is None or not os.path.isdir(keystore):
@@ -146,7 +146,7 @@ def _keystore(options: argparse.Namespace) -> str | None:
     return str(os.path.abspath(options.keystore))
 
 
-def _resolve(target: Target, options: argparse.Namespace) -> LaunchPlan:
+def _resolve(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
     from enclave_launch.boundary.progress import ProgressLine, wanted
     from enclave_launch.flow import resolve
 
@@ -201,7 +201,7 @@ def _check_pattern(pattern: str | None) -> None:
         ) from error
 
 
-def _show_file(target: Target, options: argparse.Namespace) -> int:
+def _show_file(target: LaunchTarget, options: argparse.Namespace) -> int:
     from enclave_launch.evaluation.evaluate import read_description
     from enclave_launch.host.plan_host import PlanHost
     from enclave_launch.report.launch_file import arguments_text, description_text
@@ -289,7 +289,7 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
 
 
 def _launch_plainly(
-    target: Target, options: argparse.Namespace, companion: LaunchCompanion | None = None
+    target: LaunchTarget, options: argparse.Namespace, companion: LaunchCompanion | None = None
 ) -> int:
     """Without enclaves nobody has to know what the nodes say to each other."""
     from enclave_launch.flow import launch_source, run

@@ -15,24 +15,24 @@ from enclave_launch.errors import UsageError
 from nodl import ament_index
 
 
-class Target(NamedTuple):
+class LaunchTarget(NamedTuple):
     """``arguments``: name and value of each ``name:=value``, the last of a repeated name."""
 
     launch_file: str
     arguments: tuple[tuple[str, str], ...]
 
 
-def find_target(words: Sequence[str], prefixes: Sequence[str]) -> Target:
+def find_target(words: Sequence[str], prefixes: Sequence[str]) -> LaunchTarget:
     """Raises ``UsageError``: nothing given, no such file or package, several files of that name, bad argument."""
     if not words:
         raise UsageError("give PACKAGE LAUNCH_FILE or the PATH of a launch file (see secure-launch --help)")
     first, *rest = words
     if os.path.isfile(first):
-        return Target(first, parse_arguments(rest))
+        return LaunchTarget(first, parse_arguments(rest))
     if not rest or ":=" in rest[0]:
         what = "is not a regular file" if os.path.exists(first) else "does not exist"
         raise UsageError(f"launch file {first!r} {what} (give PACKAGE LAUNCH_FILE or a PATH){_beside(first)}")
-    return Target(_in_package(first, rest[0], prefixes), parse_arguments(rest[1:]))
+    return LaunchTarget(_in_package(first, rest[0], prefixes), parse_arguments(rest[1:]))
 
 
 def _beside(path: str) -> str:

@@ -19,7 +19,7 @@ _VERSION = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class KeystoreSettings:
     """``lifetime`` is for new certificates of enclaves, ``curve`` for new keys of CAs and enclaves."""
 
     subjects: SubjectScheme = SubjectScheme.EXACT
@@ -38,7 +38,7 @@ class Settings:
         return json.dumps(content, indent=2, sort_keys=True).encode() + b"\n"
 
     @classmethod
-    def from_json(cls, text: bytes, place: str) -> Settings:
+    def from_json(cls, text: bytes, place: str) -> KeystoreSettings:
         """Raises DamagedKeystoreError for anything but what ``to_json`` writes."""
         import json
 

@@ -26,7 +26,7 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 
 if TYPE_CHECKING:
-    from keystore.disk.settings import Settings
+    from keystore.disk.settings import KeystoreSettings
     from keystore.signing.authority import Authority
     from keystore.signing.ca_access import CaAccess
 
@@ -71,11 +71,15 @@ class KeystoreView:
             )
 
     @cached_property
-    def settings(self) -> Settings:
-        from keystore.disk.settings import Settings
+    def settings(self) -> KeystoreSettings:
+        from keystore.disk.settings import KeystoreSettings
 
         text = safe_files.read_if_there(self.root, layout.SETTINGS)
-        return Settings.from_json(text, str(self.root / layout.SETTINGS)) if text is not None else Settings()
+        return (
+            KeystoreSettings.from_json(text, str(self.root / layout.SETTINGS))
+            if text is not None
+            else KeystoreSettings()
+        )
 
     def ca_bundle(self, role: Role) -> list[CertificateFacts]:
         """All certificates of a trust anchor file, the one in use first."""

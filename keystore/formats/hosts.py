@@ -36,7 +36,7 @@ _MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")
 _DEVICE = re.compile(r"/dev/[A-Za-z0-9._/-]+\Z")
 
 
-class Host(NamedTuple):
+class HostPatterns(NamedTuple):
     """Patterns of what belongs on one host."""
 
     name: str
@@ -63,7 +63,7 @@ class NodeNeeds(NamedTuple):
 class Hosts(NamedTuple):
     """``where`` names the file in errors."""
 
-    hosts: tuple[Host, ...] = ()
+    hosts: tuple[HostPatterns, ...] = ()
     needs: tuple[NodeNeeds, ...] = ()
     where: str = "the hosts file"
 
@@ -139,7 +139,9 @@ def parse_hosts(text: bytes, where: str) -> Hosts:
         raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
     for name in document.hosts:
         refuse_host_name(name, where)
-    hosts = tuple(Host(name, tuple(one.enclaves), tuple(one.nodes)) for name, one in document.hosts.items())
+    hosts = tuple(
+        HostPatterns(name, tuple(one.enclaves), tuple(one.nodes)) for name, one in document.hosts.items()
+    )
     return Hosts(hosts, tuple(_needs(one, where) for one in document.needs), where)
 
 

@@ -22,7 +22,7 @@ FOLDER = "/tools"
 Need = tuple[Operation, str]
 
 
-class Target(Enum):
+class ToolTarget(Enum):
     """What a tool works on; the value is the word for a person."""
 
     NOTHING = ""
@@ -38,7 +38,7 @@ class Tool(NamedTuple):
 
     name: str
     what: str
-    target: Target
+    target: ToolTarget
     node: str
     own: tuple[Need, ...]
     each: tuple[Need, ...]
@@ -92,32 +92,32 @@ def _below(operation: Operation, names: tuple[str, ...]) -> tuple[Need, ...]:
 
 
 TABLE: tuple[Tool, ...] = (
-    Tool("observe", "secure-nodl observe, secure-plan drift: discovery is read, nothing else", Target.NOTHING, "", (),
-         (), "secure-nodl observe --keystore {keystore} --enclave {enclave}"),
-    Tool("list", "ros2 node list|info, topic list|info, service list, action list", Target.NOTHING, _CLI_NODE,
+    Tool("observe", "secure-nodl observe, secure-plan drift: discovery is read, nothing else", ToolTarget.NOTHING, "",
+         (), (), "secure-nodl observe --keystore {keystore} --enclave {enclave}"),
+    Tool("list", "ros2 node list|info, topic list|info, service list, action list", ToolTarget.NOTHING, _CLI_NODE,
          _ANY_NODE, (), "ros2 node list --no-daemon"),
-    Tool("daemon", "the ROS daemon, which answers the commands of list", Target.NOTHING, _CLI_NODE, _ANY_NODE, (),
+    Tool("daemon", "the ROS daemon, which answers the commands of list", ToolTarget.NOTHING, _CLI_NODE, _ANY_NODE, (),
          "ros2 daemon start"),
-    Tool("echo", "ros2 topic echo, hz, bw, delay", Target.TOPIC, _CLI_NODE, _ANY_NODE, ((_S, "{}"),),
+    Tool("echo", "ros2 topic echo, hz, bw, delay", ToolTarget.TOPIC, _CLI_NODE, _ANY_NODE, ((_S, "{}"),),
          "ros2 topic echo --no-daemon {target}"),
-    Tool("pub", "ros2 topic pub", Target.TOPIC, _CLI_NODE, _ANY_NODE, ((_P, "{}"),),
+    Tool("pub", "ros2 topic pub", ToolTarget.TOPIC, _CLI_NODE, _ANY_NODE, ((_P, "{}"),),
          "ros2 topic pub --once {target} TYPE VALUES"),
-    Tool("param", "ros2 param list, get, set, describe, dump", Target.NODE, _CLI_NODE, _ANY_NODE,
+    Tool("param", "ros2 param list, get, set, describe, dump", ToolTarget.NODE, _CLI_NODE, _ANY_NODE,
          _below(_Q, PARAMETER_SERVICES), "ros2 param list --no-daemon {target}"),
-    Tool("call", "ros2 service call", Target.SERVICE, _CLI_NODE, _ANY_NODE, ((_Q, "{}"),),
+    Tool("call", "ros2 service call", ToolTarget.SERVICE, _CLI_NODE, _ANY_NODE, ((_Q, "{}"),),
          "ros2 service call {target} TYPE VALUES"),
-    Tool("action", "ros2 action send_goal", Target.ACTION, _CLI_NODE, _ANY_NODE, ((_C, "{}"),),
+    Tool("action", "ros2 action send_goal", ToolTarget.ACTION, _CLI_NODE, _ANY_NODE, ((_C, "{}"),),
          "ros2 action send_goal {target} TYPE GOAL"),
-    Tool("lifecycle", "ros2 lifecycle get, set, list", Target.NODE, _CLI_NODE, _ANY_NODE,
+    Tool("lifecycle", "ros2 lifecycle get, set, list", ToolTarget.NODE, _CLI_NODE, _ANY_NODE,
          _below(_Q, _LIFECYCLE_SERVICES), "ros2 lifecycle get --no-daemon {target}"),
-    Tool("component", "ros2 component list, load, unload", Target.NODE, _CLI_NODE, _ANY_NODE,
+    Tool("component", "ros2 component list, load, unload", ToolTarget.NODE, _CLI_NODE, _ANY_NODE,
          _below(_Q, _CONTAINER_SERVICES), "ros2 component list --no-daemon {target}"),
-    Tool("record", "ros2 bag record", Target.TOPIC, "/rosbag2_recorder",
+    Tool("record", "ros2 bag record", ToolTarget.TOPIC, "/rosbag2_recorder",
          (*_RCLCPP_NODE, (_P, "/events/write_split"), *((_R, f"~/{name}") for name in _RECORDER_SERVICES)),
          ((_S, "{}"),), "ros2 bag record {target}"),
-    Tool("rviz", "rviz2 that shows topics, without tools that publish", Target.TOPIC, "/rviz", _RVIZ, ((_S, "{}"),),
+    Tool("rviz", "rviz2 that shows topics, without tools that publish", ToolTarget.TOPIC, "/rviz", _RVIZ, ((_S, "{}"),),
          "rviz2 -d CONFIG", True),
-    Tool("rviz-control", "rviz2 with its tools for goals, poses and points: it can move the robot", Target.TOPIC,
+    Tool("rviz-control", "rviz2 with its tools for goals, poses and points: it can move the robot", ToolTarget.TOPIC,
          "/rviz", (*_RVIZ, *((_P, name) for name in _RVIZ_TOOLS)), ((_S, "{}"),), "rviz2 -d CONFIG", True),
 )  # fmt: skip
 TOOLS = {tool.name: tool for tool in TABLE}
@@ -133,9 +133,9 @@ def tool_enclave_name(tool: Tool, targets: tuple[str, ...]) -> str:
 def tool_targets(tool: Tool, words: tuple[str, ...]) -> tuple[str, ...]:
     """Absolute names of what the tool works on, as its command line would take them. Raises ``InvalidInputError`` for
     too few or too many, and ``PolicyError`` for what is not a name."""
-    if tool.target is Target.NOTHING and words:
+    if tool.target is ToolTarget.NOTHING and words:
         raise InvalidInputError(f"--for {tool.name} works on the whole graph: it takes no target")
-    if tool.target is not Target.NOTHING and not words and not tool.optional_target:
+    if tool.target is not ToolTarget.NOTHING and not words and not tool.optional_target:
         raise InvalidInputError(f"--for {tool.name} needs the {tool.target.value} that it works on")
     targets = tuple(dict.fromkeys(word if word.startswith("/") else f"/{word}" for word in words))
     for target in targets:

@@ -19,7 +19,7 @@ from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.governance_file import covers, governance_stands
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.settings import Settings
+from keystore.disk.settings import KeystoreSettings
 from keystore.disk.store import Content, Store
 from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
@@ -68,8 +68,8 @@ class CreateOptions:
     now: datetime | None = None
 
     @property
-    def settings(self) -> Settings:
-        return Settings(self.subjects, self.curve, self.lifetime)
+    def settings(self) -> KeystoreSettings:
+        return KeystoreSettings(self.subjects, self.curve, self.lifetime)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, Interface
+from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
 from nodl.graph.quality import Quality
 from nodl.graph.seen import SeenEndpoint, SeenParticipant
 from nodl.node_interface import EndpointKind
@@ -52,7 +52,7 @@ def _process(process: GraphProcess) -> dict[str, Any]:
     }
 
 
-def _interface(interface: Interface) -> dict[str, Any]:
+def _interface(interface: SeenInterface) -> dict[str, Any]:
     return {
         "kind": interface.kind.value,
         "name": interface.name,
@@ -84,8 +84,8 @@ def _read_process(fields: Mapping[str, Any]) -> GraphProcess:
     )
 
 
-def _read_interface(fields: Mapping[str, Any]) -> Interface:
-    return Interface(
+def _read_interface(fields: Mapping[str, Any]) -> SeenInterface:
+    return SeenInterface(
         EndpointKind(fields["kind"]),
         str(fields["name"]),
         str(fields["type"]),

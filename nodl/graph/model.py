@@ -43,7 +43,7 @@ class Owner(NamedTuple):
     ordinal: int = 0
 
 
-class Interface(NamedTuple):
+class SeenInterface(NamedTuple):
     """One ROS endpoint of a node. ``missing``: the DDS endpoints of it that were not seen (yet): it is half open."""
 
     kind: EndpointKind
@@ -62,7 +62,7 @@ class GraphNode(NamedTuple):
     """One node under its final name."""
 
     fqn: str
-    interfaces: tuple[Interface, ...]
+    interfaces: tuple[SeenInterface, ...]
     ordinal: int = 0
 
 
@@ -73,14 +73,14 @@ class GraphProcess(NamedTuple):
 
     participant: SeenParticipant
     nodes: tuple[GraphNode, ...] = ()
-    unowned: tuple[Interface, ...] = ()
+    unowned: tuple[SeenInterface, ...] = ()
     foreign: tuple[SeenEndpoint, ...] = ()
     listed: bool = False
     gid_size: int = 0
     announced: bool = False
 
     @property
-    def interfaces(self) -> Iterator[Interface]:
+    def interfaces(self) -> Iterator[SeenInterface]:
         for node in self.nodes:
             yield from node.interfaces
         yield from self.unowned
@@ -203,7 +203,7 @@ def _named_by_parameter_services(parts: Iterable[tuple[SeenEndpoint, Part]]) -> 
 
 def _interfaces(
     group: Iterable[tuple[SeenEndpoint, Part]], by: Mapping[str, Attribution]
-) -> tuple[Interface, ...]:
+) -> tuple[SeenInterface, ...]:
     found: dict[tuple[EndpointKind, str], list[tuple[SeenEndpoint, Part]]] = {}
     for endpoint, part in group:
         found.setdefault((part.kind, part.name), []).append((endpoint, part))
@@ -220,7 +220,7 @@ def _joined(
     name: str,
     members: Sequence[tuple[SeenEndpoint, Part]],
     by: Mapping[str, Attribution],
-) -> Iterator[Interface]:
+) -> Iterator[SeenInterface]:
     """The parts of one name; the topics of an action without any of its services are topics (``ros2 topic echo``)."""
     if kind in _ACTIONS and all(part.part in ACTION_TOPICS for _, part in members):
         for endpoint, part in members:
@@ -229,12 +229,12 @@ def _joined(
             )
             type_name = topic.type if topic else endpoint.type
             full = f"{name}/_action/{part.part}"
-            yield Interface(_AS_TOPICS[kind], full, type_name, (endpoint,), (), by[endpoint.guid])
+            yield SeenInterface(_AS_TOPICS[kind], full, type_name, (endpoint,), (), by[endpoint.guid])
         return
     for type_name, same in _by_type(members).items():
         endpoints = tuple(endpoint for endpoint, _ in same)
         missing = tuple(sorted(PARTS[kind] - {part.part for _, part in same}))
-        yield Interface(kind, name, type_name, endpoints, missing, by[endpoints[0].guid])
+        yield SeenInterface(kind, name, type_name, endpoints, missing, by[endpoints[0].guid])
 
 
 def _by_type(

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from nodl.errors import NoDLError
 from nodl.graph.json_form import NotAGraph, graph_document, graph_from_document
 from nodl.graph.model import Graph, GraphProcess
-from nodl.graph.starts import Start
-from nodl.record.lines import Run
+from nodl.graph.starts import StartedNode
+from nodl.record.lines import RecordedRun
 
 
 class ObservationError(NoDLError):
@@ -23,10 +23,10 @@ class Observed(NamedTuple):
     """``commands``: command lines by participant, of processes on the observer's machine. ``starts``: those of a launch
     file, where one was given."""
 
-    run: Run
+    run: RecordedRun
     graph: Graph
     commands: Mapping[str, tuple[str, ...]] = MappingProxyType({})
-    starts: tuple[Start, ...] = ()
+    starts: tuple[StartedNode, ...] = ()
 
 
 def observed_text(observed: Observed) -> str:
@@ -45,7 +45,7 @@ def read_observed(path: Path) -> Observed:
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         return Observed(
-            Run(**document["run"]),
+            RecordedRun(**document["run"]),
             graph_from_document(document["graph"]),
             {str(guid): tuple(map(str, words)) for guid, words in document["commands"].items()},
             tuple(map(_start, document["starts"])),
@@ -54,9 +54,9 @@ def read_observed(path: Path) -> Observed:
         raise ObservationError(f"{path} is not what secure-nodl observe --save wrote: {error}") from error
 
 
-def _start(fields: Mapping[str, Any]) -> Start:
+def _start(fields: Mapping[str, Any]) -> StartedNode:
     lists = {name: tuple(map(str, fields[name])) for name in ("command", "rule_texts", "arguments")}
-    return Start(**{**fields, **lists, "parameters": dict(fields["parameters"])})
+    return StartedNode(**{**fields, **lists, "parameters": dict(fields["parameters"])})
 
 
 def command_lines(graph: Graph, host: str) -> dict[str, tuple[str, ...]]:

@@ -12,7 +12,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, Interface
+from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
 from nodl.graph.quality import INFINITE, Quality
 from nodl.graph.seen import SeenEndpoint, SeenParticipant
 from nodl.names import join
@@ -85,14 +85,14 @@ class RclpyObserver:
                 participant, tuple(sorted(members)), listed=True, gid_size=_GUID, announced=True
             )
 
-    def _interfaces(self, name: str, namespace: str, fqn: str) -> Iterator[Interface]:
+    def _interfaces(self, name: str, namespace: str, fqn: str) -> Iterator[SeenInterface]:
         for kind, ask in self._questions().items():
             for final, types in _asked(ask, name, namespace):
                 if "/_action/" in final and kind not in _ACTIONS:
                     continue
                 endpoints = tuple(self._endpoints(kind, final, fqn)) if kind in _TOPICS else ()
                 for type_name in types:
-                    yield Interface(kind, final, type_name, endpoints, (), Attribution.LIST)
+                    yield SeenInterface(kind, final, type_name, endpoints, (), Attribution.LIST)
 
     def _questions(self) -> Mapping[EndpointKind, Any]:
         from rclpy.action import graph

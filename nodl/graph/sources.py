@@ -10,16 +10,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
-from nodl.builtin_interfaces import DISTROS, Condition, built_in_interfaces
+from nodl.builtin_interfaces import DISTROS, BuiltinCondition, built_in_interfaces
 from nodl.graph.inverse import written_names
-from nodl.graph.model import GraphNode, Interface
+from nodl.graph.model import GraphNode, SeenInterface
 from nodl.graph.observation import Observed
-from nodl.graph.starts import Start, start_for, start_of_command
+from nodl.graph.starts import StartedNode, start_for, start_of_command
 from nodl.names import split_fqn
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.asked import Asked, AskedNode
 from nodl.record.learning import OBSERVED, Learnt, learn_from
-from nodl.record.lines import Run
+from nodl.record.lines import RecordedRun
 from nodl.record.origins import arguments_as_inputs
 from nodl.record.written import final_names
 
@@ -39,9 +39,9 @@ class LearntFromGraph(NamedTuple):
 class _Placed(NamedTuple):
     """One node in one run, with the start it is explained by."""
 
-    run: Run
+    run: RecordedRun
     node: GraphNode
-    start: Start
+    start: StartedNode
     ends: frozenset[tuple[EndpointKind, str]]
 
 
@@ -49,7 +49,7 @@ def learn_observed(runs: Sequence[Observed]) -> LearntFromGraph:
     """All ``runs`` together; their order does not matter."""
     left_out: list[str] = []
     placed = [each for observed in runs for each in _placed(observed, left_out)]
-    by_run: dict[str, tuple[Run, list[AskedNode]]] = {}
+    by_run: dict[str, tuple[RecordedRun, list[AskedNode]]] = {}
     for each in placed:
         others = [other for other in placed if _same_program(each, other)]
         _, nodes = by_run.setdefault(each.run.id, (each.run, []))
@@ -140,11 +140,11 @@ def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> A
     )
 
 
-def _shown(placed: _Placed, interface: Interface) -> str:
+def _shown(placed: _Placed, interface: SeenInterface) -> str:
     return f"{placed.node.fqn}: {interface.kind.value} {interface.name}"
 
 
-def _endpoint(interface: Interface, placed: _Placed, others: Sequence[_Placed]) -> Asked:
+def _endpoint(interface: SeenInterface, placed: _Placed, others: Sequence[_Placed]) -> Asked:
     fqn = placed.node.fqn
     found = written_names(interface.kind, interface.name, fqn, placed.start.rules)
     given = _values(placed.start)
@@ -170,7 +170,7 @@ def _left(kind: EndpointKind, candidates: Sequence[str], runs: Sequence[_Placed]
     return (each for each in candidates if explained[each] == most)
 
 
-def _values(start: Start) -> set[object]:
+def _values(start: StartedNode) -> set[object]:
     """All texts that the start gives: names may be any of them."""
     found: set[object] = set()
     for value in (*start.parameters.values(), *arguments_as_inputs(start.arguments).values()):
@@ -182,12 +182,12 @@ class _BuiltIn:
     """What every node has, and every one of its sort, under the final names of this one."""
 
     _SORTS = (
-        Condition.ALWAYS,
-        Condition.PARAMETERS,
-        Condition.TYPE_DESCRIPTION,
-        Condition.LIFECYCLE,
-        Condition.CONTAINER,
-        Condition.LOGGER_SERVICES,
+        BuiltinCondition.ALWAYS,
+        BuiltinCondition.PARAMETERS,
+        BuiltinCondition.TYPE_DESCRIPTION,
+        BuiltinCondition.LIFECYCLE,
+        BuiltinCondition.CONTAINER,
+        BuiltinCondition.LOGGER_SERVICES,
     )
 
     def __init__(self, node: GraphNode) -> None:
@@ -195,21 +195,21 @@ class _BuiltIn:
         self._rows = {(row.kind, row.name.replace("~", node.fqn, 1), row.type): row.condition for row in rows}
         self._there = {self._rows[key] for each in node.interfaces if (key := _key(each)) in self._rows}
 
-    def has(self, interface: Interface) -> bool:
+    def has(self, interface: SeenInterface) -> bool:
         return _key(interface) in self._rows
 
     @property
     def lifecycle(self) -> bool:
-        return Condition.LIFECYCLE in self._there
+        return BuiltinCondition.LIFECYCLE in self._there
 
     @property
     def logger_services(self) -> bool:
-        return Condition.LOGGER_SERVICES in self._there
+        return BuiltinCondition.LOGGER_SERVICES in self._there
 
     @property
     def container(self) -> bool:
-        return Condition.CONTAINER in self._there
+        return BuiltinCondition.CONTAINER in self._there
 
 
-def _key(interface: Interface) -> tuple[EndpointKind, str, str]:
+def _key(interface: SeenInterface) -> tuple[EndpointKind, str, str]:
     return interface.kind, interface.name, interface.type

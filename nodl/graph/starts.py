@@ -17,7 +17,7 @@ _UNSPECIFIED = "<node_name_unspecified>"
 _NO_NAMESPACE = "<node_namespace_unspecified>"
 
 
-class Start(NamedTuple):
+class StartedNode(NamedTuple):
     """What is known of how a node was started. ``fqn`` is empty where the launch file gives no name; ``command`` where
     it is a component, whose rules are those of the load request."""
 
@@ -42,7 +42,7 @@ class Start(NamedTuple):
         return RemapRules(local=parsed) if self.plugin else RemapRules(process=parsed)
 
 
-def start_of_command(command: Sequence[str]) -> Start | None:
+def start_of_command(command: Sequence[str]) -> StartedNode | None:
     """Of a running process, by its command line; ``None`` for what is not a program of an ament package."""
     place = next((i for i, word in enumerate(command[:3]) if _IN_PREFIX.match(word)), None)
     if place is None:
@@ -50,7 +50,7 @@ def start_of_command(command: Sequence[str]) -> Start | None:
     match = _IN_PREFIX.match(command[place])
     assert match is not None
     rules, parameters, arguments = _ros_words(command[place + 1 :])
-    return Start(
+    return StartedNode(
         match[1],
         match[2],
         command=tuple(command),
@@ -60,12 +60,12 @@ def start_of_command(command: Sequence[str]) -> Start | None:
     )
 
 
-def starts_of_plan(document: Mapping[str, Any]) -> tuple[Start, ...]:
+def starts_of_plan(document: Mapping[str, Any]) -> tuple[StartedNode, ...]:
     """What a launch file starts. Raises ``KeyError`` or ``TypeError`` for a document that is not a plan."""
     return (*map(_of_process, document["processes"]), *map(_of_component, document["components"]))
 
 
-def start_for(fqn: str, command: Sequence[str], starts: Iterable[Start]) -> tuple[Start, ...]:
+def start_for(fqn: str, command: Sequence[str], starts: Iterable[StartedNode]) -> tuple[StartedNode, ...]:
     """The starts that may be those of the node ``fqn`` in the process of ``command`` (empty: not known); several when
     nothing tells them apart."""
     known = [each for each in starts if not each.command or not command or _within(each.command, command)]
@@ -89,12 +89,12 @@ def _within(planned: tuple[str, ...], running: Sequence[str]) -> bool:
     return any(tuple(running[i : i + size]) == planned for i in range(min(4, len(running) - size + 1)))
 
 
-def _of_process(fields: Mapping[str, Any]) -> Start:
+def _of_process(fields: Mapping[str, Any]) -> StartedNode:
     command = tuple(map(str, fields["cmd"]))
     program = next((i for i, word in enumerate(command) if word.endswith(str(fields["executable"]))), 0)
     rules, _, arguments = _ros_words(command[program + 1 :])
     fqn = str(fields["fqn"] or "").replace(_NO_NAMESPACE, "")
-    return Start(
+    return StartedNode(
         str(fields["package"] or ""),
         str(fields["executable"]).rpartition("/")[2],
         fqn="" if _UNSPECIFIED in fqn else fqn,
@@ -106,14 +106,14 @@ def _of_process(fields: Mapping[str, Any]) -> Start:
     )
 
 
-def _of_component(fields: Mapping[str, Any]) -> Start:
+def _of_component(fields: Mapping[str, Any]) -> StartedNode:
     fqn = str(fields["fqn"]).replace(_NO_NAMESPACE, "")
     named = _UNSPECIFIED not in fqn
     namespace, _, name = fqn.rpartition("/")
     rules = [f"{source}:={target}" for source, target in fields["remaps"]]
     rules += [f"__node:={name}"] if named else []
     rules += [f"__ns:={namespace}"] if namespace else []
-    return Start(
+    return StartedNode(
         str(fields["package"]),
         plugin=str(fields["plugin"]),
         fqn=fqn if named else "",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from nodl.graph.model import Attribution, Graph, GraphProcess, Interface
+from nodl.graph.model import Attribution, Graph, GraphProcess, SeenInterface
 
 
 def graph_text(graph: Graph) -> str:
@@ -40,7 +40,7 @@ def _process(process: GraphProcess) -> Iterator[str]:
         yield f"  not ROS: {verb} {endpoint.topic} [{endpoint.type}]"
 
 
-def _interface(interface: Interface) -> str:
+def _interface(interface: SeenInterface) -> str:
     words = [f"{interface.kind.value.replace('_', ' ')} {interface.name} [{interface.type}]"]
     qualities = sorted({(e.quality.reliability, e.quality.durability) for e in interface.endpoints})
     if interface.kind.value in ("publisher", "subscription") and qualities:

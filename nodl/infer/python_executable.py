@@ -18,7 +18,8 @@ from nodl.infer.analysis import start, start_function
 from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.program import Program
-from nodl.infer.results import Origin, interfaces_of
+from nodl.infer.results import interfaces_of
+from nodl.infer.start import LaunchKey
 from nodl.infer.system import without_collector
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
@@ -41,7 +42,7 @@ def infer_python(
     finder = _Finder(prefixes)
     with without_collector():
         run = finder.run(path, package, executable)
-        interfaces = interfaces_of(run.findings, Origin(package, executable))
+        interfaces = interfaces_of(run.findings, LaunchKey(package, executable))
         for gap in unsettled_places(run):
             run.findings.gap(gap.source, gap.why)
     if interfaces:

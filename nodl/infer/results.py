@@ -6,10 +6,10 @@ Parameters stay symbolic, with what the code declares as their default; launch f
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
 from nodl.infer.models.ros_arguments import ros_arguments
+from nodl.infer.start import LaunchKey
 from nodl.infer.text import Hole, Input, NodePart, Piece, Text
 from nodl.infer.values import Sequence, Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
@@ -20,16 +20,7 @@ from nodl.remap import InvalidRemapRuleError, RemapKind, RemapRules, parse_rule
 MAX_ALTERNATIVES = 16
 
 
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """Under which key launch starts the nodes of a run."""
-
-    package: str | None = None
-    executable: str | None = None
-    plugin: str | None = None
-
-
-def interfaces_of(findings: Findings, origin: Origin) -> list[NodeInterface]:
+def interfaces_of(findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
     """One interface for each node (and each name it may have), in the order they were found."""
     interfaces: list[NodeInterface] = []
     for record in findings.nodes:
@@ -55,7 +46,7 @@ def _united(interfaces: list[NodeInterface]) -> list[NodeInterface]:
     return list(united.values())
 
 
-def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: Origin) -> list[NodeInterface]:
+def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
     rules, gaps = _rules(record, findings)
     note = f"the program reads {', '.join(findings.files)}" if findings.files else ""
     endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found, note)))

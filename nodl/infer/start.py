@@ -3,7 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Protocol
+
+
+@dataclass(frozen=True)
+class LaunchKey:
+    """Under which name launch starts a program."""
+
+    package: str | None = None
+    executable: str | None = None
+    plugin: str | None = None
 
 
 class Start(Protocol):

@@ -18,7 +18,7 @@ Alternative = Callable[[], bool]  # runs one branch; tells whether its end can b
 Written = dict[tuple[int, object], tuple[Cells, object, Value]]  # by cell: its value at the end of a branch
 
 
-class State:
+class ProgramState:
     def __init__(self) -> None:
         self._trail: list[tuple[Cells, object, Value | None]] = []
         self._stamps = itertools.count(1)

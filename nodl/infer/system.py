@@ -16,7 +16,8 @@ from nodl.infer.coverage import may_make_interfaces, unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.packages import EntryPoint, Package, find_package
 from nodl.infer.program import Program
-from nodl.infer.results import Origin, interfaces_of
+from nodl.infer.results import interfaces_of
+from nodl.infer.start import LaunchKey
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
@@ -84,14 +85,14 @@ def _distinct(nodes: list[NodeInterface]) -> tuple[NodeInterface, ...]:
     return tuple(dict.fromkeys(nodes))
 
 
-def _runs(program: Program, file: str) -> Iterator[tuple[Run, Origin]]:
+def _runs(program: Program, file: str) -> Iterator[tuple[Run, LaunchKey]]:
     module = program.load(file)
     if not may_make_interfaces(program, module):
         return
     package = find_package(file)
     entries = package.entry_points_of(module.name) if package else []
     functions = [entry.function for entry in entries]
-    origin = Origin(package.name if package else None, _executable(entries, file, package))
+    origin = LaunchKey(package.name if package else None, _executable(entries, file, package))
     yield start(program, module, functions), origin
 
 

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
-    from nodl.library.check import Verdict
+    from nodl.library.check import LibraryVerdict
 
 FILE = "agreement.json"
 
@@ -33,7 +33,7 @@ def read_agreements(folder: str) -> dict[str, Agreement]:
         return {stem: Agreement(*pair) for stem, pair in json.load(stream).items()}
 
 
-def keep_agreements(folder: str, verdicts: Iterable[Verdict], stems: Iterable[str]) -> None:
+def keep_agreements(folder: str, verdicts: Iterable[LibraryVerdict], stems: Iterable[str]) -> None:
     """Write ``verdicts`` over what stood there; a document that is gone, not one of ``stems``, loses its line."""
     known: Mapping[str, Agreement] = {**read_agreements(folder), **dict(map(_kept, verdicts))}
     lines = (f"  {json.dumps(stem)}: {json.dumps(list(known[stem]))}" for stem in sorted({*stems} & {*known}))
@@ -41,5 +41,5 @@ def keep_agreements(folder: str, verdicts: Iterable[Verdict], stems: Iterable[st
         stream.write("{\n" + ",\n".join(lines) + "\n}\n")
 
 
-def _kept(verdict: Verdict) -> tuple[str, Agreement]:
+def _kept(verdict: LibraryVerdict) -> tuple[str, Agreement]:
     return verdict.document.stem, Agreement(verdict.in_short, verdict.version or "")

@@ -21,7 +21,7 @@ _BUILT_IN = frozenset(("clock", "parameter_events", "rosout"))
 _MOST = 10_000
 
 
-class Verdict(NamedTuple):
+class LibraryVerdict(NamedTuple):
     """``only_document`` and ``only_source``: names that the other side does not have; ``not_compared``: why there was
     nothing to compare with. ``version``: of the package whose source was read."""
 
@@ -62,14 +62,14 @@ class Verdict(NamedTuple):
         return "\n".join(lines)
 
 
-def check(library: Library, folder: str) -> list[Verdict]:
+def check(library: Library, folder: str) -> list[LibraryVerdict]:
     """One verdict for each document whose package is below ``folder``. Raises ``FileNotFoundError``."""
     from nodl.infer.system import infer_paths
 
     if not os.path.isdir(folder):
         raise FileNotFoundError(2, "no such directory", folder)
     packages = dict(_packages(folder))
-    verdicts: list[Verdict] = []
+    verdicts: list[LibraryVerdict] = []
     inferred: dict[str, tuple[NodeInterface, ...]] = {}
     for document in library.documents():
         source = packages.get(document.package)
@@ -78,7 +78,9 @@ def check(library: Library, folder: str) -> list[Verdict]:
         version = package_file_version(os.path.join(source, "package.xml"))
         if not fits(document.versions, "", version):
             reason = f"these sources are of version {version}"
-            verdicts.append(Verdict(document, not_compared=reason, version=version, of_other_version=True))
+            verdicts.append(
+                LibraryVerdict(document, not_compared=reason, version=version, of_other_version=True)
+            )
             continue
         if document.package not in inferred:
             inferred[document.package] = infer_paths([source]).nodes
@@ -86,14 +88,14 @@ def check(library: Library, folder: str) -> list[Verdict]:
     return verdicts
 
 
-def compare(document: LibraryDocument, nodes: Iterable[NodeInterface], library: Library) -> Verdict:
+def compare(document: LibraryDocument, nodes: Iterable[NodeInterface], library: Library) -> LibraryVerdict:
     """``document`` with what inference found in its package; what its default plugins and further nodes have, which
     ``library`` describes, may be found too."""
     if document.classes or document.transport:
-        return Verdict(document, not_compared="a plugin, whose node is made by those who load it")
+        return LibraryVerdict(document, not_compared="a plugin, whose node is made by those who load it")
     same = [node for node in nodes if _is_same(document, node)]
     if not same:
-        return Verdict(document, not_compared="inference found no such node in the sources")
+        return LibraryVerdict(document, not_compared="inference found no such node in the sources")
     theirs = {(e.kind, _key(e.name.text)) for node in same for e in node.endpoints if _is_known(e)}
     unknown = any("*" in e.name.text for node in same for e in node.endpoints)
     ours = {(e.kind, _key(e.name.text)) for e in document.interface.endpoints}
@@ -101,7 +103,7 @@ def compare(document: LibraryDocument, nodes: Iterable[NodeInterface], library: 
     varied = {(kind, _key(name)) for kind, name in depends.variations} if depends else set()
     only_document = () if unknown else _shown(ours - theirs - varied)
     brought = _brought(document.interface, library)
-    return Verdict(document, only_document, _shown(theirs - ours - brought))
+    return LibraryVerdict(document, only_document, _shown(theirs - ours - brought))
 
 
 def _is_same(document: LibraryDocument, node: NodeInterface) -> bool:

@@ -36,7 +36,7 @@ _INTROSPECTION = "/_service_event"
 _FIRST_PART = "/_action/send_goal"
 
 
-class Role(Enum):
+class EndpointRole(Enum):
     """Why an endpoint is there."""
 
     OWN = "asked for by the program"
@@ -115,35 +115,35 @@ class AskedNode(NamedTuple):
         return f"{self.package}/{self.plugin or self.executable}"
 
 
-def role_of(endpoint: EndpointMade) -> Role:
+def role_of(endpoint: EndpointMade) -> EndpointRole:
     """Why ``endpoint`` is there."""
     by, kind, final = endpoint.by, endpoint.kind, endpoint.final or endpoint.written
     if by == "librcl.so":
-        return Role.INTROSPECTION if final.endswith(_INTROSPECTION) else Role.BUILT_IN
+        return EndpointRole.INTROSPECTION if final.endswith(_INTROSPECTION) else EndpointRole.BUILT_IN
     if by == "librcl_lifecycle.so":
-        return Role.LIFECYCLE
+        return EndpointRole.LIFECYCLE
     if by == "librcl_action.so":
         own = kind in _ACTIONS
-        return Role.REPEATED if own else Role.PART_OF_ACTION
+        return EndpointRole.REPEATED if own else EndpointRole.PART_OF_ACTION
     if kind is EndpointKind.SERVICE_SERVER:
         return _role_of_server(endpoint)
     if endpoint.written == "/parameter_events" and endpoint.type in ("", "rcl_interfaces/msg/ParameterEvent"):
         published = kind is EndpointKind.PUBLISHER
-        return Role.BUILT_IN if published or not _is_rclpy(by) else Role.OWN
-    return Role.OWN
+        return EndpointRole.BUILT_IN if published or not _is_rclpy(by) else EndpointRole.OWN
+    return EndpointRole.OWN
 
 
-def _role_of_server(endpoint: EndpointMade) -> Role:
+def _role_of_server(endpoint: EndpointMade) -> EndpointRole:
     if endpoint.written.startswith("~/_container/"):
-        return Role.CONTAINER
+        return EndpointRole.CONTAINER
     _, slash, last = endpoint.written.rpartition("/")
     own_name = endpoint.fqn.rpartition("/")[2]
     mine = slash and endpoint.written in (f"{own_name}/{last}", f"{endpoint.fqn}/{last}")
     if not mine or not (endpoint.type == "" or endpoint.type.startswith("rcl_interfaces/")):
-        return Role.OWN
+        return EndpointRole.OWN
     if last in _PARAMETER_SERVICES:
-        return Role.BUILT_IN
-    return Role.LOGGER_SERVICE if last in LOGGER_SERVICES else Role.OWN
+        return EndpointRole.BUILT_IN
+    return EndpointRole.LOGGER_SERVICE if last in LOGGER_SERVICES else EndpointRole.OWN
 
 
 def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
@@ -163,15 +163,15 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
         namespace=_namespace(made.namespace if made else ""),
         fqn=node.fqn,
         library=_library(node),
-        lifecycle=Role.LIFECYCLE in roles,
+        lifecycle=EndpointRole.LIFECYCLE in roles,
         states=tuple(node.states),
         endpoints=endpoints,
         parameters=origin.parameters if origin else {},
         arguments=started.arguments if started and not component else (),
         rules=rules,
         known_start=started is not None,
-        logger_services=Role.LOGGER_SERVICE in roles,
-        container=Role.CONTAINER in roles,
+        logger_services=EndpointRole.LOGGER_SERVICE in roles,
+        container=EndpointRole.CONTAINER in roles,
         process=started.process if started else str(process.pid),
         location=origin.location if origin else "",
         started_as="component" if component else (started.kind if started else ""),
@@ -182,12 +182,14 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
 def asked_endpoint(process: RecordedProcess, node: RecordedNode, endpoint: EndpointMade) -> Asked | None:
     """``endpoint`` of ``node`` by itself, as it comes in; whoever made it. ``None`` for what is only a part of an
     action, or rcl's call of itself."""
-    if role_of(endpoint) in (Role.PART_OF_ACTION, Role.REPEATED):
+    if role_of(endpoint) in (EndpointRole.PART_OF_ACTION, EndpointRole.REPEATED):
         return None
     final = endpoint.final
     if endpoint.kind in _ACTIONS:
         before = node.endpoints[: _place(node, endpoint)]
-        final = _action_name([each for each in before if role_of(each) is Role.PART_OF_ACTION], endpoint)
+        final = _action_name(
+            [each for each in before if role_of(each) is EndpointRole.PART_OF_ACTION], endpoint
+        )
     rules = _rules(process.started, node.component) if process.started else None
     return _own(endpoint, final, node.fqn or endpoint.fqn, rules, set())
 
@@ -229,17 +231,17 @@ def _parsed(texts: Iterable[str]) -> tuple[ParsedRule, ...]:
     return tuple(rules)
 
 
-def _asked(node: RecordedNode, roles: list[Role], rules: RemapRules | None) -> Iterable[Asked]:
+def _asked(node: RecordedNode, roles: list[EndpointRole], rules: RemapRules | None) -> Iterable[Asked]:
     introspected = {
         endpoint.final.removesuffix(_INTROSPECTION)
         for endpoint, role in zip(node.endpoints, roles, strict=True)
-        if role is Role.INTROSPECTION
+        if role is EndpointRole.INTROSPECTION
     }
     parts: list[EndpointMade] = []
     for endpoint, role in zip(node.endpoints, roles, strict=True):
-        if role is Role.PART_OF_ACTION:
+        if role is EndpointRole.PART_OF_ACTION:
             parts.append(endpoint)
-        elif role is Role.OWN:
+        elif role is EndpointRole.OWN:
             is_action = endpoint.kind in _ACTIONS
             final = _action_name(parts, endpoint) if is_action else endpoint.final
             yield _own(endpoint, final, node.fqn, rules, introspected)

@@ -24,7 +24,7 @@ from nodl.record.lines import (
     NodeEnded,
     NodeMade,
     ParametersDeclared,
-    Run,
+    RecordedRun,
     StartedProcess,
     StateEntered,
     read_lines,
@@ -70,7 +70,7 @@ class Record:
     """Takes lines one by one, as they come, and answers at any time."""
 
     def __init__(self, lines: Iterable[Line] = (), complaints: Sequence[Complaint] = ()) -> None:
-        self.run = Run("")
+        self.run = RecordedRun("")
         self.components: list[LoadedComponent] = []
         self.complaints = list(complaints)
         self.processes: list[RecordedProcess] = []
@@ -89,7 +89,7 @@ class Record:
         if isinstance(line, Loaded):
             self._loaded[line.pid] = line
             self._begin(line.pid, line)
-        elif isinstance(line, Run):
+        elif isinstance(line, RecordedRun):
             self.run = line
         elif isinstance(line, StartedProcess):
             self._started[line.pid] = line

@@ -13,13 +13,13 @@ from typing import NamedTuple
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.asked import Asked, AskedNode, all_asked
 from nodl.record.assembly import Record
-from nodl.record.lines import Run
+from nodl.record.lines import RecordedRun
 from nodl.record.origins import (
     FIXED,
     MARKER,
     Name,
+    NameOrigin,
     Observation,
-    Origin,
     arguments_as_inputs,
     origins_of,
 )
@@ -42,7 +42,7 @@ _UNKNOWN_TYPES = {
 }
 
 
-class Entry(NamedTuple):
+class LearntEndpoint(NamedTuple):
     """One name of a node. ``written`` where the manifest cannot hold it as a plain name; ``moved``: rules of the
     program itself made it of what the source writes, so that it is held as the final name; ``spellings``: what else the
     source may write, as far as the runs can tell."""
@@ -52,7 +52,7 @@ class Entry(NamedTuple):
     type: str
     qos: tuple[int, ...]
     runs: tuple[str, ...]
-    origin: Origin = FIXED
+    origin: NameOrigin = FIXED
     introspected: bool = False
     moved_from: str = ""
     spellings: tuple[str, ...] = ()
@@ -78,8 +78,8 @@ class LearntNode(NamedTuple):
     library: ClientLibrary
     lifecycle: bool
     logger_services: bool
-    entries: tuple[Entry, ...]
-    runs: tuple[Run, ...]
+    entries: tuple[LearntEndpoint, ...]
+    runs: tuple[RecordedRun, ...]
     incomplete: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     random_name: bool = False
@@ -99,7 +99,7 @@ class Learnt(NamedTuple):
 
 class _Seen(NamedTuple):
     node: AskedNode
-    run: Run
+    run: RecordedRun
 
 
 def learn(records: Iterable[Record]) -> Learnt:
@@ -107,7 +107,7 @@ def learn(records: Iterable[Record]) -> Learnt:
     return learn_from((record.run, all_asked(record.attributed())) for record in records)
 
 
-def learn_from(runs: Iterable[tuple[Run, Sequence[AskedNode]]]) -> Learnt:
+def learn_from(runs: Iterable[tuple[RecordedRun, Sequence[AskedNode]]]) -> Learnt:
     """The same for runs whose nodes are known otherwise: by observing the graph."""
     groups: dict[ProgramKey, list[_Seen]] = {}
     listeners: set[ProgramKey] = set()
@@ -180,7 +180,7 @@ def _missing(lifecycle: bool, seen: Sequence[_Seen]) -> Iterable[str]:
         yield "a lifecycle node that was never active: what it makes when it is activated is not known"
 
 
-def _notes(entries: Iterable[Entry], seen: Sequence[_Seen]) -> Iterable[str]:
+def _notes(entries: Iterable[LearntEndpoint], seen: Sequence[_Seen]) -> Iterable[str]:
     for entry in entries:
         if entry.origin.undecided:
             said = ", ".join(map(str, entry.origin.candidates))
@@ -195,7 +195,7 @@ def _notes(entries: Iterable[Entry], seen: Sequence[_Seen]) -> Iterable[str]:
         yield f"{written!r} was asked for and is not a valid name (rcl's error {rc}): a bug of the program"
 
 
-def _entries(seen: Sequence[_Seen]) -> Iterable[Entry]:
+def _entries(seen: Sequence[_Seen]) -> Iterable[LearntEndpoint]:
     observations = [observation_of(each.node, each.run.id) for each in seen]
     origins = origins_of(observations)
     done: set[object] = set()
@@ -211,13 +211,13 @@ def _entries(seen: Sequence[_Seen]) -> Iterable[Entry]:
         yield _entry(name, origin._replace(proven=proven), {name, *same}, seen)
 
 
-def _entry(name: Name, origin: Origin, names: set[Name], seen: Sequence[_Seen]) -> Entry:
+def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_Seen]) -> LearntEndpoint:
     askers = [(asked, each.run.id) for each in seen for asked in each.node.endpoints if _name(asked) in names]
     runs = tuple(dict.fromkeys(run for _, run in askers))
     first = next(asked for asked, _ in askers if _name(asked) == name)
     introspected = any(asked.introspected for asked, _ in askers)
     moved_from = first.written if first.moved else ""
-    return Entry(
+    return LearntEndpoint(
         name.kind,
         name.name,
         name.type or _UNKNOWN_TYPES[name.kind],

@@ -112,7 +112,7 @@ class Ended(NamedTuple):
     at: int
 
 
-class Run(NamedTuple):
+class RecordedRun(NamedTuple):
     """What was run, said once by the supervisor; ``id`` differs for each run."""
 
     id: str
@@ -162,7 +162,7 @@ Line = (
     | ParametersDeclared
     | EndpointMade
     | Ended
-    | Run
+    | RecordedRun
     | StartedProcess
     | LoadedComponent
 )
@@ -252,9 +252,9 @@ def read_lines(text: bytes) -> tuple[list[Line], list[Complaint]]:
     return lines, reader.complaints
 
 
-def line_text(line: Run | StartedProcess | LoadedComponent) -> bytes:
+def line_text(line: RecordedRun | StartedProcess | LoadedComponent) -> bytes:
     """A line of the supervisor, ready to be appended."""
-    what = {Run: "run", StartedProcess: "process", LoadedComponent: "component"}[type(line)]
+    what = {RecordedRun: "run", StartedProcess: "process", LoadedComponent: "component"}[type(line)]
     fields = {name: dict(v) if isinstance(v, Mapping) else v for name, v in line._asdict().items()}
     text = json.dumps({"what": what, **fields}, ensure_ascii=True, default=_plain)
     return text.encode() + b"\n"
@@ -319,8 +319,8 @@ def _node(f: Mapping[str, Any]) -> NodeMade:
     )
 
 
-def _run(f: Mapping[str, Any]) -> Run:
-    return Run(
+def _run(f: Mapping[str, Any]) -> RecordedRun:
+    return RecordedRun(
         _str(f, "id"),
         _str(f, "launch_file"),
         _str(f, "distro"),

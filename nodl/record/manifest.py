@@ -14,7 +14,7 @@ from typing import Any
 from nodl.document.v2_schema import NAME_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.node_interface import ClientLibrary, EndpointKind
-from nodl.record.learning import Entry, LearntNode
+from nodl.record.learning import LearntEndpoint, LearntNode
 
 _HEAD = "# Learnt by secure-launch --learn from what the node asked of librcl; see docs/recording.md.\n"
 _LISTS = {kind: category for category, kind in CATEGORIES.items()}
@@ -92,14 +92,14 @@ def _run(fields: Mapping[str, Any]) -> dict[str, Any]:
     return {name: value for name, value in fields.items() if value}
 
 
-def _entry(entry: Entry) -> dict[str, Any]:
+def _entry(entry: LearntEndpoint) -> dict[str, Any]:
     fields: dict[str, Any] = {"name": _plain_name(entry), "type": entry.type}
     if entry.kind in _TOPICS:
         fields["qos"] = _quality(entry.qos)
     return fields
 
 
-def _plain_name(entry: Entry) -> str:
+def _plain_name(entry: LearntEndpoint) -> str:
     """What NoDL v2 lets a name be; ``written`` in our section has the source's where that is something else."""
     if re.search(NAME_PATTERN, entry.name):
         return entry.name
@@ -116,7 +116,7 @@ def _quality(qos: tuple[int, ...]) -> dict[str, Any]:
     return fields
 
 
-def _about(entry: Entry) -> dict[str, Any]:
+def _about(entry: LearntEndpoint) -> dict[str, Any]:
     """What the standard entry cannot say."""
     name, origin = _plain_name(entry), entry.origin
     fields: dict[str, Any] = {"in": _LISTS[entry.kind], "name": name}

@@ -65,7 +65,7 @@ class Source(NamedTuple):
         return f"{value} and {self.suffix}" if self.suffix else value
 
 
-class Origin(NamedTuple):
+class NameOrigin(NamedTuple):
     """Where a name comes from.
 
     ``source`` ``None``: fixed in the program, or undecided between ``candidates``. ``proven``: another value was
@@ -82,7 +82,7 @@ class Origin(NamedTuple):
         return self.source is None and bool(self.candidates)
 
 
-FIXED = Origin()
+FIXED = NameOrigin()
 
 
 def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
@@ -92,7 +92,7 @@ def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
     return {f"<{index}>": word for index, word in enumerate(words, 1)}
 
 
-def origins_of(observations: Sequence[Observation]) -> dict[Name, Origin]:
+def origins_of(observations: Sequence[Observation]) -> dict[Name, NameOrigin]:
     """The origin of each name that was seen in any of ``observations`` (all of one node of one program)."""
     found = {
         name: _with_default(_origin(name, observations), observations)
@@ -129,7 +129,7 @@ def _source(parameter: str, value: object, name: str) -> Source | None:
     return None
 
 
-def _origin(name: Name, observations: Sequence[Observation]) -> Origin:
+def _origin(name: Name, observations: Sequence[Observation]) -> NameOrigin:
     seen_in = [each for each in observations if name in each.names]
     per_observation = [set(_all_sources(name, each)) for each in seen_in]
     if not all(per_observation):
@@ -142,10 +142,10 @@ def _origin(name: Name, observations: Sequence[Observation]) -> Origin:
     ]
     followed = [source for source in left if any(_follows(name, source, each) for each in observations)]
     if len(followed) == 1:
-        return Origin(followed[0], proven=True)
+        return NameOrigin(followed[0], proven=True)
     if len(left) == 1 and any(_is_telling(left[0], each) for each in seen_in):
-        return Origin(left[0])
-    return Origin(candidates=tuple(left)) if left else FIXED
+        return NameOrigin(left[0])
+    return NameOrigin(candidates=tuple(left)) if left else FIXED
 
 
 def _all_sources(name: Name, seen: Observation) -> Iterable[Source]:
@@ -199,7 +199,7 @@ def _follows(name: Name, source: Source, other: Observation) -> bool:
     return all(name._replace(name=value) in other.names for value in values)
 
 
-def _with_default(origin: Origin, observations: Sequence[Observation]) -> Origin:
+def _with_default(origin: NameOrigin, observations: Sequence[Observation]) -> NameOrigin:
     """With what the program declares where the launch gives nothing."""
     if origin.source is None or origin.source.each:
         return origin
@@ -207,7 +207,7 @@ def _with_default(origin: Origin, observations: Sequence[Observation]) -> Origin
     return origin._replace(default=str(declared.pop())) if len(declared) == 1 else origin
 
 
-def _generalised(found: Mapping[Name, Origin]) -> dict[Name, Origin]:
+def _generalised(found: Mapping[Name, NameOrigin]) -> dict[Name, NameOrigin]:
     """``topics.a.topic`` and ``topics.b.topic`` → ``topics.*.topic``: keys that are data, where two were seen. A
     parameter with a default is one that the program knows by name."""
     families: dict[tuple[object, ...], set[str]] = {}
@@ -232,8 +232,8 @@ def _families(parameter: str) -> list[str]:
 
 
 def _without_defaults(
-    found: Mapping[Name, Origin], observations: Sequence[Observation]
-) -> dict[Name, Origin]:
+    found: Mapping[Name, NameOrigin], observations: Sequence[Observation]
+) -> dict[Name, NameOrigin]:
     """A fixed name that is there only where the parameter is not set is the parameter's default."""
     result = dict(found)
     for name, origin in found.items():

@@ -24,7 +24,7 @@ from nodl.errors import NoDLError
 if TYPE_CHECKING:
     from nodl.graph.model import Graph
     from nodl.graph.observation import Observed
-    from nodl.graph.starts import Start
+    from nodl.graph.starts import StartedNode
     from nodl.record.learning import LearntNode
 
 FORMATS = ("text", "json", "policy", "v2")
@@ -106,12 +106,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if seen else 1
 
 
-def _observe(arguments: argparse.Namespace, starts: tuple[Start, ...]) -> Observed:
+def _observe(arguments: argparse.Namespace, starts: tuple[StartedNode, ...]) -> Observed:
     from datetime import datetime, timezone
 
     from nodl.graph.observation import Observed, command_lines
     from nodl.graph.observing import Quiet, Where, look_until, observer
-    from nodl.record.lines import Run
+    from nodl.record.lines import RecordedRun
 
     directory = _enclave_directory(arguments)
     where = Where(_domain_id(arguments), arguments.source, directory)
@@ -126,7 +126,7 @@ def _observe(arguments: argparse.Namespace, starts: tuple[Start, ...]) -> Observ
         look_until(up, done)
         graph = up.graph(past=True)
     date = datetime.now(timezone.utc)
-    run = Run(
+    run = RecordedRun(
         f"{date:%Y%m%dT%H%M%S}-{os.urandom(3).hex()}",
         launch_file=" ".join(arguments.launch),
         distro=os.environ.get("ROS_DISTRO", ""),
@@ -182,7 +182,7 @@ def _write(folder: Path, documents: dict[str, str]) -> None:
         print(folder / name)
 
 
-def _starts(words: Sequence[str]) -> tuple[Start, ...]:
+def _starts(words: Sequence[str]) -> tuple[StartedNode, ...]:
     """Raises ``NoDLError`` for what is not a plan, and with what the dry run says of a launch file."""
     from nodl.graph.starts import starts_of_plan
 

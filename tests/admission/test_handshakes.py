@@ -9,7 +9,7 @@ import pytest
 from cryptography import x509
 
 from enclave_launch import provision
-from enclave_launch.admission.handshakes import Member, Pair, failing, halves, mixed_pairs
+from enclave_launch.admission.handshakes import EnclaveProcess, Pair, failing, halves, mixed_pairs
 from enclave_launch.admission.middleware import Vendor
 from enclave_launch.diagnostics import Code
 from keystore.formats.guid_prefix import Half, guid_prefix, half_of
@@ -95,12 +95,12 @@ def test_certificates_that_exist_keep_their_subject_and_that_is_told(plan: Plan,
 
 def test_pairs_and_halves() -> None:
     members = [
-        Member("/f", 0, Vendor.FAST),
-        Member("/c", 0, Vendor.CYCLONE),
-        Member("/m", 0, Vendor.FAST),
-        Member("/m", 0, Vendor.CYCLONE),
-        Member("/x", 1, Vendor.CYCLONE),
-        Member("/u", 0, None),
+        EnclaveProcess("/f", 0, Vendor.FAST),
+        EnclaveProcess("/c", 0, Vendor.CYCLONE),
+        EnclaveProcess("/m", 0, Vendor.FAST),
+        EnclaveProcess("/m", 0, Vendor.CYCLONE),
+        EnclaveProcess("/x", 1, Vendor.CYCLONE),
+        EnclaveProcess("/u", 0, None),
     ]
     pairs = mixed_pairs(members)
     assert pairs == (Pair("/f", "/c"), Pair("/f", "/m"), Pair("/m", "/c"), Pair("/m", "/m"))

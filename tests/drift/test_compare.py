@@ -10,7 +10,7 @@ import pytest
 
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
-from enclave_launch.drift.finding import Certainty, Finding, Kind, Level
+from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level
 from nodl.graph.model import Graph
 from nodl.graph.quality import Quality
 from tests.drift.planned import plan, running
@@ -25,11 +25,11 @@ LAUNCHES = [
 TALKER = plan(*LAUNCHES[0])
 
 
-def found(document: Any, graph: Graph, **circumstances: Any) -> list[Finding]:
+def found(document: Any, graph: Graph, **circumstances: Any) -> list[DriftFinding]:
     return compare(expected_in([document], 0), graph, Circumstances(**circumstances))
 
 
-def kinds(findings: list[Finding]) -> list[tuple[Kind, str]]:
+def kinds(findings: list[DriftFinding]) -> list[tuple[Kind, str]]:
     return [(each.kind, each.subject) for each in findings]
 
 
@@ -230,7 +230,7 @@ def test_a_nameless_participant_is_told_at_once_where_its_process_is_known_not_t
     made.node(guid, "", "writer HelloWorldTopic HelloWorld")
     (waits,) = found(TALKER, made.graph())
     (at_once,) = found(TALKER, made.graph(), strangers=frozenset({7}))
-    assert (waits.certainty, at_once.certainty) == (Certainty.WHEN_SETTLED, Certainty.FACT)
+    assert (waits.certainty, at_once.certainty) == (FindingCertainty.WHEN_SETTLED, FindingCertainty.FACT)
 
 
 def test_nodes_without_names_and_executables_are_not_taken_for_intruders() -> None:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from enclave_launch.drift.finding import Kind, finding
-from enclave_launch.drift.steady import Change, Patience, Steady
+from enclave_launch.drift.steady import Change, SettlingTimes, Steady
 
 FACT = finding(Kind.UNPLANNED_NODE, "/x", "there")
 SETTLED = finding(Kind.UNPLANNED_PROCESS, "p", "there")
 LEASE = finding(Kind.REPEATED_NODE, "/x", "twice")
 ABSENT = finding(Kind.MISSING_NODE, "/y", "not there")
-PATIENCE = Patience(settle=5, absence=60)
+PATIENCE = SettlingTimes(settle=5, absence=60)
 
 
 def test_a_fact_is_told_at_once_and_once() -> None:

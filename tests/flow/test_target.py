@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.target import Target, find_target, parse_arguments
+from enclave_launch.verb.target import LaunchTarget, find_target, parse_arguments
 
 
 @pytest.fixture
@@ -24,12 +24,12 @@ def prefix(tmp_path: Path) -> Path:
 
 def test_a_package_and_a_file_anywhere_below_its_share_directory(prefix: Path) -> None:
     target = find_target(["demo", "one.launch.xml", "a:=1"], [str(prefix)])
-    assert target == Target(str(prefix / "share/demo/launch/one.launch.xml"), (("a", "1"),))
+    assert target == LaunchTarget(str(prefix / "share/demo/launch/one.launch.xml"), (("a", "1"),))
 
 
 def test_a_path_followed_by_arguments(prefix: Path) -> None:
     file = str(prefix / "share/demo/launch/one.launch.xml")
-    assert find_target([file, "a:=1", "b:=x:=y"], []) == Target(file, (("a", "1"), ("b", "x:=y")))
+    assert find_target([file, "a:=1", "b:=x:=y"], []) == LaunchTarget(file, (("a", "1"), ("b", "x:=y")))
 
 
 REFUSED = {

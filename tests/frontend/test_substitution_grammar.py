@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from enclave_launch.frontend.substitution_grammar import (
     MAX_NESTING,
-    Call,
+    SubstitutionCall,
     TemplateSyntaxError,
     UnexpectedCharacters,
     UnexpectedEOF,
@@ -21,8 +21,8 @@ from enclave_launch.frontend.substitution_grammar import (
 )
 
 
-def call(name: str, *args: str | Call | tuple[str | Call, ...]) -> Call:
-    return Call(name, tuple(arg if isinstance(arg, tuple) else (arg,) for arg in args))
+def call(name: str, *args: str | SubstitutionCall | tuple[str | SubstitutionCall, ...]) -> SubstitutionCall:
+    return SubstitutionCall(name, tuple(arg if isinstance(arg, tuple) else (arg,) for arg in args))
 
 
 PARSED = {
@@ -68,7 +68,7 @@ PARSED = {
 
 
 @pytest.mark.parametrize(("text", "template"), PARSED.values(), ids=PARSED.keys())
-def test_text_parses_to(text: str, template: tuple[str | Call, ...]) -> None:
+def test_text_parses_to(text: str, template: tuple[str | SubstitutionCall, ...]) -> None:
     assert parse_template(text) == template
 
 
@@ -113,8 +113,8 @@ def test_text_that_ends_early(text: str) -> None:
 
 def test_the_rule_names_the_quotes_around_a_call() -> None:
     (outer,) = parse_template("""$(a '$(b)' "$(c)")""")
-    assert isinstance(outer, Call)
-    inner = [part for arg in outer.args for part in arg if isinstance(part, Call)]
+    assert isinstance(outer, SubstitutionCall)
+    inner = [part for arg in outer.args for part in arg if isinstance(part, SubstitutionCall)]
     assert [outer.rule, *(part.rule for part in inner)] == [
         "substitution",
         "single_quoted_substitution",
@@ -171,23 +171,27 @@ ARGUMENT_TEXT = st.text(st.characters(exclude_characters="\\"), min_size=1)
 TEMPLATES = st.recursive(
     st.tuples(ARGUMENT_TEXT),
     lambda inner: st.tuples(
-        st.builds(Call, st.sampled_from(["var", "find-pkg-share"]), st.lists(inner, max_size=3).map(tuple))
+        st.builds(
+            SubstitutionCall,
+            st.sampled_from(["var", "find-pkg-share"]),
+            st.lists(inner, max_size=3).map(tuple),
+        )
     ),
     max_leaves=6,
 )
 
 
 @given(TEMPLATES)
-def test_a_template_prints_as_text_that_parses_to_it(template: tuple[str | Call, ...]) -> None:
+def test_a_template_prints_as_text_that_parses_to_it(template: tuple[str | SubstitutionCall, ...]) -> None:
     assert parse_template(print_template(template)) == template
 
 
 @pytest.mark.parametrize(
     "template",
-    [(), ("a\\", Call("f", ())), (Call("no name", ()),), ("a", "b")],
+    [(), ("a\\", SubstitutionCall("f", ())), (SubstitutionCall("no name", ()),), ("a", "b")],
     ids=["no part", "backslash before a call", "bad name", "two texts in a row"],
 )
-def test_what_no_text_stands_for_cannot_be_printed(template: tuple[str | Call, ...]) -> None:
+def test_what_no_text_stands_for_cannot_be_printed(template: tuple[str | SubstitutionCall, ...]) -> None:
     with pytest.raises(ValueError, match=r"no text stands for|No terminal"):
         print_template(template)
 

@@ -6,18 +6,18 @@ from types import MappingProxyType
 
 from nodl.graph.observation import Observed
 from nodl.graph.sources import learn_observed
-from nodl.graph.starts import Start, start_of_command, starts_of_plan
+from nodl.graph.starts import StartedNode, start_of_command, starts_of_plan
 from nodl.node_interface import EndpointKind as Kind
-from nodl.record.learning import Entry, LearntNode
-from nodl.record.lines import Run
+from nodl.record.learning import LearntEndpoint, LearntNode
+from nodl.record.lines import RecordedRun
 from tests.graph.made import Made, one_node
 from tests.graph.nodes import action, service, topic
 
 
 def observed(name: str, fqn: str, endpoints: list[str], *rules: str, **parameters: object) -> Observed:
     """A run of one node of ``demo/talker``."""
-    start = Start("demo", "talker", fqn=fqn, rule_texts=rules, parameters=MappingProxyType(parameters))
-    return Observed(Run(name), one_node(fqn, *endpoints), starts=(start,))
+    start = StartedNode("demo", "talker", fqn=fqn, rule_texts=rules, parameters=MappingProxyType(parameters))
+    return Observed(RecordedRun(name), one_node(fqn, *endpoints), starts=(start,))
 
 
 def learnt(*runs: Observed) -> LearntNode:
@@ -25,7 +25,7 @@ def learnt(*runs: Observed) -> LearntNode:
     return node
 
 
-def entry(node: LearntNode, kind: Kind = Kind.PUBLISHER) -> Entry:
+def entry(node: LearntNode, kind: Kind = Kind.PUBLISHER) -> LearntEndpoint:
     (found,) = [each for each in node.entries if each.kind is kind]
     return found
 
@@ -111,7 +111,7 @@ def test_half_open_and_unexplained_things_are_told_and_in_no_manifest() -> None:
     found = learn_observed([observed("a", "/talker", [request, *action("/go", serves=True)])])
     assert [each.name for each in found.learnt.nodes[0].entries] == ["go"]
     assert found.left_out == ("/talker: service_server /reset is half open, without reply",)
-    stranger = Observed(Run("b"), one_node("/stranger", *topic("/x", writes=True)))
+    stranger = Observed(RecordedRun("b"), one_node("/stranger", *topic("/x", writes=True)))
     assert learn_observed([stranger]).learnt.nodes == ()
     assert "nothing tells which program it is" in learn_observed([stranger]).left_out[0]
 
@@ -129,7 +129,7 @@ def test_the_command_line_of_a_process_tells_program_rules_and_parameters() -> N
     made = Made()
     participant = made.participant(1, pid=7)
     made.listed(participant, made.node(participant, "/r1/talker", *topic("/news", writes=True)))
-    run = Observed(Run("a"), made.graph(), {participant: tuple(command)})
+    run = Observed(RecordedRun("a"), made.graph(), {participant: tuple(command)})
     (node,) = learn_observed([run]).learnt.nodes
     assert node.program == "demo/talker" and node.entries[0].name == "chatter"
 
@@ -157,6 +157,6 @@ def test_a_launch_file_tells_how_a_node_was_started_also_where_it_gives_no_name(
         made.node(participant, "/talker", *topic("/news", writes=True)),
         made.node(participant, "/r1/ear", *topic("/news", writes=False)),
     )
-    run = Observed(Run("a"), made.graph(), starts=starts_of_plan(plan))
+    run = Observed(RecordedRun("a"), made.graph(), starts=starts_of_plan(plan))
     found = {node.program: node.entries[0].name for node in learn_observed([run]).learnt.nodes}
     assert found == {"demo/talker": "chatter", "demo/demo::Listener": "chatter"}

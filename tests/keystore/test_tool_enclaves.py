@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import keystore
-from keystore.formats.tool_needs import TABLE, TOOLS, Target, tool_policy, tool_targets
+from keystore.formats.tool_needs import TABLE, TOOLS, ToolTarget, tool_policy, tool_targets
 from keystore.steps.tool_enclaves import create_tool_enclave
 from keystore.verb import main
 
@@ -86,7 +86,7 @@ def test_what_cannot_be_is_refused_and_nothing_is_made(
 @pytest.mark.parametrize("tool", TABLE, ids=[tool.name for tool in TABLE])
 def test_no_tool_gets_more_than_its_own_names_its_target_and_what_every_node_has(tool: object) -> None:
     kind = TOOLS[tool.name]  # type: ignore[attr-defined]
-    targets = () if kind.target is Target.NOTHING else ("/robot/it",)
+    targets = () if kind.target is ToolTarget.NOTHING else ("/robot/it",)
     for profile in tool_policy(kind, tool_targets(kind, targets), "/tools/x").profiles:
         for rule in profile.rules:
             own = kind.node and rule.expression.startswith(f"{kind.node}/")

@@ -10,7 +10,7 @@ import pytest
 
 from enclave_launch.flow import provision, resolve
 from enclave_launch.options import ResolveOptions, SecurityOptions
-from enclave_launch.review.document import Grant
+from enclave_launch.review.document import GrantedName
 from enclave_launch.review.signed import as_signed
 from enclave_launch.verb.secure_plan import main
 from keystore.formats.validity import utc_now
@@ -102,12 +102,12 @@ def test_a_folder_that_is_no_keystore_is_told(
 def test_grants_come_back_from_dds_as_they_went_unless_they_say_the_same() -> None:
     grants = frozenset(
         {
-            Grant("publish", "/x"),
-            Grant("subscribe", "/a/*"),
-            Grant("call_services", "/s"),
-            Grant("serve_actions", "/act"),
+            GrantedName("publish", "/x"),
+            GrantedName("subscribe", "/a/*"),
+            GrantedName("call_services", "/s"),
+            GrantedName("serve_actions", "/act"),
         }
     )
     assert as_signed(grants) == grants
-    doubled = grants | {Grant("publish", "/act/_action/status")}
+    doubled = grants | {GrantedName("publish", "/act/_action/status")}
     assert as_signed(doubled) == grants, "the topic is part of the action"

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from enclave_launch.errors import RuntimeFailure
-from enclave_launch.runtime.zenoh_router import Answer, RouterPlace, ZenohRouter, who_answers
+from enclave_launch.runtime.zenoh_router import RouterAnswer, RouterPlace, ZenohRouter, who_answers
 from keystore import ProvisionOptions, RemoveOptions, apply_policy, remove
 from keystore.disk.view import KeystoreView
 from keystore.disk.zenoh_files import present_address
@@ -52,7 +52,7 @@ def running(tmp_path: Path) -> Iterator[Running]:
     made = Running(tmp_path)
     with made.router():
         yield made
-    assert who_answers(made.place) is Answer.NOBODY
+    assert who_answers(made.place) is RouterAnswer.NOBODY
 
 
 def test_a_removed_enclave_is_cut_off_and_the_others_come_back_by_themselves(running: Running) -> None:
@@ -62,7 +62,7 @@ def test_a_removed_enclave_is_cut_off_and_the_others_come_back_by_themselves(run
         kept = listener.declare_subscriber(topic("/chatter"), heard)
         assert passes(talker, topic("/chatter"), heard)
         remove(running.keystore, ["/talker"], options=RemoveOptions(durable=False))
-        assert wait_for(lambda: who_answers(running.place) is Answer.PRESENT)
+        assert wait_for(lambda: who_answers(running.place) is RouterAnswer.PRESENT)
         assert passes(herald, topic("/chatter"), heard) and kept
         talker.put(topic("/chatter"), "forged")
         assert passes(herald, topic("/chatter"), heard) and "forged" not in heard.texts()
@@ -75,7 +75,7 @@ def test_what_is_newly_granted_can_be_done_at_once(running: Running) -> None:
         kept = listener.declare_subscriber(topic("/news"), heard)
         more = policy_of({"/talker": {"publish": ("/chatter", "/news")}})
         apply_policy(running.keystore, more, options=ProvisionOptions(durable=False))
-        assert wait_for(lambda: who_answers(running.place) is Answer.PRESENT)
+        assert wait_for(lambda: who_answers(running.place) is RouterAnswer.PRESENT)
         talker = running.session("/talker")
         with kit.closing(talker):
             assert passes(talker, topic("/news"), heard) and kept
@@ -97,7 +97,7 @@ def _started(running: Running) -> None:
 
 def test_a_router_that_runs_with_the_present_rules_is_used_and_no_other_started(running: Running) -> None:
     with running.router(program="/nonexistent"):
-        assert who_answers(running.place) is Answer.PRESENT
+        assert who_answers(running.place) is RouterAnswer.PRESENT
 
 
 def test_a_router_that_cannot_start_is_told_with_what_it_said(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.markup import expose
 from enclave_launch.description.substitution import TextSubstitution
 from enclave_launch.frontend.substitution_grammar import (
-    Call,
+    SubstitutionCall,
     Template,
     VisitError,
     called_names,
@@ -94,12 +94,12 @@ def _parse_shared(string_value: str) -> tuple[Substitution, ...] | None:
 
 def _instantiate(template: Template, text: str) -> list[Substitution]:
     return [
-        _instantiate_call(part, text) if isinstance(part, Call) else TextSubstitution(text=part)
+        _instantiate_call(part, text) if isinstance(part, SubstitutionCall) else TextSubstitution(text=part)
         for part in template
     ]
 
 
-def _instantiate_call(call: Call, text: str) -> Substitution:
+def _instantiate_call(call: SubstitutionCall, text: str) -> Substitution:
     args = [_instantiate(argument, text) for argument in call.args]
     try:
         return expose.instantiate_substitution(call.name, args)

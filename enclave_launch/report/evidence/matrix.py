@@ -8,7 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from enclave_launch.boundary.terminal import printable
-from enclave_launch.report.graph import Graph
+from enclave_launch.report.graph import EnclaveGraph
 from enclave_launch.report.reasons import evidence_text
 
 
@@ -24,7 +24,7 @@ class Row(NamedTuple):
     evidence: str
 
 
-def rows(graph: Graph) -> Iterator[Row]:
+def rows(graph: EnclaveGraph) -> Iterator[Row]:
     """In the graph's order."""
     for use in graph.uses:
         channel = graph.channels[use.channel]

@@ -10,7 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 
-class Part(NamedTuple):
+class EvidencePart(NamedTuple):
     """``files`` of the evidence, what they show, and the requirements that this supports."""
 
     name: str
@@ -25,7 +25,7 @@ DISCLAIMER = (
 )
 _ISO = "ISO 10218-1:2025 and ISO 10218-2:2025, cybersecurity"
 PARTS = (
-    Part(
+    EvidencePart(
         "Access control",
         ("access-control.csv", "access-control.json", "plan.json"),
         "each permission of each enclave, the nodes that ask for it, and where that is written",
@@ -36,7 +36,7 @@ PARTS = (
             _ISO,
         ),
     ),
-    Part(
+    EvidencePart(
         "Attack surface",
         ("attack-surface.json", "report.html"),
         "what each enclave accepts from others, what only a party outside of the launch could send, programs without "
@@ -47,7 +47,7 @@ PARTS = (
             _ISO,
         ),
     ),
-    Part(
+    EvidencePart(
         "Keys and algorithms",
         ("keys.json",),
         "every certificate of the keystore with its algorithm, its end and where its private key is",
@@ -58,7 +58,7 @@ PARTS = (
             "IEC 62443-3-3 SR 4.3, 62443-4-2 CR 4.3: use of cryptography",
         ),
     ),
-    Part(
+    EvidencePart(
         "Secure defaults",
         ("secure-defaults.json",),
         "the governance in force, attribute by attribute, each that is weaker than the default, and what "
@@ -72,7 +72,7 @@ PARTS = (
             "IEC 62443-3-3 SR 7.6, 62443-4-2 CR 7.6: network and security configuration settings",
         ),
     ),
-    Part(
+    EvidencePart(
         "Findings and accepted exceptions",
         ("findings.json", "findings.sarif", "accepted.json"),
         "what the checks found, and which findings somebody accepted, with the reason",
@@ -81,7 +81,7 @@ PARTS = (
             "CRA Article 13 (2) and (3): cybersecurity risk assessment",
         ),
     ),
-    Part(
+    EvidencePart(
         "Components",
         ("components.json",),
         "the software bill of materials that belongs to the product, by its CycloneDX BOM-Link and hash",
@@ -90,7 +90,7 @@ PARTS = (
             "IEC 62443-3-3 SR 7.8, 62443-4-2 CR 7.8: control system component inventory",
         ),
     ),
-    Part(
+    EvidencePart(
         "Scope",
         ("scope.json",),
         "what was checked, by which checks, and what was not: gaps of the plan, parts that were not given",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, Graph, Use, plan_graph
+from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, ChannelUse, EnclaveGraph, plan_graph
 from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.information_flow import flow_graph, opened_by_sharing, reached_from
 from keystore.formats.permissions_patterns import can_meet
@@ -38,13 +38,13 @@ def surface_document(document: Mapping[str, Any]) -> dict[str, Any]:
     }
 
 
-def _enclave(graph: Graph, enclave: str) -> dict[str, Any]:
+def _enclave(graph: EnclaveGraph, enclave: str) -> dict[str, Any]:
     held = [use for use in graph.uses if use.enclave == enclave and not use.built_in]
     patterns = {graph.channels[use.channel].name for use in held if graph.channels[use.channel].is_pattern}
     return {"accepts": _accepted(graph, enclave, held), "wildcards": sorted(patterns)}
 
 
-def _accepted(graph: Graph, enclave: str, held: list[Use]) -> list[dict[str, Any]]:
+def _accepted(graph: EnclaveGraph, enclave: str, held: list[ChannelUse]) -> list[dict[str, Any]]:
     """What comes in: messages of subscriptions, requests to servers. ``sent_by``: enclaves of this launch that may
     send it; with none, only somebody outside of the launch could."""
     coming_in = sorted({(use.operation, use.channel) for use in held if use.operation not in OUTWARD})
@@ -59,7 +59,7 @@ def _accepted(graph: Graph, enclave: str, held: list[Use]) -> list[dict[str, Any
     ]
 
 
-def _senders(graph: Graph, operation: str, name: str) -> set[str]:
+def _senders(graph: EnclaveGraph, operation: str, name: str) -> set[str]:
     return {
         use.enclave
         for use in graph.uses

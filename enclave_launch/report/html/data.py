@@ -8,11 +8,11 @@ from __future__ import annotations
 from typing import Any
 
 from enclave_launch.boundary.terminal import printable
-from enclave_launch.report.graph import OUTWARD, Graph, Use
+from enclave_launch.report.graph import OUTWARD, ChannelUse, EnclaveGraph
 from enclave_launch.report.reasons import evidence_text
 
 
-def graph_data(graph: Graph) -> dict[str, Any]:
+def graph_data(graph: EnclaveGraph) -> dict[str, Any]:
     """Lists of the graph's elements; they refer to each other by number."""
     return {
         "enclaves": [printable(path) for path in graph.enclaves],
@@ -40,7 +40,7 @@ def graph_data(graph: Graph) -> dict[str, Any]:
     }
 
 
-def _use(use: Use) -> dict[str, Any]:
+def _use(use: ChannelUse) -> dict[str, Any]:
     return {
         "member": use.member,
         "enclave": printable(use.enclave),

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 
 from enclave_launch.report.contents import Influence, ReportContents
 from enclave_launch.report.flows import step_text
-from enclave_launch.report.graph import Graph, Use
+from enclave_launch.report.graph import ChannelUse, EnclaveGraph
 from enclave_launch.report.html.markup import row, table, text
 from enclave_launch.report.reasons import evidence_text
 from enclave_launch.review.checks.keystore import Ending
@@ -38,7 +38,7 @@ def permissions(contents: ReportContents) -> str:
     return "".join(parts) or "<p>This launch has no enclaves.</p>"
 
 
-def _permission(graph: Graph, use: Use) -> str:
+def _permission(graph: EnclaveGraph, use: ChannelUse) -> str:
     channel = graph.channels[use.channel]
     who = "no node: a policy file" if use.member is None else graph.members[use.member].name
     evidence = "<br>".join(dict.fromkeys(text(evidence_text(reason)) for reason in use.reasons))

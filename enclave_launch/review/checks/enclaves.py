@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import Grant, PlanDocument, Told
+from enclave_launch.review.document import GrantedName, PlanDocument, Told
 from enclave_launch.review.similarity import splits
 
 _NAMED = 3  # permissions that a node gains, by name; the rest is counted
@@ -47,7 +47,7 @@ def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
         )
 
 
-def _some(grants: tuple[Grant, ...]) -> str:
+def _some(grants: tuple[GrantedName, ...]) -> str:
     named = ", ".join(map(str, grants[:_NAMED]))
     return f"{named} and {len(grants) - _NAMED} more" if len(grants) > _NAMED else named
 
@@ -58,7 +58,7 @@ def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
         nodes = plan.nodes_of(enclave)
         if not nodes or document["enclaves"][enclave].get("permissions_unknown"):
             continue
-        for grant in sorted(grants - frozenset[Grant]().union(*(node.grants for node in nodes))):
+        for grant in sorted(grants - frozenset[GrantedName]().union(*(node.grants for node in nodes))):
             yield finding(
                 "permission-unasked",
                 enclave,

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import Grant, PlanDocument, Told
+from enclave_launch.review.document import GrantedName, PlanDocument, Told
 from enclave_launch.review.signed import as_signed
 
 _NAMED = 4
@@ -24,14 +24,16 @@ class Ending(NamedTuple):
 
 
 def against_keystore(
-    plan: PlanDocument, signed: Mapping[str, frozenset[Grant]], endings: Iterable[Ending]
+    plan: PlanDocument, signed: Mapping[str, frozenset[GrantedName]], endings: Iterable[Ending]
 ) -> list[Told]:
     """``endings``: what is due, of the whole keystore; what belongs to enclaves of other plans is left out."""
     found = [told for enclave in sorted(plan.enclaves) for told in _enclave(plan, enclave, signed)]
     return [*found, *_expiring(plan, endings)]
 
 
-def _enclave(plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[Grant]]) -> Iterator[Told]:
+def _enclave(
+    plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[GrantedName]]
+) -> Iterator[Told]:
     if enclave not in signed:
         yield finding(
             "keystore-enclave-missing",
@@ -67,6 +69,6 @@ def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[Told]:
             yield told._replace(severity="error") if one.days_left < 0 else told
 
 
-def _some(grants: list[Grant]) -> str:
+def _some(grants: list[GrantedName]) -> str:
     named = ", ".join(map(str, grants[:_NAMED]))
     return f"{named} and {len(grants) - _NAMED} more" if len(grants) > _NAMED else named

@@ -7,7 +7,7 @@ from itertools import combinations, product
 from typing import Any, NamedTuple
 
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import KIND_OF, Grant, Operation, PlanDocument, Told
+from enclave_launch.review.document import KIND_OF, GrantedName, Operation, PlanDocument, Told
 from keystore.formats.permissions_patterns import can_meet
 from nodl.graph.quality import INFINITE, Quality, unmet
 
@@ -70,7 +70,7 @@ _GAPS = frozenset({
 def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
     asked, users = _asked_for(plan), _users(document)
     everywhere: dict[Operation, set[str]] = {}
-    for grant in frozenset[Grant]().union(*plan.enclaves.values()):
+    for grant in frozenset[GrantedName]().union(*plan.enclaves.values()):
         everywhere.setdefault(grant.operation, set()).add(grant.name)
     for here, there, code, verb in _ENDS:
         others = everywhere.get(there, set())

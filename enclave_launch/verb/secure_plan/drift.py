@@ -23,7 +23,7 @@ from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan,
 if TYPE_CHECKING:
     from enclave_launch.drift.compare import Security
     from enclave_launch.drift.expected import Expected
-    from enclave_launch.drift.finding import Finding
+    from enclave_launch.drift.finding import DriftFinding
     from nodl.graph.model import Graph
     from nodl.graph.observing import Observer, Where
 
@@ -85,7 +85,7 @@ def run(options: argparse.Namespace) -> int:
     security = _security(options)
     expected: Expected = expected_in(documents, domain)
 
-    def findings(graph: Graph, forged: tuple[str, ...] = ()) -> list[Finding]:
+    def findings(graph: Graph, forged: tuple[str, ...] = ()) -> list[DriftFinding]:
         circumstances = Circumstances(security, tuple(options.accept), forged=forged)
         return compare(expected, graph, circumstances)
 
@@ -97,10 +97,10 @@ def run(options: argparse.Namespace) -> int:
     return 1 if any(each.level is Level.ALARM for each in found) else 0
 
 
-Findings = Callable[..., "list[Finding]"]
+Findings = Callable[..., "list[DriftFinding]"]
 
 
-def _looked(options: argparse.Namespace, domain: int, findings: Findings) -> tuple[Graph, list[Finding]]:
+def _looked(options: argparse.Namespace, domain: int, findings: Findings) -> tuple[Graph, list[DriftFinding]]:
     """Raises ``CannotObserve``."""
     from nodl.errors import NoDLError
     from nodl.graph.observing import Where, observer
@@ -120,9 +120,9 @@ def _looked(options: argparse.Namespace, domain: int, findings: Findings) -> tup
 
 def _settled(
     options: argparse.Namespace, where: Where, up: Observer, findings: Findings
-) -> tuple[Graph, list[Finding]]:
+) -> tuple[Graph, list[DriftFinding]]:
     """Once nothing changes any more and nothing is missing; what is missing has until the end of ``--for``."""
-    from enclave_launch.drift.finding import Certainty, Level
+    from enclave_launch.drift.finding import FindingCertainty, Level
     from nodl.graph.observing import Quiet, look_until
 
     end = time.monotonic() + options.longest
@@ -130,7 +130,9 @@ def _settled(
         look_until(up, Quiet(up, options.settle, max(options.longest, options.settle)))
         graph = up.graph()
         found = findings(graph, up.forged)
-        waits = any(each.certainty is not Certainty.FACT and each.level is Level.ALARM for each in found)
+        waits = any(
+            each.certainty is not FindingCertainty.FACT and each.level is Level.ALARM for each in found
+        )
         if not waits or time.monotonic() >= end:
             return graph, found
         time.sleep(_BETWEEN)

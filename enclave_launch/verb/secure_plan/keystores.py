@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from datetime import datetime
 
     from enclave_launch.review.checks.keystore import Ending
-    from enclave_launch.review.document import Grant
+    from enclave_launch.review.document import GrantedName
 
 DEFAULT_MARGIN = "30d"
 
@@ -28,7 +28,7 @@ def keystore_errors() -> Iterator[None]:
         raise ProvisionError(str(error)) from error
 
 
-def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[Grant]]:
+def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
     """Enclave -> what its signed permissions allow."""
     from enclave_launch.review.signed import grants_of_rules
     from keystore.steps.granted import granted

@@ -7,13 +7,13 @@ from functools import cached_property
 
 from nodl.infer.cpp.answer import Answer
 from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
-from nodl.infer.cpp.entry import Entry, Key, Solved
+from nodl.infer.cpp.entry import Entry, Solved
 from nodl.infer.cpp.program import Sources
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace
 from nodl.infer.cpp.solved import solve
 from nodl.infer.cpp.syntax import check_support
 from nodl.infer.cpp.system import package_programs
-from nodl.infer.start import Start
+from nodl.infer.start import LaunchKey, Start
 
 
 class Answering:
@@ -21,7 +21,7 @@ class Answering:
 
     def __init__(self, workspace: Workspace):
         self._workspace = workspace
-        self._programs: dict[str, Sequence[tuple[Key, Entry]]] = {}
+        self._programs: dict[str, Sequence[tuple[LaunchKey, Entry]]] = {}
 
     def of_program(
         self, package: SourcePackage, executable: str | None, plugin: str | None, start: Start | None
@@ -37,7 +37,7 @@ class Answering:
     def _sources(self) -> Sources:
         return Sources(self._workspace)
 
-    def _solved(self, key: Key, entry: Entry, start: Start | None) -> Solved:
+    def _solved(self, key: LaunchKey, entry: Entry, start: Start | None) -> Solved:
         question = ("program", key, entry)
         found = self._answers.find(question, start)
         if found is None:
@@ -47,7 +47,7 @@ class Answering:
         solved: Solved = found.answer
         return solved
 
-    def _programs_of(self, package: SourcePackage) -> Sequence[tuple[Key, Entry]]:
+    def _programs_of(self, package: SourcePackage) -> Sequence[tuple[LaunchKey, Entry]]:
         question = ("programs", package.name, package.folder)
         if package.name not in self._programs:
             found = self._answers.find(question)

@@ -9,15 +9,6 @@ from nodl.node_interface import Gap, NodeInterface
 
 
 @dataclass(frozen=True)
-class Key:
-    """Under which name launch starts a program."""
-
-    package: str | None
-    executable: str | None = None
-    plugin: str | None = None
-
-
-@dataclass(frozen=True)
 class Entry:
     """Where a program starts: ``main`` of its files, or the constructor of a class."""
 

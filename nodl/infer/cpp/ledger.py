@@ -50,7 +50,7 @@ class Site(NamedTuple):
     word: str
 
 
-class Answer(NamedTuple):
+class SiteAnswer(NamedTuple):
     """``reason``: why the place is dead, or what is missing."""
 
     site: Site
@@ -82,9 +82,9 @@ def sites_of(index: FileIndex) -> list[Site]:
     return found
 
 
-def account(run: Machine, files: Iterable[FileIndex]) -> list[Answer]:
+def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
     """What became of each place that has no interface and no gap of its own."""
-    answers: list[Answer] = []
+    answers: list[SiteAnswer] = []
     reachable = reachable_functions(run)
     for index in files:
         functions = sorted(index.all_functions, key=lambda f: f.node.start_byte)
@@ -100,7 +100,7 @@ def account(run: Machine, files: Iterable[FileIndex]) -> list[Answer]:
 def _answer(
     run: Machine, index: FileIndex, site: Site, functions: list[Function], starts: list[int], handled: list[int],
     reachable: set[Function],
-) -> Answer | None:  # fmt: skip
+) -> SiteAnswer | None:  # fmt: skip
     function = _around(site.offset, functions, starts)
     if function is None:
         if _is_declaration(index, site) or _is_handled(index, site, handled):
@@ -108,24 +108,24 @@ def _answer(
         owner = _class_around(index, site)
         made = [c for obj in run.made_objects() if obj.cls is not None for c in run.names.ancestry(obj.cls)]
         if owner is not None and owner not in made:
-            return Answer(site, True, f"the program makes no object of {owner}")
-        return Answer(site, False, f"{site.word} stands where it is not understood")
+            return SiteAnswer(site, True, f"the program makes no object of {owner}")
+        return SiteAnswer(site, False, f"{site.word} stands where it is not understood")
     if _is_handled(index, site, handled):
         return None
     if function.name == site.word and site.offset < _body_start(function):
         return None  # the name of the function itself
     for (file, start, end), why in run.dead.items():
         if file == index.file and start <= site.offset < end:
-            return Answer(site, True, why)
+            return SiteAnswer(site, True, why)
     if function not in run.called:
         if function not in reachable:
-            return Answer(site, True, f"nothing in the program calls {function}")
+            return SiteAnswer(site, True, f"nothing in the program calls {function}")
         if _is_overridden(run, function):
-            return Answer(site, True, f"every object of the program overrides {function}")
-        return Answer(
+            return SiteAnswer(site, True, f"every object of the program overrides {function}")
+        return SiteAnswer(
             site, False, f"{site.word}: it was not understood who calls {function}, and for which node"
         )
-    return Answer(
+    return SiteAnswer(
         site, False, f"{site.word} was not followed: whether it is reached, and for which node, is not known"
     )
 

@@ -13,7 +13,7 @@ from enclave_launch.boundary.files import read_bytes
 from nodl.infer.cpp.cache.digests import digest_of, digest_of_content
 from nodl.infer.cpp.entry import Entry
 from nodl.infer.cpp.findings import NodeRecord
-from nodl.infer.cpp.ledger import CREATES, Answer, account
+from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account
 from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
@@ -44,7 +44,7 @@ class Findings:
 
     nodes: list[NodeRecord] = field(default_factory=list)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
-    answers: list[Answer] = field(default_factory=list)
+    answers: list[SiteAnswer] = field(default_factory=list)
     classes: set[str] = field(default_factory=set)
     files: tuple[str, ...] = ()
     consulted: dict[str, object] = field(default_factory=dict)

@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from nodl.infer.cpp.cache.answers import Answers, Made
-from nodl.infer.cpp.entry import Entry, Key, Solved
+from nodl.infer.cpp.entry import Entry, Solved
 from nodl.infer.cpp.program import Sources, registered_components, target_entry
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
 from nodl.infer.cpp.solved import solve_all
 from nodl.infer.cpp.syntax import check_support
+from nodl.infer.start import LaunchKey
 from nodl.node_interface import Gap, NodeInterface
 
 _SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
@@ -51,15 +52,15 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
     workspace, read = sources.workspace, dict[str, str]()
     found: list[Solved] = []
 
-    def solved(listed: Sequence[tuple[Key, Entry]]) -> list[Solved]:
+    def solved(listed: Sequence[tuple[LaunchKey, Entry]]) -> list[Solved]:
         made = solve_all(sources, answers, listed)
         for each in made:
             read.update(each.files)
         return [each.answer for each in made]
 
     def listed(
-        name: str, programs: Callable[[], Iterable[tuple[Key, Entry]]]
-    ) -> tuple[tuple[Key, Entry], ...]:
+        name: str, programs: Callable[[], Iterable[tuple[LaunchKey, Entry]]]
+    ) -> tuple[tuple[LaunchKey, Entry], ...]:
         question = (name, tuple(files), tuple(sorted(made)))
         kept = answers.find(question)
         if kept is None:
@@ -67,7 +68,7 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
             kept = Made(answer, dict(sources.digests))
             answers.keep(question, kept)
         read.update(kept.files)
-        programs_listed: tuple[tuple[Key, Entry], ...] = kept.answer
+        programs_listed: tuple[tuple[LaunchKey, Entry], ...] = kept.answer
         return programs_listed
 
     made: set[str] = set()
@@ -115,9 +116,9 @@ def _source_space(package: Path) -> Path | None:
     return package.parent if siblings else None
 
 
-def programs(workspace: Workspace, sources: Sources, given: set[str]) -> list[tuple[Key, Entry]]:
+def programs(workspace: Workspace, sources: Sources, given: set[str]) -> list[tuple[LaunchKey, Entry]]:
     """Every executable and component that one of the given files belongs to."""
-    found: list[tuple[Key, Entry]] = []
+    found: list[tuple[LaunchKey, Entry]] = []
     touched = [p for p in workspace.packages.values() if any(f.startswith(p.folder + os.sep) for f in given)]
     for package in touched:
         found += package_programs(package, workspace, sources, given)
@@ -126,14 +127,14 @@ def programs(workspace: Workspace, sources: Sources, given: set[str]) -> list[tu
 
 def package_programs(
     package: SourcePackage, workspace: Workspace, sources: Sources, given: set[str] | None = None
-) -> list[tuple[Key, Entry]]:
-    found: list[tuple[Key, Entry]] = []
+) -> list[tuple[LaunchKey, Entry]]:
+    found: list[tuple[LaunchKey, Entry]] = []
     build = package.build
     for target in build.targets.values():
         entry = target_entry(target, package, workspace)
         wanted = given is None or any(file in given for file in entry.files)
         if target.executable and wanted:
-            found.append((Key(package.name, build.renamed.get(target.name, target.name)), entry))
+            found.append((LaunchKey(package.name, build.renamed.get(target.name, target.name)), entry))
     for name, key in components(package, sources).items():
         entry = _component_entry(name, package, workspace, sources)
         if given is None or any(file in given for file in entry.files):
@@ -141,15 +142,17 @@ def package_programs(
     return found
 
 
-def components(package: SourcePackage, sources: Sources) -> dict[str, Key]:
+def components(package: SourcePackage, sources: Sources) -> dict[str, LaunchKey]:
     """By CMake and by the macro in the source."""
-    found = {name: Key(package.name, executable, name) for name, executable in package.build.plugins.items()}
+    found = {
+        name: LaunchKey(package.name, executable, name) for name, executable in package.build.plugins.items()
+    }
     for target in package.build.targets.values():
         for file in target.sources:
             index = sources.index(file, dict(target.definitions), False)
             for name in registered_components(index) if index is not None else ():
                 if name not in found:
-                    found[name] = Key(package.name, None, name)
+                    found[name] = LaunchKey(package.name, None, name)
     return found
 
 
@@ -180,7 +183,9 @@ def _all_sources(package: SourcePackage) -> list[str]:
     return [str(path) for path in sorted(Path(package.folder).rglob("*")) if path.suffix in _SOURCES]
 
 
-def _left_over(workspace: Workspace, sources: Sources, files: Sequence[str]) -> Iterable[tuple[Key, Entry]]:
+def _left_over(
+    workspace: Workspace, sources: Sources, files: Sequence[str]
+) -> Iterable[tuple[LaunchKey, Entry]]:
     """Files of no target: their mains and components."""
     built = {f for p in workspace.packages.values() for t in p.build.targets.values() for f in t.sources}
     loose = [file for file in files if file not in built and not _is_test(file, workspace)]
@@ -194,18 +199,18 @@ def _left_over(workspace: Workspace, sources: Sources, files: Sequence[str]) -> 
         for file, index in indexed.items():
             if index is not None and "main" in index.functions:
                 others = [f for f in listed if "main" not in getattr(indexed[f], "functions", {})]
-                yield Key(package_name), Entry((file, *others))
+                yield LaunchKey(package_name), Entry((file, *others))
         for file, index in indexed.items():
             for cls in registered_components(index) if index is not None else ():
                 yield (
-                    Key(package_name, None, cls),
+                    LaunchKey(package_name, None, cls),
                     Entry((file, *(f for f in listed if f != file)), cls=cls, main=False),
                 )
 
 
 def _unmade(
     workspace: Workspace, sources: Sources, files: Sequence[str], made: set[str]
-) -> Iterable[tuple[Key, Entry]]:
+) -> Iterable[tuple[LaunchKey, Entry]]:
     from nodl.infer.cpp.libraries import NODE_BASES
     from nodl.infer.cpp.reading.names import Names
 
@@ -232,7 +237,7 @@ def _unmade(
             package = workspace.package_of(index.file)
             own = [f for f in files if workspace.package_of(f) is package]
             yield (
-                Key(package.name if package else None),
+                LaunchKey(package.name if package else None),
                 Entry(_with_first(index.file, own), cls=cls.qualified, main=False),
             )
 

@@ -17,7 +17,7 @@ from nodl.infer.interpreter.decisions import Decisions
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy, Variables
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.state import State
+from nodl.infer.state import ProgramState
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
@@ -85,7 +85,7 @@ class Run:
         self.tables = tables
         self._expressions = tables.expressions
         self._statements = tables.statements
-        self.state = State()
+        self.state = ProgramState()
         self.findings = Findings()
         self.state.found = lambda: self.findings.count()
         self.modules: dict[str, ModuleValue] = {}

@@ -27,7 +27,7 @@ class GivenParameter(NamedTuple):
     value: str
 
 
-class RosArguments(NamedTuple):
+class WrittenRosArguments(NamedTuple):
     """``rules`` as written; ``files``: parameter files."""
 
     rules: tuple[str, ...] = ()
@@ -35,11 +35,11 @@ class RosArguments(NamedTuple):
     files: tuple[str, ...] = ()
 
 
-def ros_arguments(words: Iterable[str]) -> RosArguments:
+def ros_arguments(words: Iterable[str]) -> WrittenRosArguments:
     """What the flags among ``words`` say. What rcl would refuse is left out: the program ends there."""
     pairs = list(_flags(words))
     parameters = (_parameter(value) for flag, value in pairs if flag in _PARAMETER)
-    return RosArguments(
+    return WrittenRosArguments(
         tuple(value for flag, value in pairs if flag in _REMAP),
         tuple(parameter for parameter in parameters if parameter is not None),
         tuple(value for flag, value in pairs if flag == _FILE),

@@ -27,7 +27,7 @@ class Argument:
 
 
 @dataclass(frozen=True, slots=True)
-class Callback:
+class CallbackArgument:
     """An argument that is called later, with ``arity`` arguments (``None``: any number)."""
 
     argument: Argument
@@ -42,7 +42,7 @@ class EndpointCall:
     type: Argument
     name: Argument
     node: Argument | None = None
-    callbacks: tuple[Callback, ...] = ()
+    callbacks: tuple[CallbackArgument, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +60,7 @@ class Helper:
 
     node: Argument
     endpoints: tuple[FixedEndpoint, ...]
-    callbacks: tuple[Callback, ...] = ()
+    callbacks: tuple[CallbackArgument, ...] = ()
 
 
 _CALLBACK = Argument(2, "callback")
@@ -69,10 +69,13 @@ NODE_ENDPOINTS: dict[str, EndpointCall] = {
     "create_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic")),
     "create_lifecycle_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic")),
     "create_subscription": EndpointCall(
-        SUBSCRIPTION, Argument(0, "msg_type"), Argument(1, "topic"), callbacks=(Callback(_CALLBACK, 1),)
+        SUBSCRIPTION,
+        Argument(0, "msg_type"),
+        Argument(1, "topic"),
+        callbacks=(CallbackArgument(_CALLBACK, 1),),
     ),
     "create_service": EndpointCall(
-        SERVER, Argument(0, "srv_type"), Argument(1, "srv_name"), callbacks=(Callback(_CALLBACK, 2),)
+        SERVER, Argument(0, "srv_type"), Argument(1, "srv_name"), callbacks=(CallbackArgument(_CALLBACK, 2),)
     ),
     "create_client": EndpointCall(CLIENT, Argument(0, "srv_type"), Argument(1, "srv_name")),
 }
@@ -89,10 +92,10 @@ ENDPOINT_CALLS: dict[tuple[str, str], EndpointCall] = {
         _ACTION_NAME,
         _NODE,
         callbacks=(
-            Callback(Argument(3, "execute_callback"), 1),
-            Callback(Argument(-1, "goal_callback"), 1),
-            Callback(Argument(-1, "handle_accepted_callback"), 1),
-            Callback(Argument(-1, "cancel_callback"), 1),
+            CallbackArgument(Argument(3, "execute_callback"), 1),
+            CallbackArgument(Argument(-1, "goal_callback"), 1),
+            CallbackArgument(Argument(-1, "handle_accepted_callback"), 1),
+            CallbackArgument(Argument(-1, "cancel_callback"), 1),
         ),
     ),
     ("message_filters", "Subscriber"): EndpointCall(
@@ -157,20 +160,20 @@ PARAMETER_SERVICES: dict[str, str] = {
 }
 
 # Node methods that only take callbacks.
-NODE_CALLBACKS: dict[str, Callback] = {
-    "create_timer": Callback(Argument(1, "callback"), 0),
-    "create_guard_condition": Callback(Argument(0, "callback"), 0),
-    "add_on_set_parameters_callback": Callback(Argument(0, "callback"), 1),
-    "add_pre_set_parameters_callback": Callback(Argument(0, "callback"), 1),
-    "add_post_set_parameters_callback": Callback(Argument(0, "callback"), 1),
-    "set_parameters_callback": Callback(Argument(0, "callback"), 1),
-    "add_waitable": Callback(Argument(0, "waitable"), None),
+NODE_CALLBACKS: dict[str, CallbackArgument] = {
+    "create_timer": CallbackArgument(Argument(1, "callback"), 0),
+    "create_guard_condition": CallbackArgument(Argument(0, "callback"), 0),
+    "add_on_set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
+    "add_pre_set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
+    "add_post_set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
+    "set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
+    "add_waitable": CallbackArgument(Argument(0, "waitable"), None),
 }
 
 # Methods of objects whose class is not known that take a callback.
-COMMON_CALLBACKS: dict[str, Callback] = {
-    "add_done_callback": Callback(Argument(0, "callback"), 1),
-    "send_goal_async": Callback(Argument(1, "feedback_callback"), 1),
+COMMON_CALLBACKS: dict[str, CallbackArgument] = {
+    "add_done_callback": CallbackArgument(Argument(0, "callback"), 1),
+    "send_goal_async": CallbackArgument(Argument(1, "feedback_callback"), 1),
 }
 
 # Transitions that a lifecycle node's class overrides (rclpy/lifecycle/node.py).

@@ -22,7 +22,7 @@ _NODE = "NAME_OF_THE_NODE"
 
 
 @dataclass(frozen=True, slots=True)
-class Interface:
+class ExpandedInterface:
     """One interface under its fully qualified name (``*`` for what is not known of it)."""
 
     kind: EndpointKind
@@ -34,9 +34,9 @@ class Interface:
 
 
 @dataclass(frozen=True, slots=True)
-class Node:
+class ExpandedNode:
     interface: NodeInterface
-    interfaces: tuple[Interface, ...]
+    interfaces: tuple[ExpandedInterface, ...]
     programs: tuple[str, ...] = ()  # executables and plugins of packages that hold it
 
     @property
@@ -56,7 +56,7 @@ class OpenQuestion:
 
 @dataclass(frozen=True, slots=True)
 class ExpandedSystem:
-    nodes: tuple[Node, ...]
+    nodes: tuple[ExpandedNode, ...]
     unresolved: tuple[OpenQuestion, ...]
 
 
@@ -66,7 +66,7 @@ def expand(system: InferredSystem) -> ExpandedSystem:
     nodes = []
     for written, programs in _told_once(system.nodes):
         interface = _under_own_rules(written)
-        found: list[Interface] = []
+        found: list[ExpandedInterface] = []
         for endpoint in interface.endpoints:
             for expanded, why in _expanded(endpoint, interface):
                 if why:
@@ -76,7 +76,7 @@ def expand(system: InferredSystem) -> ExpandedSystem:
         for gap in interface.gaps:
             unresolved[OpenQuestion(gap.source, gap.why)] = None
         found.extend(_built_in(interface))
-        nodes.append(Node(interface, tuple(dict.fromkeys(found)), programs))
+        nodes.append(ExpandedNode(interface, tuple(dict.fromkeys(found)), programs))
     for gap in system.gaps:
         unresolved[OpenQuestion(gap.source, gap.why)] = None
     nodes.sort(key=lambda node: (node.namespace, node.name, node.interface.source))
@@ -101,7 +101,7 @@ def _under_own_rules(node: NodeInterface) -> NodeInterface:
     return remapped(node, RemapRules(tuple(map(parse_rule, node.own_rules)), ())) if node.own_rules else node
 
 
-def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[Interface | None, str]]:
+def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[ExpandedInterface | None, str]]:
     """The interface of each name that ``endpoint`` has by default, and what is open about it."""
     kind = endpoint.kind.value.replace("_", " ")
     filled = endpoint.name.unconditional.fill_each({})
@@ -114,7 +114,7 @@ def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[Interfa
         except InvalidNameError as error:
             yield None, f"{kind}: {error}"
             continue
-        yield Interface(endpoint.kind, name, endpoint.type, endpoint.certainty, endpoint.source), why
+        yield ExpandedInterface(endpoint.kind, name, endpoint.type, endpoint.certainty, endpoint.source), why
 
 
 def _why(template: NameTemplate) -> str:
@@ -141,12 +141,12 @@ _LIFECYCLE_SERVICES = {
 }
 
 
-def _built_in(node: NodeInterface) -> Iterator[Interface]:
+def _built_in(node: NodeInterface) -> Iterator[ExpandedInterface]:
     """What every node of a current distribution (iron and later) has, by client library."""
     base = f"{'' if node.namespace in (None, '/') else node.namespace}/{node.name or '*'}"
 
-    def made(kind: EndpointKind, name: str, type_name: str) -> Interface:
-        return Interface(kind, name, type_name, Certainty.EXACT, node.source, built_in=True)
+    def made(kind: EndpointKind, name: str, type_name: str) -> ExpandedInterface:
+        return ExpandedInterface(kind, name, type_name, Certainty.EXACT, node.source, built_in=True)
 
     events = "rcl_interfaces/msg/ParameterEvent"
     yield made(EndpointKind.PUBLISHER, "/parameter_events", events)

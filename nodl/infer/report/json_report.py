@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.boundary.terminal import json_text
-from nodl.infer.report.expanded import ExpandedSystem, Interface, Node
+from nodl.infer.report.expanded import ExpandedInterface, ExpandedNode, ExpandedSystem
 
 
 def to_json(system: ExpandedSystem, *, built_in: bool = False) -> str:
@@ -18,7 +18,7 @@ def to_json(system: ExpandedSystem, *, built_in: bool = False) -> str:
     return json_text(document, indent=2) + "\n"
 
 
-def _node(node: Node, built_in: bool) -> dict[str, object]:
+def _node(node: ExpandedNode, built_in: bool) -> dict[str, object]:
     return {
         "name": node.name,
         "namespace": node.namespace,
@@ -30,7 +30,7 @@ def _node(node: Node, built_in: bool) -> dict[str, object]:
     }
 
 
-def _interface(interface: Interface) -> dict[str, object]:
+def _interface(interface: ExpandedInterface) -> dict[str, object]:
     return {
         "kind": interface.kind.value,
         "name": interface.name,

@@ -6,7 +6,7 @@ process with remappings.
 
 from __future__ import annotations
 
-from nodl.infer.report.expanded import ExpandedSystem, Node
+from nodl.infer.report.expanded import ExpandedNode, ExpandedSystem
 from nodl.node_interface import EndpointKind
 from nodl.policy_text import policy_text, profile_lines
 
@@ -21,7 +21,7 @@ def to_policy(system: ExpandedSystem, *, accept_patterns: bool = False) -> str:
     return policy_text(enclaves)
 
 
-def _profile(node: Node, accept_patterns: bool) -> list[str]:
+def _profile(node: ExpandedNode, accept_patterns: bool) -> list[str]:
     names: dict[EndpointKind, list[str]] = {}
     for interface in node.interfaces:
         if _allowed(interface.name, accept_patterns):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from nodl.node_interface import EndpointKind
-from nodl.record.asked import Role, role_of
+from nodl.record.asked import EndpointRole, role_of
 from nodl.record.lines import EndpointMade
 from nodl.record.written import meant_name, private_name
 from nodl.remap import RemapRules, parse_rule
@@ -28,29 +28,32 @@ def made(kind: EndpointKind, written: str, by: str, type_name: str = "", final: 
 @pytest.mark.parametrize(
     ("endpoint", "role"),
     [
-        (made(P, "/rosout", "librcl.so"), Role.BUILT_IN),
-        (made(R, "/a/me/get_type_description", "librcl.so"), Role.BUILT_IN),
-        (made(P, "/a/do/_service_event", "librcl.so"), Role.INTROSPECTION),
-        (made(P, "/rosout", CPP), Role.OWN),
-        (made(R, "~/change_state", "librcl_lifecycle.so"), Role.LIFECYCLE),
-        (made(C, "other/change_state", CPP), Role.OWN),
-        (made(R, "fib/_action/send_goal", "librcl_action.so"), Role.PART_OF_ACTION),
-        (made(A, "fib", "librcl_action.so"), Role.REPEATED),
-        (made(A, "fib", PY), Role.OWN),
-        (made(R, "me/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), Role.BUILT_IN),
-        (made(R, "/a/me/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), Role.BUILT_IN),
-        (made(R, "you/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), Role.OWN),
-        (made(R, "me/get_parameters", CPP, "my_msgs/srv/GetParameters"), Role.OWN),
-        (made(C, "you/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), Role.OWN),
-        (made(R, "me/get_logger_levels", CPP, "rcl_interfaces/srv/GetLoggerLevels"), Role.LOGGER_SERVICE),
-        (made(R, "~/_container/load_node", CPP), Role.CONTAINER),
-        (made(P, "/parameter_events", PY, EVENT), Role.BUILT_IN),
-        (made(S, "/parameter_events", CPP, EVENT), Role.BUILT_IN),
-        (made(S, "/parameter_events", PY, EVENT), Role.OWN),
-        (made(P, "/statistics", CPP, "statistics_msgs/msg/MetricsMessage"), Role.OWN),
+        (made(P, "/rosout", "librcl.so"), EndpointRole.BUILT_IN),
+        (made(R, "/a/me/get_type_description", "librcl.so"), EndpointRole.BUILT_IN),
+        (made(P, "/a/do/_service_event", "librcl.so"), EndpointRole.INTROSPECTION),
+        (made(P, "/rosout", CPP), EndpointRole.OWN),
+        (made(R, "~/change_state", "librcl_lifecycle.so"), EndpointRole.LIFECYCLE),
+        (made(C, "other/change_state", CPP), EndpointRole.OWN),
+        (made(R, "fib/_action/send_goal", "librcl_action.so"), EndpointRole.PART_OF_ACTION),
+        (made(A, "fib", "librcl_action.so"), EndpointRole.REPEATED),
+        (made(A, "fib", PY), EndpointRole.OWN),
+        (made(R, "me/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), EndpointRole.BUILT_IN),
+        (made(R, "/a/me/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), EndpointRole.BUILT_IN),
+        (made(R, "you/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), EndpointRole.OWN),
+        (made(R, "me/get_parameters", CPP, "my_msgs/srv/GetParameters"), EndpointRole.OWN),
+        (made(C, "you/get_parameters", CPP, "rcl_interfaces/srv/GetParameters"), EndpointRole.OWN),
+        (
+            made(R, "me/get_logger_levels", CPP, "rcl_interfaces/srv/GetLoggerLevels"),
+            EndpointRole.LOGGER_SERVICE,
+        ),
+        (made(R, "~/_container/load_node", CPP), EndpointRole.CONTAINER),
+        (made(P, "/parameter_events", PY, EVENT), EndpointRole.BUILT_IN),
+        (made(S, "/parameter_events", CPP, EVENT), EndpointRole.BUILT_IN),
+        (made(S, "/parameter_events", PY, EVENT), EndpointRole.OWN),
+        (made(P, "/statistics", CPP, "statistics_msgs/msg/MetricsMessage"), EndpointRole.OWN),
     ],
 )
-def test_who_made_an_endpoint_decides_what_it_is(endpoint: EndpointMade, role: Role) -> None:
+def test_who_made_an_endpoint_decides_what_it_is(endpoint: EndpointMade, role: EndpointRole) -> None:
     assert role_of(endpoint) is role
 
 

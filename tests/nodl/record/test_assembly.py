@@ -13,7 +13,7 @@ from nodl.record.lines import (
     Loaded,
     LoadedComponent,
     NodeMade,
-    Run,
+    RecordedRun,
     StartedProcess,
 )
 
@@ -37,7 +37,7 @@ def publisher(pid: int, number: int, name: str, fqn: str) -> EndpointMade:
 
 
 def nodes(*lines: Line) -> list[AskedNode]:
-    return all_asked(Record([Run("r"), *lines]).attributed())
+    return all_asked(Record([RecordedRun("r"), *lines]).attributed())
 
 
 def test_a_node_behind_a_shell_belongs_to_the_process_of_the_launch() -> None:
@@ -143,14 +143,14 @@ def test_what_a_launch_did_not_load_and_executables_are_not_learnt() -> None:
         loaded(11, 1, 11),
         node(11, 1, "script", "/script"),
     )
-    learnt = learn([Record([Run("r"), *lines])])
+    learnt = learn([Record([RecordedRun("r"), *lines])])
     assert [each.key.node for each in learnt.nodes if each.key.node != "ComponentManager"] == []
     assert any("/stranger" in text for text in learnt.unforeseeable)
 
 
 def test_the_node_of_a_transform_listener_marks_the_node_that_made_it() -> None:
     lines = (
-        Run("r"),
+        RecordedRun("r"),
         StartedProcess(10, "a-1", "demo", "a"),
         loaded(10, 1, 10),
         node(10, 1, "a", "/a"),
@@ -168,7 +168,7 @@ def test_other_nodes_with_addresses_in_their_names_are_reported() -> None:
         loaded(10, 1, 10),
         node(10, 1, "_", "/helper_5581a2b3c4d0"),
     )
-    assert learn([Record([Run("r"), *lines])]).unforeseeable == ("helper_* of demo/a",)
+    assert learn([Record([RecordedRun("r"), *lines])]).unforeseeable == ("helper_* of demo/a",)
 
 
 def test_a_word_of_letters_is_no_address() -> None:
@@ -177,5 +177,5 @@ def test_a_word_of_letters_is_no_address() -> None:
         loaded(10, 1, 10),
         node(10, 1, "the_facade", "/the_facade"),
     )
-    (learnt,) = learn([Record([Run("r"), *lines])]).nodes
+    (learnt,) = learn([Record([RecordedRun("r"), *lines])]).nodes
     assert (learnt.key.node, learnt.random_name) == ("the_facade", False)

@@ -15,7 +15,7 @@ from nodl.record.lines import (
     LineReader,
     LoadedComponent,
     NodeMade,
-    Run,
+    RecordedRun,
     StartedProcess,
     line_text,
     read_lines,
@@ -135,7 +135,7 @@ def test_no_bytes_make_the_reader_fail(text: bytes) -> None:
 @pytest.mark.parametrize(
     "said",
     [
-        Run("r1", "/x.launch.xml", "jazzy", "network namespace", "2026-11-21", secured=True),
+        RecordedRun("r1", "/x.launch.xml", "jazzy", "network namespace", "2026-11-21", secured=True),
         StartedProcess(
             9, "talker-1", "demo", "talker", "node", "/talker", "/", "x:3", ("a",), ("b:=c",), {"p": ("q", 1)}
         ),
@@ -143,7 +143,7 @@ def test_no_bytes_make_the_reader_fail(text: bytes) -> None:
     ],
 )
 def test_what_the_supervisor_says_is_read_as_it_was_said(
-    said: Run | StartedProcess | LoadedComponent,
+    said: RecordedRun | StartedProcess | LoadedComponent,
 ) -> None:
     assert read_lines(line_text(said)) == ([said], [])
 

@@ -12,8 +12,8 @@ from nodl.node_interface import EndpointKind
 from nodl.record.origins import (
     FIXED,
     Name,
+    NameOrigin,
     Observation,
-    Origin,
     Source,
     arguments_as_inputs,
     candidates,
@@ -31,7 +31,7 @@ def seen(inputs: Mapping[str, object], *names: str | Name) -> Observation:
     return Observation(inputs, frozenset(name(each) if isinstance(each, str) else each for each in names))
 
 
-def origin(text: str, *observations: Observation) -> Origin:
+def origin(text: str, *observations: Observation) -> NameOrigin:
     return origins_of(observations)[name(text)]
 
 
@@ -40,12 +40,12 @@ def test_a_name_that_no_value_explains_is_fixed() -> None:
 
 
 def test_one_candidate_is_the_source_as_far_as_one_run_tells() -> None:
-    assert origin("scan", seen({"scan_topic": "scan"}, "scan")) == Origin(Source("scan_topic"))
+    assert origin("scan", seen({"scan_topic": "scan"}, "scan")) == NameOrigin(Source("scan_topic"))
 
 
 def test_another_value_that_was_followed_proves_it() -> None:
     first, second = seen({"scan_topic": "scan"}, "scan"), seen({"scan_topic": "front"}, "front")
-    assert origin("scan", first, second) == Origin(Source("scan_topic"), proven=True)
+    assert origin("scan", first, second) == NameOrigin(Source("scan_topic"), proven=True)
 
 
 def test_another_value_that_was_not_followed_makes_it_fixed() -> None:
@@ -56,7 +56,7 @@ def test_another_value_that_was_not_followed_makes_it_fixed() -> None:
 
 def test_a_value_that_was_not_changed_proves_nothing() -> None:
     same = seen({"scan_topic": "scan"}, "scan")
-    assert origin("scan", same, same) == Origin(Source("scan_topic"))
+    assert origin("scan", same, same) == NameOrigin(Source("scan_topic"))
 
 
 @pytest.mark.parametrize("parameter", ["global_frame", "odom.frame_id", "scan.type"])
@@ -65,7 +65,7 @@ def test_frames_and_types_are_no_candidates(parameter: str) -> None:
 
 
 def test_what_is_called_a_topic_goes_before_other_values() -> None:
-    assert origin("scan", seen({"scan.topic": "scan", "label": "scan"}, "scan")) == Origin(
+    assert origin("scan", seen({"scan.topic": "scan", "label": "scan"}, "scan")) == NameOrigin(
         Source("scan.topic")
     )
 
@@ -79,7 +79,7 @@ def test_several_candidates_are_undecided_and_no_source() -> None:
 def test_a_second_run_decides_between_several() -> None:
     first = seen({"odom0": "odom", "other": "odom"}, "odom")
     second = seen({"odom0": "wheels", "other": "odom"}, "wheels")
-    assert origin("odom", first, second) == Origin(Source("odom0"), proven=True)
+    assert origin("odom", first, second) == NameOrigin(Source("odom0"), proven=True)
 
 
 def test_a_value_as_a_part_of_a_name_is_a_coincidence() -> None:
@@ -87,13 +87,13 @@ def test_a_value_as_a_part_of_a_name_is_a_coincidence() -> None:
 
 
 def test_values_are_names_verbatim() -> None:
-    assert origin("~/p", seen({"a": "~/p"}, "~/p")) == Origin(Source("a"))
+    assert origin("~/p", seen({"a": "~/p"}, "~/p")) == NameOrigin(Source("a"))
     assert origin("/p", seen({"a": "p"}, "/p")) == FIXED
 
 
 def test_each_entry_of_a_list() -> None:
     origins = origins_of([seen({"sources": ("a", "b")}, "a", "b")])
-    assert set(origins.values()) == {Origin(Source("sources", each=True))}
+    assert set(origins.values()) == {NameOrigin(Source("sources", each=True))}
 
 
 def test_types_keep_two_names_of_one_value_apart() -> None:
@@ -105,21 +105,21 @@ def test_types_keep_two_names_of_one_value_apart() -> None:
         lock._replace(name="two"),
     )
     origins = origins_of([first, second])
-    assert origins[twist] == Origin(Source("topics.a.topic"), proven=True)
-    assert origins[lock] == Origin(Source("locks.a.topic"), proven=True)
+    assert origins[twist] == NameOrigin(Source("topics.a.topic"), proven=True)
+    assert origins[lock] == NameOrigin(Source("locks.a.topic"), proven=True)
 
 
 def test_keys_that_are_data_become_a_star_where_two_were_seen() -> None:
     two = seen({"topics.joy.topic": "a", "topics.nav.topic": "b"}, "a", "b")
-    assert origins_of([two])[name("a")] == Origin(Source("topics.*.topic"))
+    assert origins_of([two])[name("a")] == NameOrigin(Source("topics.*.topic"))
     one = seen({"topics.joy.topic": "a"}, "a")
-    assert origins_of([one])[name("a")] == Origin(Source("topics.joy.topic"))
+    assert origins_of([one])[name("a")] == NameOrigin(Source("topics.joy.topic"))
 
 
 def test_the_name_where_nothing_is_set_is_the_default() -> None:
     set_, unset = seen({"scan_topic": "front"}, "front", "odom"), seen({}, "scan", "odom")
     origins = origins_of([set_, unset])
-    assert origins[name("front")] == Origin(Source("scan_topic"), proven=True, default="scan")
+    assert origins[name("front")] == NameOrigin(Source("scan_topic"), proven=True, default="scan")
     assert name("scan") not in origins
     assert origins[name("odom")] == FIXED
 
@@ -166,7 +166,7 @@ MANAGED = ("map_server/get_state", "amcl/get_state")
 def test_names_below_every_entry_of_a_list_follow_the_list() -> None:
     """nav2's lifecycle_manager has a client below the name of each node in ``node_names``."""
     run = seen({"node_names": ("map_server", "amcl")}, *MANAGED, "bond")
-    assert origin("amcl/get_state", run) == Origin(Source("node_names", each=True, suffix="/get_state"))
+    assert origin("amcl/get_state", run) == NameOrigin(Source("node_names", each=True, suffix="/get_state"))
     assert origin("bond", run) == FIXED
 
 
@@ -177,9 +177,9 @@ def test_a_name_below_one_entry_only_is_a_coincidence() -> None:
 def test_a_list_of_one_entry_leaves_open_what_a_second_run_decides() -> None:
     source = Source("node_names", each=True, suffix="/get_state")
     one = seen({"node_names": ("amcl",)}, "amcl/get_state")
-    assert origin("amcl/get_state", one) == Origin(candidates=(source,))
+    assert origin("amcl/get_state", one) == NameOrigin(candidates=(source,))
     other = seen({"node_names": ("planner",)}, "planner/get_state")
-    assert origin("amcl/get_state", one, other) == Origin(source, proven=True)
+    assert origin("amcl/get_state", one, other) == NameOrigin(source, proven=True)
     fixed = seen({"node_names": ("planner",)}, "amcl/get_state")
     assert origin("amcl/get_state", one, fixed) == FIXED
 
@@ -190,7 +190,7 @@ def declared(defaults: Mapping[str, object], *names: str, **given_too: object) -
 
 def test_a_parameter_that_the_program_declares_and_nobody_sets_is_a_source_with_its_default() -> None:
     run = declared({"map_topic": "map", "frame_id": "map"}, "map")
-    assert origin("map", run) == Origin(Source("map_topic"), default="map")
+    assert origin("map", run) == NameOrigin(Source("map_topic"), default="map")
 
 
 def test_a_declared_value_that_is_another_one_explains_nothing() -> None:
@@ -199,22 +199,22 @@ def test_a_declared_value_that_is_another_one_explains_nothing() -> None:
 
 def test_a_run_that_sets_what_another_one_left_proves_it_and_keeps_the_default() -> None:
     left, given_ = declared({"map_topic": "map"}, "map"), seen({"map_topic": "floor"}, "floor")
-    expected = Origin(Source("map_topic"), proven=True, default="map")
+    expected = NameOrigin(Source("map_topic"), proven=True, default="map")
     assert origin("map", left, given_) == expected == origin("floor", left, given_)
 
 
 def test_what_the_program_declares_from_its_command_line_comes_from_there() -> None:
-    assert origin("scan", declared({"input_topic": "scan"}, "scan", **{"<1>": "scan"})) == Origin(
+    assert origin("scan", declared({"input_topic": "scan"}, "scan", **{"<1>": "scan"})) == NameOrigin(
         Source("<1>")
     )
 
 
 def test_declared_and_given_parameters_of_one_value_are_undecided() -> None:
     run = declared({"goal_topic": "goal"}, "goal", start_topic="goal")
-    assert origin("goal", run) == Origin(candidates=(Source("goal_topic"), Source("start_topic")))
+    assert origin("goal", run) == NameOrigin(candidates=(Source("goal_topic"), Source("start_topic")))
 
 
 def test_parameters_with_defaults_are_not_made_a_pattern() -> None:
     """The program knows them by name: without the defaults a launch that sets none of them would have no names."""
     run = declared({"front.topic": "a", "rear.topic": "b"}, "a", "b")
-    assert origin("a", run) == Origin(Source("front.topic"), default="a")
+    assert origin("a", run) == NameOrigin(Source("front.topic"), default="a")

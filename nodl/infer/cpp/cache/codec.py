@@ -11,7 +11,8 @@ from enum import Enum
 from typing import Any
 
 from nodl.dependence import Dependence, Test, Variation, When
-from nodl.infer.cpp.entry import Entry, FixedMapping, Key, Solved
+from nodl.infer.cpp.entry import Entry, FixedMapping, Solved
+from nodl.infer.start import LaunchKey
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
 from nodl.source_ref import SourceRef
@@ -19,8 +20,8 @@ from nodl.source_ref import SourceRef
 _RECORDS: dict[str, Callable[..., Any]] = {
     each.__name__: each
     for each in (
-        Dependence, Endpoint, Entry, Gap, Key, NameTemplate, NodeInterface, ParameterPart, Solved, SourceRef, Test,
-        UnknownPart, Variation, When,
+        Dependence, Endpoint, Entry, Gap, LaunchKey, NameTemplate, NodeInterface, ParameterPart, Solved, SourceRef,
+        Test, UnknownPart, Variation, When,
     )
 }  # fmt: skip
 _ENUMERATIONS: dict[str, type[Enum]] = {

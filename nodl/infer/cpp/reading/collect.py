@@ -10,8 +10,8 @@ from nodl.infer.cpp.reading.declarations import (
     Field,
     FileIndex,
     Function,
+    FunctionParameter,
     Global,
-    Parameter,
     function_declarator,
     type_text,
 )
@@ -279,7 +279,7 @@ def _plain_name(name: str) -> str:
     return re.sub(r"\s+", "", "".join(out))
 
 
-def parameters_of(declarator: Node, function: Function | None = None) -> list[Parameter]:
+def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:
     listed = declarator.child_by_field_name("parameters")
     found = []
     for child in listed.named_children if listed is not None else ():
@@ -294,7 +294,9 @@ def parameters_of(declarator: Node, function: Function | None = None) -> list[Pa
         if written == "void" and not names:
             continue
         found.append(
-            Parameter(text(names[0]) if names else "", written, child.child_by_field_name("default_value"))
+            FunctionParameter(
+                text(names[0]) if names else "", written, child.child_by_field_name("default_value")
+            )
         )
     return found
 

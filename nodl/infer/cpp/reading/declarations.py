@@ -24,7 +24,7 @@ _NUMBERS = frozenset({
 
 
 @dataclass(eq=False, slots=True)
-class Parameter:
+class FunctionParameter:
     name: str
     type: str
     default: Node | None = None
@@ -39,7 +39,7 @@ class Function:
     file: FileIndex
     scope: Scope  # namespaces, then classes, that names in it are looked up in
     owner: str = ""
-    parameters: list[Parameter] = field(default_factory=list)
+    parameters: list[FunctionParameter] = field(default_factory=list)
     templates: list[str] = field(default_factory=list)
     initialisers: list[tuple[str, Node]] = field(default_factory=list)  # member or base -> arguments
     body: Node | None = None

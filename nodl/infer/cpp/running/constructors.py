@@ -18,7 +18,7 @@ from nodl.infer.cpp.syntax import children
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.reading.declarations import Class, Function, Parameter
+    from nodl.infer.cpp.reading.declarations import Class, Function, FunctionParameter
     from nodl.infer.cpp.reading.type_names import Type
 
 
@@ -264,7 +264,7 @@ def _takes(function: Function, count: int) -> bool:
     return function.variadic or required <= count <= len(function.parameters)
 
 
-def _likeness(parameter: Parameter, value: Value) -> int:
+def _likeness(parameter: FunctionParameter, value: Value) -> int:
     """How well an argument fits a parameter, by their looks."""
     atom = value[0] if value else None
     kind = parameter.type

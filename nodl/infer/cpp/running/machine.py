@@ -16,7 +16,7 @@ from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
 from nodl.infer.cpp.reading.declarations import Function
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.store import Changes, Store
+from nodl.infer.cpp.running.store import AbstractStore, Changes
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
@@ -86,7 +86,7 @@ class Machine:
     def __init__(self, names: Names, settings: Settings | None = None):
         self.names = names
         self.settings = settings or Settings()
-        self.store = Store()
+        self.store = AbstractStore()
         self.nodes: dict[NodeRecord, None] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.objects: dict[object, Obj] = {}

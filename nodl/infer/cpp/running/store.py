@@ -11,7 +11,7 @@ Changes = dict[Cell, Value]
 _ABSENT: Value = (("absent",),)
 
 
-class Store:
+class AbstractStore:
     def __init__(self) -> None:
         self._cells: dict[Cell, Value] = {}
         self._trail: list[tuple[Cell, Value]] = []
