@@ -202,3 +202,30 @@ def named_in_architecture() -> list[str]:
 @pytest.mark.parametrize("named", named_in_architecture())
 def test_what_architecture_md_names_exists(named: str) -> None:
     assert (ROOT / "enclave_launch" / named).exists() or (ROOT / named).exists()
+
+
+# Public class names that stand twice on purpose. What is not here has a name of its own.
+AS_UPSTREAM_HAS_IT = {  # launch, launch_ros and the NoDL v1 API name both so, and launch files import them
+    "Action", "Entity", "IncludeLaunchDescription", "Node", "Parameter", "Parser", "PushRosEnclave", "Shutdown",
+    "ProcessExited", "ProcessStarted",  # the events of launch, and what a library user hears of them
+}  # fmt: skip
+AS_THE_PLAN_HAS_IT = {
+    "Diagnostic",
+    "LauncherCall",
+    "Node",
+    "Reaction",
+    "Respawn",
+}  # report/contract.py: their JSON
+IN_BOTH_KINDS_OF_INFERENCE = {  # of Python in nodl/infer/, of C++ in nodl/infer/cpp/
+    "BudgetExceeded", "Call", "Findings", "FoundEndpoint", "Frame", "NodePart", "NodeRecord", "Text", "Unknown",
+}  # fmt: skip
+
+
+def test_a_public_class_has_its_name_alone() -> None:
+    homes: dict[str, list[str]] = {}
+    for path in (path for package in PACKAGES for path in sources(package)):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                homes.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    twice = {name for name, places in homes.items() if len(places) > 1}
+    assert twice == AS_UPSTREAM_HAS_IT | AS_THE_PLAN_HAS_IT | IN_BOTH_KINDS_OF_INFERENCE

@@ -1,4 +1,4 @@
-"""XML text -> elements with line numbers. Pure.
+"""The XML of launch files -> elements with line numbers. Pure.
 
 Parsed by expat, as upstream does through ElementTree: same dialect, same messages, right line numbers in long
 files, and less time than lxml takes to build a tree and give it to Python. Unlike ElementTree we keep the
@@ -10,41 +10,15 @@ entity that the file declares must be short, the entities in it included, so tha
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from functools import partial
 from xml.parsers import expat
+
+from enclave_launch.boundary.xml_tree import RefusedXml, XmlElement, collect_elements
 
 MAX_ENTITY_LENGTH = 256  # characters of one declared entity
 _REFERENCE = re.compile("&([^;&#]+);")
 _PREDEFINED = dict.fromkeys(("lt", "gt", "amp", "apos", "quot"), " ")
 _UNKNOWN = " " * (MAX_ENTITY_LENGTH + 1)
-MAX_NESTING = 250  # elements in elements; upstream ends in a RecursionError before
-
-
-class RefusedXml(ValueError):
-    """Well-formed, but made to exhaust memory or to reach outside the file. ``line`` counts from 1."""
-
-    def __init__(self, message: str, line: int):
-        super().__init__(f"{message}: line {line}")
-        self.line = line
-
-
-class XmlElement:
-    """One element. Iterating gives the child elements; text, comments and instructions are not kept."""
-
-    __slots__ = ("attrib", "children", "sourceline", "tag")
-
-    def __init__(self, tag: str, attrib: dict[str, str], sourceline: int):
-        self.tag = tag
-        self.attrib = attrib
-        self.sourceline = sourceline
-        self.children: list[XmlElement] = []
-
-    def __iter__(self) -> Iterator[XmlElement]:
-        return iter(self.children)
-
-    def __len__(self) -> int:
-        return len(self.children)
 
 
 def parse_launch_xml(text: str) -> XmlElement:
@@ -55,42 +29,13 @@ def parse_launch_xml(text: str) -> XmlElement:
     parser = expat.ParserCreate(namespace_separator="}")
     parser.EntityDeclHandler = partial(_check_entity, parser, dict(_PREDEFINED))
     parser.SkippedEntityHandler = partial(_refuse_skipped_entity, parser)
-    document = _collect_elements(parser, namespaces="xmlns" in text)
+    document = collect_elements(parser, namespaces="xmlns" in text)
     try:
         # Encoded text and not str, as upstream: a declared encoding then counts, oddly, a second time.
         parser.Parse(text.encode("utf-8", "surrogatepass"), True)
     except expat.ExpatError as error:
         raise _parse_error(str(error), error.code, (error.lineno, error.offset)) from None
     return document[0]
-
-
-def _collect_elements(parser: expat.XMLParserType, *, namespaces: bool) -> list[XmlElement]:
-    """Let ``parser`` build elements; the returned list holds the root when it is done.
-
-    Closures, for speed: two calls per element are most of the time that a front end takes.
-    """
-    document: list[XmlElement] = []
-    open_elements = [document]
-    descend, ascend = open_elements.append, open_elements.pop
-
-    def start(tag: str, attributes: dict[str, str]) -> None:
-        element = XmlElement(tag, attributes, parser.CurrentLineNumber)
-        open_elements[-1].append(element)
-        descend(element.children)
-        if len(open_elements) > MAX_NESTING:
-            raise RefusedXml(f"elements are nested more than {MAX_NESTING} deep", element.sourceline)
-
-    def start_with_namespaces(tag: str, attributes: dict[str, str]) -> None:
-        start(_clark(tag), {_clark(name): value for name, value in attributes.items()})
-
-    parser.StartElementHandler = start_with_namespaces if namespaces else start
-    parser.EndElementHandler = lambda _tag: ascend()
-    return document
-
-
-def _clark(name: str) -> str:
-    """``uri}name`` -> ``{uri}name``, ElementTree's way to write a name in a namespace."""
-    return "{" + name if "}" in name else name
 
 
 def _check_entity(

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from enclave_launch.boundary.xml_tree import XmlElement
 from nodl.document.manifest_node import ManifestNode
-from nodl.document.xml_text import XmlElement, parse_xml
+from nodl.document.xml_text import parse_xml
 from nodl.errors import (
     InvalidElementError,
     InvalidNodeChildError,
@@ -171,4 +172,4 @@ def _no_text(element: XmlElement, file: str) -> None:
 
 
 def _at(element: XmlElement, file: str) -> SourceRef:
-    return SourceRef(file, element.line)
+    return SourceRef(file, element.sourceline)

@@ -11,13 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.frontend.xml_tree import (
-    MAX_ENTITY_LENGTH,
-    MAX_NESTING,
-    RefusedXml,
-    XmlElement,
-    parse_launch_xml,
-)
+from enclave_launch.boundary.xml_tree import MAX_NESTING, RefusedXml, XmlElement
+from enclave_launch.frontend.xml_tree import MAX_ENTITY_LENGTH, parse_launch_xml
 
 
 def shape(element: XmlElement | ET.Element) -> tuple[object, ...]:

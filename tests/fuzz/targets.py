@@ -11,9 +11,9 @@ from typing import NamedTuple
 import yaml
 
 from enclave_launch.boundary.shell_words import split_words
+from enclave_launch.boundary.xml_tree import RefusedXml
 from enclave_launch.boundary.yaml_nodes import compose
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template, print_template
-from enclave_launch.frontend.xml_tree import RefusedXml
 from enclave_launch.frontend.xml_tree import parse_launch_xml as parse_launch_xml
 from enclave_launch.frontend.yaml_scalar import load as load_scalar
 from enclave_launch.frontend.yaml_tree import parse_yaml as parse_launch_yaml

@@ -17,7 +17,7 @@ from enclave_launch.source_location import SourceLocation
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from enclave_launch.frontend.xml_tree import XmlElement
+    from enclave_launch.boundary.xml_tree import XmlElement
 
 
 _VALUE_TYPES = frozenset({str, int, float, bool, None})  # certainly no lists of entities
