@@ -19,9 +19,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats import der
+from keystore.formats.certificate import CertificateFacts
 
 if TYPE_CHECKING:
-    from keystore.formats.certificate import CertificateFacts
+    from keystore.signing.authority import Authority
     from keystore.signing.signer import Signer
 
 _TEXT_HEADER = b"Content-Type: text/plain\r\n\r\n"
@@ -45,6 +46,11 @@ def sign(document: bytes, certificate: CertificateFacts, signer: Signer, now: da
     content = _TEXT_HEADER + _with_crlf(document)
     pkcs7 = _signed_data(content, certificate, signer, now)
     return _multipart(content, pkcs7)
+
+
+def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
+    """``document`` signed by ``ca`` as S/MIME, the form that DDS-Security asks for."""
+    return sign(document, ca.facts, ca.signer, now)
 
 
 def _with_crlf(document: bytes) -> bytes:

@@ -1,8 +1,7 @@
 """A new keystore, or the missing parts of one: CAs, governance, settings. The same call completes what an
 interrupted run left; what is there is never made anew.
 
-A CA's certificate and key are published together: the pair is renamed into ``private/incoming`` as one
-directory and installed from there, so that no crash can leave a certificate beside another CA's key.
+A new CA's certificate and key are published together (``steps.incoming_ca``).
 """
 
 from __future__ import annotations
@@ -10,18 +9,16 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
 from enclave_launch.boundary.dependencies import require
 from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, lock, safe_files, store
-from keystore.disk.governance_file import covers, governance_stands
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.settings import KeystoreSettings
-from keystore.disk.store import Content, Store
-from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, NotAKeystoreError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
@@ -31,10 +28,12 @@ from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
-from keystore.signing import authority, smime
+from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.signer import FileSigner, open_signer
+from keystore.steps.governance_signing import write_governance
+from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 
 
@@ -280,56 +279,6 @@ def _read_given(path: Path) -> bytes:
         raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
 
 
-def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: bytes) -> None:
-    """Stage a CA pair durably; ``install_incoming`` publishes it, now or in the next run."""
-    opened.ensure_directory(layout.PRIVATE)
-    opened.ensure_directory(layout.INCOMING)
-    name = "key.p11" if key_name.endswith(".p11") else layout.KEY
-    facts = read_certificate(cert, layout.INCOMING)
-    with opened.batch() as batch:
-        batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
-        batch.directory(
-            f"{layout.INCOMING}/{role.value}",
-            {name: Content(key, store.PRIVATE_MODE), layout.CERT: Content(cert)},
-        )
-
-
-def install_incoming(opened: Store) -> None:
-    """Publish every complete CA pair waiting in ``private/incoming``; repeats safely after a crash."""
-    for role in Role:
-        waiting = f"{layout.INCOMING}/{role.value}"
-        if not opened.is_directory(waiting):
-            continue
-        cert = safe_files.read_if_there(opened.root, f"{waiting}/{layout.CERT}")
-        if cert is not None:
-            _install(opened, role, waiting, cert)
-        for name in (
-            layout.CERT,
-            layout.KEY,
-            "key.p11",
-        ):  # the certificate first: without it nothing is installed
-            opened.remove(f"{waiting}/{name}")
-        opened.remove_empty_directory(waiting)
-    opened.remove_empty_directory(layout.INCOMING)
-
-
-def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
-    pem = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY}")
-    uri = safe_files.read_if_there(opened.root, f"{waiting}/key.p11")
-    if pem is None and uri is None:
-        raise DamagedKeystoreError(
-            f"{printable(opened.root / waiting)} holds a certificate without key; remove it"
-        )
-    name, stale = layout.ca_key(role), layout.ca_key_uri(role)
-    if pem is None:
-        name, stale = stale, name
-    opened.ensure_directory(layout.PUBLIC)
-    with opened.batch() as batch:
-        batch.file(name, pem or uri or b"", store.PRIVATE_MODE)
-        batch.file(layout.ca_cert(role), cert)
-    opened.remove(stale)
-
-
 def _complete_governance(opened: Store, options: CreateOptions, actions: list[str]) -> None:
     if os.path.isfile(opened.root / layout.GOVERNANCE):
         return
@@ -361,45 +310,3 @@ def _unsigned_default(root: Path) -> bytes | None:
         f"{printable(place)} is not the default governance, and its signature governance.p7s is missing; look at "
         f"it and remove it: rm {shlex.quote(str(place))}"
     )
-
-
-def mirror_governance(opened: Store) -> bool:
-    """``governance.xml`` again as what is signed, where somebody changed it; whether that was needed."""
-    present = safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML)
-    document = trusted_document(KeystoreView(opened.root), layout.GOVERNANCE)
-    if present is None or present.replace(b"\r\n", b"\n") == document:
-        return False
-    with opened.batch() as batch:
-        batch.file(layout.GOVERNANCE_XML, document)
-    return True
-
-
-def write_governance(opened: Store, document: bytes, permissions_ca: Authority, now: datetime) -> None:
-    """Record, sign and publish it."""
-    signed = sign_document(document, permissions_ca, now)
-    with opened.batch() as batch:
-        batch.record(replace(opened.register, governance=document))
-        batch.file(layout.GOVERNANCE_XML, document)
-        batch.file(layout.GOVERNANCE, signed)
-
-
-def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
-    """``document`` signed by ``ca`` as S/MIME, the form that DDS-Security asks for."""
-    return smime.sign(document, ca.facts, ca.signer, now)
-
-
-def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
-    """Sign the governance again if it is not the one signed last, or its domains or signer no longer fit; whether
-    that was needed.
-
-    Raises InvalidInputError when it has several rules and none for a domain: then a person must decide.
-    """
-    view = KeystoreView(opened.root)
-    if governance_stands(view, domains, opened.register):
-        return False
-    document = opened.register.governance or trusted_document(view, layout.GOVERNANCE)
-    governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
-    if not covers(governance.domains(), domains):
-        document = governance_document(governance.extended_to(domains))
-    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
-    return True

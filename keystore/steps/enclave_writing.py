@@ -30,7 +30,7 @@ from keystore.formats.validity import Validity, iso
 from keystore.signing.authority import Authority, IdentityIssuer
 from keystore.signing.identity import Identity, certify, new_identity, public_half
 from keystore.signing.records import certificate_record, permissions_record
-from keystore.steps.creation import sign_document
+from keystore.signing.smime import sign_document
 from keystore.steps.crl import can_revoke, revocable
 from keystore.steps.enclave_state import EnclaveState, PermissionsSource, Reissue
 from keystore.steps.past_permissions import kept_permissions, what_is_taken_away

@@ -15,7 +15,7 @@ from keystore.formats.governance import Governance, governance_document
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
-from keystore.steps.creation import write_governance
+from keystore.steps.governance_signing import write_governance
 from keystore.steps.opening import opened_for_change
 
 

@@ -30,8 +30,8 @@ from keystore.signing import smime
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
 from keystore.signing.records import permissions_record
+from keystore.signing.smime import sign_document
 from keystore.steps.bundle import matching, refuse_unfit
-from keystore.steps.creation import sign_document
 from keystore.steps.opening import opened_for_change
 
 SUFFIX = ".bundle"

@@ -17,10 +17,11 @@ from keystore.disk.view import KeystoreView
 from keystore.formats.enclave_name import check_distinct
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity
 from keystore.steps.comparison import WantedEnclave, as_found, inspect_wanted
-from keystore.steps.creation import CreateOptions, complete, renew_governance
+from keystore.steps.creation import CreateOptions, complete
 from keystore.steps.crl import publish_crl, restore_crl
 from keystore.steps.enclave_state import EnclaveState
 from keystore.steps.enclave_writing import EnclaveWriter
+from keystore.steps.governance_signing import renew_governance
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import Progress, ProvisionOptions
 from keystore.steps.report import EnclaveReport, ProvisionReport

@@ -36,10 +36,11 @@ from keystore.formats.validity import utc_now
 from keystore.signing.authority import pem_certificate
 from keystore.steps import rollover
 from keystore.steps.comparison import WantedEnclave, with_domains
-from keystore.steps.creation import install_incoming, mirror_governance
 from keystore.steps.crl import restore_crl
 from keystore.steps.enclave_state import Reissue
 from keystore.steps.enclaves import keep
+from keystore.steps.governance_signing import mirror_governance
+from keystore.steps.incoming_ca import install_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import bring_about

@@ -24,7 +24,7 @@ from keystore.signing.authority import Authority, pem_certificate
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.requests import request_key
-from keystore.steps.creation import sign_document
+from keystore.signing.smime import sign_document
 from keystore.steps.host_keys import Request
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions

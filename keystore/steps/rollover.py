@@ -37,9 +37,10 @@ from keystore.formats.validity import Validity, utc_now
 from keystore.signing import authority, smime
 from keystore.signing.authority import Authority, pem_certificate
 from keystore.steps.comparison import WantedEnclave, with_domains
-from keystore.steps.creation import CreateOptions, install_incoming, passphrase_for_new_keys, put_incoming
+from keystore.steps.creation import CreateOptions, passphrase_for_new_keys
 from keystore.steps.crl import drop_crl
 from keystore.steps.enclaves import keep
+from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import bring_about

@@ -10,7 +10,7 @@ more.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -176,8 +176,6 @@ class Complaint(NamedTuple):
 
 
 _ENDPOINTS = {kind.value: kind for kind in EndpointKind}
-
-
 _MOST_MISSING = 100_000
 
 
@@ -188,9 +186,8 @@ class LineReader:
         self.complaints: list[Complaint] = []
         self._rest = b""
         self._highest: dict[int, int] = {}
-        self._missing: dict[
-            int, set[int]
-        ] = {}  # threads number their lines in one order and write them in another
+        # Threads number their lines in one order and write them in another.
+        self._missing: dict[int, set[int]] = {}
 
     def feed(self, data: bytes) -> list[Line]:
         """The lines that ``data`` completes."""
@@ -221,9 +218,8 @@ class LineReader:
         pid, number = fields.get("pid"), fields.get("n")
         if not isinstance(pid, int) or not isinstance(number, int):
             return
-        if (
-            fields["what"] == "loaded"
-        ):  # the first of a program; one process may run several, one after another
+        # The first line of a program; one process may run several, one after another.
+        if fields["what"] == "loaded":
             self._settle(pid)
             self._highest[pid] = 0
         highest = self._highest.get(pid, 0)
@@ -268,114 +264,31 @@ def _plain(value: object) -> object:
 def _parse(fields: Mapping[str, Any]) -> Line | None:
     what = fields["what"]
     if what in _ENDPOINTS:
-        return _endpoint(fields, _ENDPOINTS[what])
-    reader = _READERS.get(what)
-    return reader(fields) if reader else None
+        named = {**fields, "written": fields.get("name")}
+        return EndpointMade(_ENDPOINTS[what], *_values(EndpointMade._fields[1:], named))
+    if what == "parameters":
+        texts = declared_texts(bytes.fromhex(_str(fields, "cdr")))
+        return ParametersDeclared._make([*_values(("pid", "at", "node"), fields), texts])
+    kind = _KINDS.get(what)
+    return kind(*_values(kind._fields, fields)) if kind else None
 
 
-def _endpoint(f: Mapping[str, Any], kind: EndpointKind) -> EndpointMade:
-    return EndpointMade(
-        kind,
-        _int(f, "pid"),
-        _int(f, "thread"),
-        _int(f, "at"),
-        _int(f, "node"),
-        _int(f, "rc"),
-        _str(f, "name"),
-        _str(f, "fqn"),
-        _str(f, "final"),
-        _str(f, "type"),
-        _str(f, "by"),
-        tuple(int(number) for number in f.get("qos", ())),
-        _texts(f, "error"),
-    )
-
-
-def _loaded(f: Mapping[str, Any]) -> Loaded:
-    forked = f.get("forked") is True
-    return Loaded(
-        _int(f, "pid"), _int(f, "at"), _int(f, "parent"), _int(f, "session"), _str(f, "program"), forked
-    )
-
-
-def _initialised(f: Mapping[str, Any]) -> Initialised:
-    return Initialised(
-        _int(f, "pid"), _int(f, "at"), _int(f, "rc"), _str(f, "middleware"), _str(f, "by"), _texts(f, "error")
-    )
-
-
-def _node(f: Mapping[str, Any]) -> NodeMade:
-    return NodeMade(
-        _int(f, "pid"),
-        _int(f, "thread"),
-        _int(f, "at"),
-        _int(f, "node"),
-        _int(f, "rc"),
-        _str(f, "name"),
-        _str(f, "namespace"),
-        _str(f, "fqn"),
-        _str(f, "by"),
-        _texts(f, "error"),
-    )
-
-
-def _run(f: Mapping[str, Any]) -> RecordedRun:
-    return RecordedRun(
-        _str(f, "id"),
-        _str(f, "launch_file"),
-        _str(f, "distro"),
-        _str(f, "isolation"),
-        _str(f, "date"),
-        f.get("secured") is True,
-    )
-
-
-def _process(f: Mapping[str, Any]) -> StartedProcess:
-    return StartedProcess(
-        _int(f, "pid"),
-        _str(f, "process"),
-        _str(f, "package"),
-        _str(f, "executable"),
-        _str(f, "kind"),
-        _str(f, "fqn"),
-        _str(f, "enclave"),
-        _str(f, "location"),
-        _texts(f, "arguments"),
-        _texts(f, "rules"),
-        _parameters(f),
-    )
-
-
-def _component(f: Mapping[str, Any]) -> LoadedComponent:
-    return LoadedComponent(
-        _str(f, "container"),
-        _str(f, "package"),
-        _str(f, "plugin"),
-        _str(f, "name"),
-        _str(f, "namespace"),
-        _str(f, "location"),
-        _texts(f, "rules"),
-        _parameters(f),
-    )
-
-
-def _declared(f: Mapping[str, Any]) -> ParametersDeclared:
-    texts = declared_texts(bytes.fromhex(_str(f, "cdr")))
-    return ParametersDeclared(_int(f, "pid"), _int(f, "at"), _int(f, "node"), texts)
-
-
-_READERS: dict[str, Callable[[Mapping[str, Any]], Line]] = {
-    "loaded": _loaded,
-    "init": _initialised,
-    "node": _node,
-    "node_end": lambda f: NodeEnded(_int(f, "pid"), _int(f, "at"), _int(f, "node")),
-    "state": lambda f: StateEntered(_int(f, "pid"), _int(f, "at"), _int(f, "node"), _str(f, "state")),
-    "parameters": _declared,
-    "ended": lambda f: Ended(_int(f, "pid"), _int(f, "at")),
-    "run": _run,
-    "process": _process,
-    "component": _component,
+_KINDS: dict[str, Any] = {
+    "loaded": Loaded,
+    "init": Initialised,
+    "node": NodeMade,
+    "node_end": NodeEnded,
+    "state": StateEntered,
+    "ended": Ended,
+    "run": RecordedRun,
+    "process": StartedProcess,
+    "component": LoadedComponent,
 }
+
+
+def _values(names: Iterable[str], fields: Mapping[str, Any]) -> list[Any]:
+    """Fields of these names in this order, each of the type that its name has in every line."""
+    return [_READERS.get(name, _str)(fields, name) for name in names]
 
 
 def _int(fields: Mapping[str, Any], name: str) -> int:
@@ -396,11 +309,20 @@ def _texts(fields: Mapping[str, Any], name: str) -> tuple[str, ...]:
     return tuple(str(text) for text in fields.get(name) or ())
 
 
-def _parameters(fields: Mapping[str, Any]) -> Mapping[str, object]:
-    given = fields.get("parameters") or {}
+def _parameters(fields: Mapping[str, Any], name: str) -> Mapping[str, object]:
+    given = fields.get(name) or {}
     if not isinstance(given, dict):
-        raise TypeError("parameters")
+        raise TypeError(name)
     return {name: tuple(value) if isinstance(value, list) else value for name, value in given.items()}
+
+
+_READERS: dict[str, Callable[[Mapping[str, Any], str], object]] = {
+    **dict.fromkeys(("pid", "thread", "at", "node", "rc", "parent", "session"), _int),
+    **dict.fromkeys(("error", "arguments", "rules"), _texts),
+    **dict.fromkeys(("forked", "secured"), lambda fields, name: fields.get(name) is True),
+    "parameters": _parameters,
+    "qos": lambda fields, name: tuple(int(number) for number in fields.get(name, ())),
+}  # what is not here is a text
 
 
 def _shown(text: bytes) -> str:

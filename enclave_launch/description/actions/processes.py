@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping
-from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary import shell_words
 from enclave_launch.description.action import Action
-from enclave_launch.description.actions.events import Shutdown
 from enclave_launch.description.actions.executable import Executable
+from enclave_launch.description.actions.process_attributes import attributes_of
 from enclave_launch.description.location import location_of
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
@@ -27,7 +26,6 @@ from enclave_launch.description.substitutions.variables import LaunchConfigurati
 from enclave_launch.host.current import current_release
 from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess, Respawn
-from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import enclave_scope
 from enclave_launch.ros_rules.output import Routes, output_routes
 from enclave_launch.ros_rules.ros_arguments import RosArguments, parse_ros_arguments, words_after_program
@@ -38,7 +36,6 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
-    from enclave_launch.ros_rules.distro import Release
 
 
 if TYPE_CHECKING:
@@ -325,7 +322,7 @@ class ExecuteProcess(ExecuteLocal):
         if "cmd" not in skipped:
             kwargs["cmd"] = cls._parse_cmdline(entity.get_attr("cmd"), parser)
         given = entity.given
-        for attribute, keyword, read in _attributes_of(current_release()):
+        for attribute, keyword, read in attributes_of(current_release()):
             if attribute in given and keyword not in skipped:
                 value = read(entity, parser, attribute)
                 if value is not None:
@@ -356,96 +353,6 @@ class ExecuteProcess(ExecuteLocal):
     @property
     def additional_env(self) -> Any:
         return self.process_description.additional_env
-
-
-def _text(entity: Entity, parser: Parser, name: str) -> Any:
-    value = entity.get_attr(name, optional=True)
-    return None if value is None else parser.parse_substitution(value)
-
-
-def _flag(entity: Entity, parser: Parser, name: str) -> Any:
-    return entity.get_attr(name, data_type=bool, optional=True)
-
-
-def _count(entity: Entity, parser: Parser, name: str) -> Any:
-    return entity.get_attr(name, data_type=int, optional=True)
-
-
-def _seconds(entity: Entity, parser: Parser, name: str) -> Any:
-    value: Any = entity.get_attr(name, data_type=float, optional=True)
-    if value is not None and value < 0.0:
-        raise ValueError(
-            f"Attribute {name} of Entity node expected to be a non-negative value but got `{value}`"
-        )
-    return value
-
-
-def _seconds_as_text(entity: Entity, parser: Parser, name: str) -> Any:
-    value = _seconds(entity, parser, name)
-    return None if value is None else str(value)
-
-
-def _on_exit(entity: Entity, parser: Parser, name: str) -> Any:
-    value = entity.get_attr(name, optional=True)
-    if value is None:
-        return None
-    if value != "shutdown":
-        raise ValueError(
-            f"Attribute on_exit of Entity node expected to be shutdown but got `{value}`"
-            "Other on_exit actions not yet supported"
-        )
-    return [Shutdown()]
-
-
-def _environment(entity: Entity, parser: Parser, name: str) -> Any:
-    variables = entity.get_attr(name, data_type=list[Entity], optional=True)
-    if variables is None:
-        return None
-    parse = parser.parse_substitution
-    environment = {
-        tuple(parse(variable.get_attr("name"))): parse(variable.get_attr("value")) for variable in variables
-    }
-    for variable in variables:
-        variable.assert_entity_completely_parsed()
-    return environment
-
-
-_Attribute = tuple[
-    str, str, Callable[[Entity, "Parser", str], Any]
-]  # attribute, constructor argument, reader
-
-_ATTRIBUTES: tuple[_Attribute, ...] = (
-    ("cwd", "cwd", _text),
-    ("name", "name", _text),
-    ("launch-prefix", "prefix", _text),
-    ("output", "output", _text),
-    ("respawn", "respawn", _text),
-    ("enclave", "enclave", _text),
-    ("machine", "machine", _text),
-    ("respawn_delay", "respawn_delay", _seconds),
-    ("shell", "shell", _flag),
-)
-_EXIT_AND_TTY: tuple[_Attribute, ...] = (
-    ("on_exit", "on_exit", _on_exit),
-    ("emulate_tty", "emulate_tty", _flag),
-)
-_TIMEOUTS: tuple[_Attribute, ...] = (
-    ("respawn_max_retries", "respawn_max_retries", _count),
-    ("sigkill_timeout", "sigkill_timeout", _seconds_as_text),
-    ("sigterm_timeout", "sigterm_timeout", _seconds_as_text),
-)
-_ENVIRONMENT: _Attribute = ("env", "additional_env", _environment)
-
-
-@lru_cache(maxsize=8)
-def _attributes_of(release: Release) -> tuple[_Attribute, ...]:
-    """The optional attributes of a process element, in the order in which upstream reads them."""
-    return (
-        *_ATTRIBUTES,
-        *(_EXIT_AND_TTY if release.has(Feature.EXIT_AND_TTY_ATTRIBUTES) else ()),
-        *(_TIMEOUTS if release.has(Feature.TIMEOUT_ATTRIBUTES) else ()),
-        _ENVIRONMENT,
-    )
 
 
 def split_words(template: Iterable[Substitution]) -> list[SomeSubstitutionsType]:
