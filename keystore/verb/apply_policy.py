@@ -12,11 +12,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     parser.add_argument("policy", metavar="POLICY.xml", type=Path, help="SROS2 policy, version 0.2.0")
     common.add_domains(parser)
-    common.add_validity(parser)
-    common.add_revocation(parser)
-    common.add_subjects(parser)
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_provisioning(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

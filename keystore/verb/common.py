@@ -104,6 +104,20 @@ def add_subjects(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def add_change(parser: argparse.ArgumentParser) -> None:
+    """Of each verb that signs and writes."""
+    add_signing(parser)
+    add_lock(parser)
+
+
+def add_provisioning(parser: argparse.ArgumentParser) -> None:
+    """Of each verb that issues certificates for enclaves; ``provision_options`` reads them."""
+    add_validity(parser)
+    add_revocation(parser)
+    add_subjects(parser)
+    add_change(parser)
+
+
 def access(arguments: argparse.Namespace) -> CaAccess:
     from keystore.signing.ca_access import CaAccess, Secret
 
@@ -139,7 +153,7 @@ def span(arguments: argparse.Namespace) -> Span:
 
 
 def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
-    """From the arguments of ``add_signing``, ``add_lock``, ``add_validity`` and ``add_subjects``."""
+    """What ``add_provisioning`` was given."""
     from keystore.formats.subject import SubjectScheme
     from keystore.steps.options import ProvisionOptions
 
@@ -152,7 +166,7 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
         allow_subject_overlap=arguments.allow_subject_overlap,
         access=access(arguments),
         lock_timeout=arguments.lock_timeout,
-        revoke=not vars(arguments).get("no_revoke", False),
+        revoke=not arguments.no_revoke,
         progress=ProgressBar("enclaves") if wanted(arguments.quiet) else None,
         **more,
     )

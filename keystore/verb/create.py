@@ -38,8 +38,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
         "--encrypt-ca-keys", action="store_true", help="encrypt new CA keys with the passphrase"
     )
     common.add_subjects(parser)
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_change(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

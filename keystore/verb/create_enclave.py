@@ -15,11 +15,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+", help="absolute name, such as /front/camera")
     parser.add_argument("--allow-all", action="store_true", help="grant every topic, service and action")
     common.add_domains(parser)
-    common.add_validity(parser)
-    common.add_revocation(parser)
-    common.add_subjects(parser)
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_provisioning(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -41,8 +41,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
         "--accept-shared-enclaves", action="store_true",
         help="export although an enclave, and so its key, would be on several hosts",
     )  # fmt: skip
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_change(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,8 +16,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file", metavar="FILE.yaml", type=Path, help="see docs: version, domain_rules, topic_rules"
     )
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_change(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -15,8 +15,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+")
     parser.add_argument("--no-revoke", action="store_true", help="only delete: copies elsewhere stay valid")
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_change(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

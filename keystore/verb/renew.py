@@ -35,11 +35,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--encrypt-ca-keys", action="store_true", help="encrypt new CA keys with the passphrase"
     )
-    common.add_validity(parser)
-    common.add_revocation(parser)
-    common.add_subjects(parser)
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_provisioning(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -23,8 +23,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--token", metavar="URI", help="pkcs11: URI of the enclave's key in a token (RFC 7512)"
     )
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_change(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -16,8 +16,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     common.add_keystore(parser)
     parser.add_argument("--drop", metavar="OWNER", help="drop the shares of this launch")
     common.add_format(parser)
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_change(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -22,11 +22,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
         "--issued", metavar="FILE", type=Path,
         help="PEM certificates that somebody else's identity CA issued for the requests: take these, issue none",
     )  # fmt: skip
-    common.add_validity(parser)
-    common.add_revocation(parser)
-    common.add_subjects(parser)
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_provisioning(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

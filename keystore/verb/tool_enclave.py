@@ -26,11 +26,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument("--name", metavar="ENCLAVE", help="default: /tools/TOOL/TARGET")
     common.add_domains(parser)
-    common.add_validity(parser)
-    common.add_revocation(parser)
-    common.add_subjects(parser)
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_provisioning(parser)
     common.add_format(parser)
 
 

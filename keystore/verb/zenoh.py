@@ -25,8 +25,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
         help="where processes find the router (as before; localhost:7447 for the first time). For another host than "
         "localhost it listens on all addresses",
     )  # fmt: skip
-    common.add_signing(parser)
-    common.add_lock(parser)
+    common.add_change(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
