@@ -6,22 +6,9 @@ of the exception object. Read by the evaluation when it turns the exception into
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from enclave_launch.source_location import SourceLocation
 
 _ATTRIBUTE = "enclave_launch_location"
-
-
-class Locatable(Protocol):
-    """An element of a launch file."""
-
-    @property
-    def source_location(self) -> SourceLocation | None: ...
-
-    def find_text(self, text: str) -> SourceLocation | None:
-        """The place at or below this element where an attribute has exactly this text."""
-        ...
 
 
 def mark(error: BaseException, entity: object) -> None:

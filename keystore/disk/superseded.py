@@ -1,23 +1,21 @@
 """Certificates that were replaced but have not ended: whoever copied one, with its key, can still use it.
 
 ``private/superseded.json`` remembers their serial numbers, so that removing an enclave revokes all it ever had.
-Written in the batch that replaces them, before them.
+Written by earlier versions; the register (``formats.register``) holds them now.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any
 
 from keystore.disk import layout, safe_files
-from keystore.disk.store import PRIVATE_MODE, Batch
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.enclave_name import validate_enclave_name
-from keystore.formats.validity import iso, parse_moment
+from keystore.formats.validity import parse_moment
 
 _VERSION = 1
 
@@ -52,24 +50,3 @@ def _entry(entry: dict[str, str]) -> Superseded:
     return Superseded(
         validate_enclave_name(entry["enclave"]), int(entry["serial"], 16), parse_moment(entry["not_after"])
     )
-
-
-def remember(batch: Batch, view: KeystoreView, replaced: Iterable[Superseded], now: datetime) -> None:
-    """Add these to the file, first of the batch; those that have ended are forgotten."""
-    fresh = tuple(replaced)
-    if not fresh:
-        return
-    kept = {one for one in (*superseded(view), *fresh) if one.not_after > now}
-    ordered = sorted(kept, key=lambda one: (one.enclave, one.serial))
-    entries = [
-        {"enclave": one.enclave, "serial": f"{one.serial:040x}", "not_after": iso(one.not_after)}
-        for one in ordered
-    ]
-    text = json.dumps({"version": _VERSION, "certificates": entries}, indent=1) + "\n"
-    batch.file(layout.SUPERSEDED, text.encode(), PRIVATE_MODE)
-
-
-def serials_of(view: KeystoreView, enclaves: Iterable[str]) -> set[int]:
-    """Serials of the superseded certificates of ``enclaves``; raises as ``superseded``."""
-    names = set(enclaves)
-    return {one.serial for one in superseded(view) if one.enclave in names}

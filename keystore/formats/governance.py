@@ -165,13 +165,6 @@ _TOPIC_LEAVES = (
 )  # fmt: skip
 
 
-def check_governance_schema(document: bytes, where: str) -> None:
-    """Raises InvalidInputError with file:line for what the schema (and so Fast DDS) would refuse."""
-    from keystore.formats.safe_xml import check_schema, parse_xml
-
-    check_schema(parse_xml(document, where), "governance.xsd", where, "DDS governance document")
-
-
 def parse_governance(document: bytes, where: str) -> Governance:
     """A governance document, ours or SROS2's, as values. Raises InvalidInputError with file:line."""
     from keystore.formats.safe_xml import check_schema, parse_xml

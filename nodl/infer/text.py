@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 MAX_PARTS = 24
 MAX_PRODUCT = 64
@@ -21,10 +20,6 @@ DEFERRED_METHODS = frozenset(
 )
 
 Edit = tuple[str, tuple[str, ...]]
-
-
-class InputOwner(Protocol):
-    """Who knows the defaults of an input: a node for its parameters, a parser for its options."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,11 +75,6 @@ def make_text(pieces: tuple[Piece, ...]) -> Text:
     if text is None:
         text = _texts[pieces] = Text(pieces)
     return text
-
-
-def forget_texts() -> None:
-    """Let go of all texts; between analyses, since they hold on to what owns their inputs."""
-    _texts.clear()
 
 
 def text_of(pieces: Iterable[Piece]) -> TextAtom:

@@ -381,10 +381,6 @@ def present(value: Value) -> Value:
     return tuple(atom for atom in value if type(atom) is not Absent) if ABSENT[0] in value else value
 
 
-def without_unknown(value: Value) -> Value:
-    return tuple(atom for atom in value if type(atom) is not Unknown)
-
-
 def constant_strings(value: Value) -> list[str]:
     return [atom for atom in value if isinstance(atom, str)]
 

@@ -124,13 +124,6 @@ def fits(versions: dict[str, str], distro: str, version: str | None) -> bool:
     return any(_in_series(version, series) for series in versions.values())
 
 
-def series_of(versions: dict[str, str], distro: str, version: str | None) -> str:
-    """The distribution by whose rules the document is read: that of the installed version, where one is known."""
-    if version is not None and not (distro in versions and _in_series(version, versions[distro])):
-        return next((name for name, series in versions.items() if _in_series(version, series)), distro)
-    return distro
-
-
 def _in_series(version: str, series: str) -> bool:
     return version.split(".")[: len(series.split("."))] == series.split(".")
 

@@ -309,10 +309,6 @@ def registered_components(index: FileIndex) -> list[str]:
     return [match[1].replace(" ", "").lstrip(":") for match in _REGISTERED.finditer(index.source.text)]
 
 
-def exported_plugins(index: FileIndex) -> list[tuple[str, str]]:
-    return [(m[1].lstrip(":"), m[2].lstrip(":")) for m in _EXPORTED.finditer(index.source.text)]
-
-
 def target_entry(target: Target, package: SourcePackage, workspace: Workspace) -> Entry:
     """The program of an executable target."""
     files = sources_of(target, package.build)

@@ -333,9 +333,3 @@ CONSTANTS: dict[str, Value] = {
     "typing.TYPE_CHECKING": (False,),
     "rclpy.action.client.ActionClient": (External("rclpy.action.ActionClient"),),
 }
-
-
-def arguments_of_callback(arity: int | None) -> Arguments:
-    """What foreign code hands to a callback: ``arity`` values it makes, or any number of them."""
-    made = unknown("an argument given by code that is not analysed")
-    return Arguments(more=made) if arity is None else Arguments([made] * arity)

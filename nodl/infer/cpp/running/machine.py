@@ -373,7 +373,3 @@ def template_arguments(node: Node | None) -> list[Node]:
         else None
     )
     return [child for child in listed.named_children if child.type != "comment"] if listed is not None else []
-
-
-def is_reference(written: str) -> bool:
-    return written.rstrip().endswith(("&", "*"))
