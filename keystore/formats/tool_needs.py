@@ -1,10 +1,10 @@
 """What each ROS tool needs to work on a secured robot: the one table of it. Pure; docs/running-systems.md shows it.
 
-Seen on real ROS 2 jazzy: every ``ros2`` command is a node ``/_ros2cli_<pid>`` that publishes ``/rosout`` and
+Recorded and tried on real ROS 2 jazzy: a ``ros2`` command is a node ``/_ros2cli_<pid>`` that publishes ``/rosout`` and
 ``/parameter_events`` and serves ``get_type_description`` below its own name (the pid is in it, so a wildcard stands
-there); ``param``, even ``get``, is a client of all six parameter services of its target. rosbag2 and rviz2: from their
-sources (ros2/rosbag2 ``recorder.cpp``, ros2/rviz ``visualizer_app.cpp``), not run. ``ros_discovery_info`` is granted to
-all, and must not be published only by ``observe``, which is not an rmw.
+there); ``service call`` and ``action send_goal`` make a node named after the interface's type, which serves parameters,
+too; ``param``, even ``get``, is a client of all six parameter services of its target. ``ros_discovery_info`` is granted
+to all, and must not be published only by ``observe``, which is not an rmw.
 """
 
 from __future__ import annotations
@@ -70,14 +70,27 @@ _LIFECYCLE_SERVICES = (
 )
 _CONTAINER_SERVICES = ("_container/load_node", "_container/unload_node", "_container/list_nodes")
 _RECORDER_SERVICES = ("is_paused", "pause", "resume", "record", "stop", "snapshot", "split_bagfile")
+_PLAYER_SERVICES = (
+    *("burst", "get_rate", "is_paused", "pause", "play", "play_next"),
+    *("resume", "seek", "set_rate", "stop", "toggle_paused"),
+)
 _RVIZ_TOOLS = ("/clicked_point", "/goal_pose", "/initialpose")
 
 _CLI_NODE = "/_ros2cli_*"
+_CALLER = "/_ros2cli_requester_*"  # and the type: ros2service call.py
+_GOAL_SENDER = "/_ros2cli_send_goal_*"  # and the type: ros2action send_goal.py
 _ANY_NODE: tuple[Need, ...] = ((_P, "/rosout"), (_P, "/parameter_events"), (_R, "~/get_type_description"))
-_RCLCPP_NODE: tuple[Need, ...] = (
-    *_ANY_NODE,
-    (_S, "/parameter_events"),
-    *((_R, f"~/{name}") for name in PARAMETER_SERVICES),
+_RCLPY_NODE: tuple[Need, ...] = (*_ANY_NODE, *((_R, f"~/{name}") for name in PARAMETER_SERVICES))
+_RCLCPP_NODE: tuple[Need, ...] = (*_RCLPY_NODE, (_S, "/parameter_events"))
+_RECORDER: tuple[Need, ...] = (  # recorder.cpp: start_parameter_event_publisher(false)
+    *(need for need in _RCLCPP_NODE if need != (_P, "/parameter_events")),
+    *((_R, f"~/{name}") for name in _RECORDER_SERVICES),
+    (_P, "/events/write_split"),
+)
+_PLAYER: tuple[Need, ...] = (
+    *_RCLCPP_NODE,
+    *((_R, f"~/{name}") for name in _PLAYER_SERVICES),
+    (_P, "/events/read_split"),
 )
 _TF_LISTENER: tuple[Need, ...] = (
     (_S, "/tf"),
@@ -104,17 +117,18 @@ TABLE: tuple[Tool, ...] = (
          "ros2 topic pub --once {target} TYPE VALUES"),
     Tool("param", "ros2 param list, get, set, describe, dump", ToolTarget.NODE, _CLI_NODE, _ANY_NODE,
          _below(_Q, PARAMETER_SERVICES), "ros2 param list --no-daemon {target}"),
-    Tool("call", "ros2 service call", ToolTarget.SERVICE, _CLI_NODE, _ANY_NODE, ((_Q, "{}"),),
+    Tool("call", "ros2 service call", ToolTarget.SERVICE, _CALLER, _RCLPY_NODE, ((_Q, "{}"),),
          "ros2 service call {target} TYPE VALUES"),
-    Tool("action", "ros2 action send_goal", ToolTarget.ACTION, _CLI_NODE, _ANY_NODE, ((_C, "{}"),),
+    Tool("action", "ros2 action send_goal", ToolTarget.ACTION, _GOAL_SENDER, _RCLPY_NODE, ((_C, "{}"),),
          "ros2 action send_goal {target} TYPE GOAL"),
     Tool("lifecycle", "ros2 lifecycle get, set, list", ToolTarget.NODE, _CLI_NODE, _ANY_NODE,
          _below(_Q, _LIFECYCLE_SERVICES), "ros2 lifecycle get --no-daemon {target}"),
     Tool("component", "ros2 component list, load, unload", ToolTarget.NODE, _CLI_NODE, _ANY_NODE,
          _below(_Q, _CONTAINER_SERVICES), "ros2 component list --no-daemon {target}"),
-    Tool("record", "ros2 bag record", ToolTarget.TOPIC, "/rosbag2_recorder",
-         (*_RCLCPP_NODE, (_P, "/events/write_split"), *((_R, f"~/{name}") for name in _RECORDER_SERVICES)),
-         ((_S, "{}"),), "ros2 bag record {target}"),
+    Tool("record", "ros2 bag record", ToolTarget.TOPIC, "/rosbag2_recorder", _RECORDER, ((_S, "{}"),),
+         "ros2 bag record {target}"),
+    Tool("play", "ros2 bag play: it moves the robot as the topics do", ToolTarget.TOPIC, "/rosbag2_player", _PLAYER,
+         ((_P, "{}"),), "ros2 bag play BAG --topics {target}"),
     Tool("rviz", "rviz2 that shows topics, without tools that publish", ToolTarget.TOPIC, "/rviz", _RVIZ, ((_S, "{}"),),
          "rviz2 -d CONFIG", True),
     Tool("rviz-control", "rviz2 with its tools for goals, poses and points: it can move the robot", ToolTarget.TOPIC,

@@ -1,6 +1,6 @@
 """Enclaves of tools on real DDS: what a tool needs on its target can be made, its neighbour cannot.
 
-The endpoints are written down by hand, as ``ros2`` commands were seen to make them; the table under test is not asked.
+The endpoints are written down by hand, as the tools of jazzy were recorded making them; the table is not asked.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -28,31 +29,85 @@ pytestmark = pytest.mark.dds
 
 DISCOVERY = ("ros_discovery_info",)
 ME = f"_ros2cli_{os.getpid()}"
+LIFECYCLE = (
+    "change_state", "get_state", "get_available_states", "get_available_transitions", "get_transition_graph",
+)  # fmt: skip
 
 
-def client(service: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+def clients(prefix: str, services: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """What is published and subscribed."""
-    return (f"rq{service}Request",), (f"rr{service}Reply",)
+    names = [f"{prefix}/{each}" for each in services]
+    return tuple(f"rq{each}Request" for each in names), tuple(f"rr{each}Reply" for each in names)
 
 
-def clients(node: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    both = [client(f"{node}/{service}") for service in PARAMETER_SERVICES]
-    return tuple(p for publish, _ in both for p in publish), tuple(
-        s for _, subscribe in both for s in subscribe
-    )
+def servers(*services: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    return tuple(f"rr{each}Reply" for each in services), tuple(f"rq{each}Request" for each in services)
 
 
-# Every command of ros2cli, whatever it does.
-CLI_PUBLISHES = ("rt/rosout", "rt/parameter_events", f"rr/{ME}/get_type_descriptionReply", *DISCOVERY)
-CLI_SUBSCRIBES = (f"rq/{ME}/get_type_descriptionRequest", *DISCOVERY)
+class Has(NamedTuple):
+    """What a node publishes and subscribes, in DDS's names."""
 
-# tool, target, may publish, may subscribe, may not publish, may not subscribe
-CASES = {
-    "list": ((), (), (), ("rt/chatter",), ("rt/chatter",)),
-    "echo": (("/chatter",), (), ("rt/chatter",), ("rt/chatter",), ("rt/other", "rt/chatter/more", "rt/")),
-    "pub": (("/chatter",), ("rt/chatter",), (), ("rt/other",), ("rt/chatter",)),
-    "param": (("/front/talker",), *clients("/front/talker"), clients("/talker")[0], clients("/front/other")[1]),
-    "call": (("/reset",), *client("/reset"), *client("/stop")),
+    publishes: tuple[str, ...]
+    subscribes: tuple[str, ...]
+
+
+def node(name: str, *services: str, publishes: tuple[str, ...] = (), subscribes: tuple[str, ...] = ()) -> Has:
+    """With ``/rosout`` and its description, as every node has them since jazzy."""
+    replies, requests = servers(*(f"/{name}/{each}" for each in ("get_type_description", *services)))
+    return Has(("rt/rosout", *replies, *publishes, *DISCOVERY), (*requests, *subscribes, *DISCOVERY))
+
+
+EVENTS = ("rt/parameter_events",)
+CLI = node(ME, publishes=EVENTS)
+CALLER = node("_ros2cli_requester_std_srvs_Empty", *PARAMETER_SERVICES, publishes=EVENTS)
+GOAL_SENDER = node("_ros2cli_send_goal_demo_action_Fold", *PARAMETER_SERVICES, publishes=EVENTS)
+RECORDER = node(
+    "rosbag2_recorder", *PARAMETER_SERVICES, "is_paused", "pause", "resume", "split_bagfile", "snapshot",
+    publishes=("rt/events/write_split",), subscribes=EVENTS,
+)  # fmt: skip
+PLAYER = node(
+    "rosbag2_player", *PARAMETER_SERVICES, "burst", "get_rate", "is_paused", "pause", "play", "play_next",
+    "resume", "seek", "set_rate", "stop", "toggle_paused",
+    publishes=("rt/events/read_split", *EVENTS), subscribes=EVENTS,
+)  # fmt: skip
+FOLD = "/fold/_action"
+FOLDING = Has(
+    tuple(f"rq{FOLD}/{each}Request" for each in ("send_goal", "cancel_goal", "get_result")),
+    (
+        *(f"rr{FOLD}/{each}Reply" for each in ("send_goal", "cancel_goal", "get_result")),
+        *(f"rt{FOLD}/{each}" for each in ("feedback", "status")),
+    ),
+)
+
+# tool: its targets, its node, what else it makes on its target, what beside it must be refused
+CASES: dict[str, tuple[tuple[str, ...], Has, Has, Has]] = {
+    "list": ((), CLI, Has((), ()), Has(("rt/chatter",), ("rt/chatter",))),
+    "echo": (
+        ("/chatter",), CLI, Has((), ("rt/chatter",)),
+        Has(("rt/chatter",), ("rt/other", "rt/chatter/more", "rt/")),
+    ),
+    "pub": (("/chatter",), CLI, Has(("rt/chatter",), ()), Has(("rt/other",), ("rt/chatter",))),
+    "param": (
+        ("/front/talker",), CLI, Has(*clients("/front/talker", PARAMETER_SERVICES)),
+        Has(clients("/talker", PARAMETER_SERVICES)[0], clients("/front/other", PARAMETER_SERVICES)[1]),
+    ),
+    "call": (("/reset",), CALLER, Has(*clients("", ("reset",))), Has(*clients("", ("stop",)))),
+    "action": (
+        ("/fold",), GOAL_SENDER, FOLDING,
+        Has((f"rt{FOLD}/feedback", "rq/two/fold/_action/send_goalRequest"), ("rr/two/fold/_action/send_goalReply",)),
+    ),
+    "lifecycle": (
+        ("/driver",), CLI, Has(*clients("/driver", LIFECYCLE)),
+        Has(("rq/camera/change_stateRequest", "rr/driver/change_stateReply"), ("rq/driver/change_stateRequest",)),
+    ),
+    "component": (
+        ("/box",), CLI, Has(*clients("/box/_container", ("load_node", "unload_node", "list_nodes"))),
+        Has(("rq/box2/_container/load_nodeRequest",), ("rr/box2/_container/list_nodesReply",)),
+    ),
+    "record": (
+        ("/chatter",), RECORDER, Has((), ("rt/chatter",)), Has(("rt/chatter", *EVENTS), ("rt/other",)),
+    ),
+    "play": (("/chatter",), PLAYER, Has(("rt/chatter",), ()), Has(("rt/other", "rt/clock"), ("rt/chatter",))),
 }  # fmt: skip
 
 
@@ -70,20 +125,21 @@ def root(tmp_path: Path, domain_id: int) -> Path:
 def test_a_tool_can_make_what_it_needs_on_its_target_and_nothing_beside(
     dds: Probe, root: Path, domain_id: int, tool: str
 ) -> None:
-    targets, publish, subscribe, not_publish, not_subscribe = CASES[tool]
+    targets, own, on_target, beside = CASES[tool]
     made = create_tool_enclave(root, tool, targets)
+    publishes, subscribes = own.publishes + on_target.publishes, own.subscribes + on_target.subscribes
     attempts = Participant(
         "tool",
         root / "enclaves" / made.enclave[1:],
-        (*CLI_PUBLISHES, *publish, *not_publish),
-        (*CLI_SUBSCRIBES, *subscribe, *not_subscribe),
+        (*publishes, *beside.publishes),
+        (*subscribes, *beside.subscribes),
     )
     answers = dds.try_endpoints(domain_id, [attempts])
     assert answers.participants == {"tool": True}, answers.log
     allowed = {(verb, name) for (_, verb, name), allowed in answers.endpoints.items() if allowed}
     assert allowed == {
-        *(("publish", name) for name in (*CLI_PUBLISHES, *publish)),
-        *(("subscribe", name) for name in (*CLI_SUBSCRIBES, *subscribe)),
+        *(("publish", name) for name in publishes),
+        *(("subscribe", name) for name in subscribes),
     }
 
 
