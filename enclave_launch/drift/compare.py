@@ -7,17 +7,17 @@ with a hash of its certificate's subject, so a table of the keystore's certifica
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from enclave_launch.drift.expected import Expected, ExpectedNode
 from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level, finding
 from enclave_launch.review.document import GrantedName, Operation
 from keystore.formats.permissions_patterns import covers
 from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
-from nodl.graph.quality import unmet
+from nodl.graph.quality import differences, unmet
 from nodl.graph.seen import SeenEndpoint
 from nodl.graph.text import participant_text
 from nodl.graph.wire_names import ros_type
@@ -31,6 +31,7 @@ OPERATIONS: Mapping[EndpointKind, Operation] = {
     EndpointKind.ACTION_SERVER: "serve_actions",
     EndpointKind.ACTION_CLIENT: "call_actions",
 }
+_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 _OR_PLAN_IT = "or plan it: in the launch file or its manifests; or accept it"
 
 
@@ -224,6 +225,9 @@ class _Comparison:
             elif grant in types and interface.type and types[grant] != interface.type:
                 text = f"{node.fqn}: {grant} has the type {interface.type}, planned is {types[grant]}"
                 yield self._about(Kind.TYPE_DIFFERS, process, text, subject=node.fqn, name=interface.name)
+            for why in _other_quality(interface, [e.qos for e in planned.interfaces if e.grant == grant]):
+                text = f"{node.fqn}: {grant}: {why}"
+                yield self._about(Kind.QOS_DIFFERS, process, text, subject=node.fqn, name=interface.name)
 
     def _absent(
         self, node: GraphNode, planned: ExpectedNode, process: GraphProcess
@@ -329,6 +333,14 @@ def _between(topic: str, writer: _End, reader: _End) -> Iterator[DriftFinding]:
     for why in unmet(writer.endpoint.quality, reader.endpoint.quality):
         text = f"{topic}: {writer.owner} and {reader.owner} do not meet: {why}"
         yield finding(Kind.QOS_DOES_NOT_MEET, subject, text, name=topic, who=who)
+
+
+def _other_quality(interface: SeenInterface, planned: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Why no endpoint of a topic that the plan knows is like this; of several that a node has on one topic, any."""
+    if interface.kind not in _TOPICS or not planned:
+        return ()
+    found = [[differences(qos, each.quality) for qos in planned] for each in interface.endpoints]
+    return next((min(each, key=len) for each in found if all(each)), ())
 
 
 def _grant(interface: SeenInterface) -> GrantedName:

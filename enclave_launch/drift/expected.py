@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from enclave_launch.review.document import GrantedName
@@ -16,11 +17,12 @@ _LIFECYCLE = "/change_state"
 
 
 class ExpectedInterface(NamedTuple):
-    """``certain``: a node that runs has it."""
+    """``certain``: a node that runs has it. ``qos``: what is known of it, by NoDL v2's names."""
 
     grant: GrantedName
     type: str
     certain: bool
+    qos: Mapping[str, Any] = MappingProxyType({})
 
 
 class ExpectedNode(NamedTuple):
@@ -120,4 +122,5 @@ def _described(
 def _interface(fields: Mapping[str, Any], stated: bool) -> ExpectedInterface:
     wildcard = any(character in fields["name"] for character in "*?[")
     certain = stated and not fields["built_in"] and not fields["note"] and not wildcard
-    return ExpectedInterface(GrantedName(fields["operation"], fields["name"]), fields["type"], certain)
+    grant = GrantedName(fields["operation"], fields["name"])
+    return ExpectedInterface(grant, fields["type"], certain, fields.get("qos", {}))

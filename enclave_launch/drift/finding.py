@@ -16,6 +16,7 @@ class Kind(str, Enum):
     MISSING_ENDPOINT = "missing-endpoint"
     REPEATED_NODE = "repeated-node"
     TYPE_DIFFERS = "type-differs"
+    QOS_DIFFERS = "qos-differs"
     TYPES_DO_NOT_MEET = "types-do-not-meet"
     QOS_DOES_NOT_MEET = "qos-does-not-meet"
     NOT_SECURED = "not-secured"

@@ -168,14 +168,24 @@ class _Collector:
             self._result.warnings.append(name_unremappable(self._fqn, template.text, where))
         try:
             for final_operation, resolved in self._resolve(operation, template.text, place):
+                qos = self._quality(endpoint, resolved.name)
                 reason = Reason(
-                    self._fqn, "declared", place, written, resolved.rules, note, endpoint.type, endpoint.qos
+                    self._fqn, "declared", place, written, resolved.rules, note, endpoint.type, qos
                 )
                 self._result.permissions.append(Permission(final_operation, resolved.name, reason))
                 if endpoint.introspected:
                     self._introspection(final_operation, resolved.name, reason)
         except InvalidNameError as error:
             self._unresolved(operation, place, str(error))
+
+    def _quality(self, endpoint: Endpoint, name: str) -> tuple[tuple[str, str | int], ...]:
+        """Without the policies that parameters of the launch may set (rclcpp ``qos_overriding_options.hpp``:
+        ``qos_overrides.<topic>.<kind>[_<id>].<policy>``); the program says whether it lets them."""
+        start = f"qos_overrides.{name}.{endpoint.kind.value}"
+        set_here = {each.rpartition(".")[2] for each in self._node.parameters if each.startswith(start)}
+        return tuple(
+            (policy, value) for policy, value in endpoint.qos if policy.removesuffix("_ns") not in set_here
+        )
 
     def _introspection(self, operation: Operation, name: str, reason: Reason) -> None:
         """Servers and clients publish what they are asked and answer (rcl service_event_publisher.c)."""

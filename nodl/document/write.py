@@ -18,7 +18,7 @@ from nodl.errors import InvalidNoDLDocumentError
 from nodl.names import shown
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
 
-_DEFAULT_QOS = "{history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
+_UNKNOWN_QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
 _PLAIN_SCALAR = re.compile(r"[A-Za-z/][A-Za-z0-9_/.:]*[A-Za-z0-9_]\Z|~/[A-Za-z0-9_/]+\Z")
 _YAML_WORDS = frozenset({"yes", "no", "on", "off", "true", "false", "null", "y", "n"})
 
@@ -66,10 +66,12 @@ def v2_yaml(node: ManifestNode) -> Written:
             continue
         is_topic = kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
         topics |= is_topic
-        qos = f", qos: {_DEFAULT_QOS}" if is_topic else ""
+        qos = f", qos: {_UNKNOWN_QOS}" if is_topic else ""
         lines.append(f"{category}:")
         lines += [f"  - {{name: {_v2_name(e)}, type: {_v2_endpoint_type(e)}{qos}}}" for e in entries]
-    note = f"{interface.name}: v1 says nothing of QoS; ROS's default profile was written, check it"
+    note = (
+        f"{interface.name}: v1 says nothing of QoS; SYSTEM_DEFAULT was written, put in what the code asks for"
+    )
     return Written("\n".join(lines) + "\n", (note,) if topics else ())
 
 

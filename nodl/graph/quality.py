@@ -5,10 +5,11 @@ Rules of request and offer: DDS 1.4, 2.2.3, the table of policies with "RxO = ye
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 INFINITE = -1
+_RMW_INFINITE = (1 << 63) - 1  # RMW_DURATION_INFINITE
 _RELIABILITY = ("BEST_EFFORT", "RELIABLE")
 _DURABILITY = ("VOLATILE", "TRANSIENT_LOCAL", "TRANSIENT", "PERSISTENT")
 _LIVELINESS = ("AUTOMATIC", "MANUAL_BY_PARTICIPANT", "MANUAL_BY_TOPIC")
@@ -64,8 +65,28 @@ def _unmet(offered: Quality, requested: Quality) -> Iterator[str]:
         yield f"ownership: {offered.ownership} is offered, {requested.ownership} asked for"
 
 
+def differences(planned: Mapping[str, str | int], seen: Quality) -> tuple[str, ...]:
+    """How ``seen`` is another than ``planned``, by NoDL v2's names; what either does not say is no difference."""
+    return tuple(
+        f"{what} is {has}, planned is {wanted}"
+        for what, has, wanted in _compared(planned, seen)
+        if has not in ("", wanted)
+    )
+
+
+def _compared(planned: Mapping[str, str | int], seen: Quality) -> Iterator[tuple[str, str | int, str | int]]:
+    for name, wanted in sorted(planned.items()):
+        if name in _NODL_TIMES:
+            field = _NODL_TIMES[name]
+            yield _TIMES[field], _seconds(getattr(seen, field)), _seconds(int(wanted) or INFINITE)
+        elif name in _WORDS or (name == "depth" and seen.history == "KEEP_LAST"):
+            yield name, getattr(seen, name), wanted
+
+
+_WORDS = ("history", "reliability", "durability", "liveliness")
+_NODL_TIMES = {"deadline_ns": "deadline", "liveliness_lease_duration_ns": "lease"}  # 0 is rmw's word for none
 _TIMES = {"deadline": "deadline", "lease": "liveliness lease"}
 
 
 def _seconds(nanoseconds: int) -> str:
-    return "none" if nanoseconds == INFINITE else f"{nanoseconds / 1e9:g} s"
+    return "none" if nanoseconds in (INFINITE, _RMW_INFINITE) else f"{nanoseconds / 1e9:g} s"

@@ -221,13 +221,21 @@ def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_See
         name.kind,
         name.name,
         name.type or _UNKNOWN_TYPES[name.kind],
-        first.qos,
+        _common([asked.qos for asked, _ in askers]),
         runs,
         origin,
         introspected,
         moved_from,
         () if origin.source else first.spellings,
     )
+
+
+def _common(qualities: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
+    """What all have; 0, which is "the system's", where one has another, as a parameter may decide it."""
+    first = qualities[0]
+    if any(len(each) != len(first) for each in qualities):
+        return ()
+    return tuple(values[0] if len(set(values)) == 1 else 0 for values in zip(*qualities, strict=True))
 
 
 def observation_of(node: AskedNode, run: str = "") -> Observation:

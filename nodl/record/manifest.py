@@ -107,7 +107,7 @@ def _plain_name(entry: LearntEndpoint) -> str:
 
 
 def _quality(qos: tuple[int, ...]) -> dict[str, Any]:
-    history, depth, reliability, durability = qos if len(qos) == 4 else (1, 10, 1, 2)
+    history, depth, reliability, durability = qos if len(qos) == 4 else (0, 0, 0, 0)
     fields: dict[str, Any] = {"history": _HISTORY.get(history, "SYSTEM_DEFAULT")}
     if fields["history"] == "KEEP_LAST":
         fields["depth"] = max(1, depth)

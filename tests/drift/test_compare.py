@@ -13,7 +13,7 @@ from enclave_launch.drift.expected import expected_in
 from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level
 from nodl.graph.model import Graph
 from nodl.graph.quality import Quality
-from tests.drift.planned import plan, running
+from tests.drift.planned import commands, plan, running
 from tests.graph.made import Made
 from tests.graph.nodes import topic
 
@@ -121,8 +121,6 @@ def again(made: Made, _: dict[str, str]) -> None:
     document = copy.deepcopy(TALKER)
     document["nodes"] = [each for each in document["nodes"] if each["fqn"] == "/talker"]
     guid = made.participant(91, pid=8)
-    from tests.drift.planned import commands
-
     lines = [line for each in document["nodes"][0]["interfaces"] for line in commands(each)]
     made.listed(guid, made.node(guid, "/talker", *lines))
 
@@ -173,6 +171,57 @@ def test_another_type_than_planned_is_found() -> None:
         (Kind.TYPE_DIFFERS, "/listener"),
         (Kind.TYPE_DIFFERS, "/talker"),
     }
+
+
+def with_quality(made: Made, number: int, fqn: str, quality: Quality) -> None:
+    """The node of the plan, all of its endpoints with one quality."""
+    guid = made.participant(number)
+    (planned,) = [each for each in TALKER["nodes"] if each["fqn"] == fqn]
+    lines = [line for each in planned["interfaces"] for line in commands(each)]
+    made.listed(guid, made.node(guid, fqn, *lines, quality=quality))
+
+
+AS_ROS = Quality(history="KEEP_LAST", depth=10)
+STATED = {
+    "history": "KEEP_LAST",
+    "depth": 10,
+    "reliability": "RELIABLE",
+    "durability": "VOLATILE",
+    "deadline_ns": 0,
+}
+OTHER_QUALITIES = {
+    "depth is 1, planned is 10": AS_ROS._replace(depth=1),
+    "history is KEEP_ALL, planned is KEEP_LAST": AS_ROS._replace(history="KEEP_ALL", depth=0),
+    "reliability is BEST_EFFORT, planned is RELIABLE": AS_ROS._replace(reliability="BEST_EFFORT"),
+    "durability is TRANSIENT_LOCAL, planned is VOLATILE": AS_ROS._replace(durability="TRANSIENT_LOCAL"),
+    "deadline is 0.5 s, planned is none": AS_ROS._replace(deadline=500_000_000),
+}
+
+
+def quality_told(planned: dict[str, Any], seen: Quality) -> list[str]:
+    document, made = copy.deepcopy(TALKER), Made()
+    for node in document["nodes"]:
+        for each in node["interfaces"]:
+            if each["name"] == "/chatter":
+                each["qos"] = planned
+    for number, fqn in enumerate(("/talker", "/listener"), 1):
+        with_quality(made, number, fqn, seen)
+    return [each.text for each in found(document, made.graph()) if each.kind is Kind.QOS_DIFFERS]
+
+
+@pytest.mark.parametrize(("why", "seen"), OTHER_QUALITIES.items(), ids=OTHER_QUALITIES.keys())
+def test_quality_that_is_another_than_planned_is_found(why: str, seen: Quality) -> None:
+    assert quality_told(STATED, seen) == [
+        f"/talker: publish /chatter: {why}",
+        f"/listener: subscribe /chatter: {why}",
+    ]
+
+
+def test_quality_as_planned_or_that_the_plan_or_discovery_leaves_open_is_not_told() -> None:
+    assert quality_told(STATED, AS_ROS) == []
+    assert quality_told({}, Quality(reliability="BEST_EFFORT", depth=3, history="KEEP_LAST")) == []
+    assert quality_told(STATED, Quality()) == [], "Fast DDS does not announce its history"
+    assert quality_told({"lifespan_ns": 5}, AS_ROS) == [], "nor does anybody a lifespan that we read"
 
 
 def test_two_ends_whose_quality_does_not_meet_are_found_and_those_that_meet_are_not() -> None:
@@ -264,8 +313,6 @@ SECURITY = Security({HASH: ENCLAVE, OTHER_HASH: "/other"})
 
 
 def secured(made: Made, number: int, node: str, hash_: int = HASH) -> str:
-    from tests.drift.planned import commands
-
     guid = made.participant(number, prefix=f"{hash_:012x}", enclave=ENCLAVE)
     (planned,) = [each for each in TALKER["nodes"] if each["fqn"] == node]
     made.listed(guid, made.node(guid, node, *(c for each in planned["interfaces"] for c in commands(each))))

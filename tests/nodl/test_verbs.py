@@ -97,10 +97,10 @@ def test_converting_v1_to_v2(folder: Path, capsys: pytest.CaptureFixture[str]) -
     assert main(["convert", "demo.nodl.xml", "-o", "out"]) == 0
     captured = capsys.readouterr()
     assert captured.out == "out/talker.py.nodl.yaml\nout/listener.nodl.yaml\n"
-    assert (
-        captured.err == "note: talker: v1 says nothing of QoS; ROS's default profile was written, check it\n"
+    assert captured.err == (
+        "note: talker: v1 says nothing of QoS; SYSTEM_DEFAULT was written, put in what the code asks for\n"
     )
-    qos = "{history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
+    qos = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
     assert (folder / "out/talker.py.nodl.yaml").read_text() == (
         "nodl_version: 2\n"
         "codegen:\n"

@@ -225,6 +225,24 @@ def test_names_from_parameters_follow_what_launch_sets(node: NodeMaker) -> None:
     assert (reasons[0].written, reasons[0].note) == ("cam/param:topic", "parameter topic, set by launch")
 
 
+def test_what_is_known_of_quality_follows_the_names_but_not_against_parameters_that_may_override_it(
+    node: NodeMaker,
+) -> None:
+    known = (("depth", 5), ("reliability", "RELIABLE"))
+
+    def quality(**parameters: object) -> dict[str, str | int]:
+        topic = endpoint("chatter")._replace(qos=known)
+        derived = derive(node(topic, remap=("chatter:=blather",), parameters=parameters))
+        (reasons,) = (r for rule, r in derived.reasons["/"].items() if rule.expression == "/blather")
+        return dict(reasons[0].qos)
+
+    assert quality() == dict(known)
+    assert quality(**{"qos_overrides./blather.publisher.reliability": "best_effort"}) == {"depth": 5}
+    assert quality(**{"qos_overrides./blather.publisher_main.depth": 9}) == {"reliability": "RELIABLE"}
+    assert quality(**{"qos_overrides./chatter.publisher.depth": 9}) == dict(known), "the name before the rule"
+    assert quality(**{"qos_overrides./blather.subscription.depth": 9}) == dict(known), "of the other end"
+
+
 def test_names_from_a_list_parameter_are_one_for_each_element(node: NodeMaker) -> None:
     each = node(endpoint("cam/", ParameterPart("cameras", item="each")), parameters={"cameras": ("l", "r")})
     assert declared(derive(each)) == {"publish /cam/l", "publish /cam/r"}

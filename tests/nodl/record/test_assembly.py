@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import yaml
+
 from nodl.node_interface import EndpointKind
 from nodl.record.asked import AskedNode, all_asked
 from nodl.record.assembly import Record
@@ -16,6 +20,7 @@ from nodl.record.lines import (
     RecordedRun,
     StartedProcess,
 )
+from nodl.record.manifest import manifest_text
 
 CPP = "librclcpp.so"
 CONTAINER = StartedProcess(10, "box-1", "rclcpp_components", "component_container", "container", "/box")
@@ -179,3 +184,27 @@ def test_a_word_of_letters_is_no_address() -> None:
     )
     (learnt,) = learn([Record([RecordedRun("r"), *lines])]).nodes
     assert (learnt.key.node, learnt.random_name) == ("the_facade", False)
+
+
+def test_quality_that_all_runs_have_is_learnt_and_what_differs_is_left_open() -> None:
+    def record(run: str, *qos: int) -> Record:
+        made = publisher(10, 1, "chatter", "/t")._replace(qos=qos)
+        return Record(
+            [
+                RecordedRun(run),
+                StartedProcess(10, "t-1", "demo", "t"),
+                loaded(10, 1, 10),
+                node(10, 1, "t", "/t"),
+                made,
+            ]
+        )
+
+    def learnt(*records: Record) -> Any:
+        (found,) = learn(list(records)).nodes
+        return yaml.safe_load(manifest_text(found))["publishers"][0]["qos"]
+
+    first = record("a", 1, 5, 2, 2)
+    same = {"history": "KEEP_LAST", "depth": 5, "reliability": "BEST_EFFORT", "durability": "VOLATILE"}
+    assert learnt(first, record("b", 1, 5, 2, 2)) == same
+    assert learnt(first, record("b", 1, 5, 1, 2)) == {**same, "reliability": "SYSTEM_DEFAULT"}
+    assert set(learnt(first, record("b")).values()) == {"SYSTEM_DEFAULT"}, "one run that does not tell"
