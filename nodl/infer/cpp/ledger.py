@@ -25,7 +25,8 @@ CREATES = re.compile(
     r"create_(?:publisher|subscription|service|client|server|generic_\w+|sub_node|lifecycle_publisher|camera_publisher|"
     r"camera_subscription|subscriber)|advertise\w*|createPublisher|createSubscription|createService|createClient|"
     r"create(?:Shared|Unique|Unmanaged)?Instance|wait_for_message|createSubscriber|subscribeCamera|advertiseCamera|add_publisher|"
-    r"configure_introspection|subscribe|on_parameter_event"
+    r"configure_introspection|subscribe|on_parameter_event|"
+    r"rclc?_(?:publisher|subscription|service|client|action_server|action_client|node)_init(?:_(?!options)\w+)?"
 )
 MAKERS = frozenset({
     "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond",

@@ -58,7 +58,7 @@ _HARMLESS_CLASSES = re.compile(
 )
 _HARMLESS_FUNCTIONS = re.compile(
     r"(?:std|Eigen|cv|boost|tf2|fmt|angles|YAML|nlohmann|pcl|rcpputils|rcutils|ament_index_cpp|KDL|cv_bridge|__builtin)::.*"
-    r"|TRACEPOINT|TRACETOOLS_\w+|RCLCPP_\w+|RCUTILS_\w+|ROS_\w+|rc(?:l|utils|pputils)_\w+|rmw_\w+|assert|ASSERT|printf|fprintf|memcpy|memset|signal|sqrt\w*|"
+    r"|TRACEPOINT|TRACETOOLS_\w+|RCLCPP_\w+|RCUTILS_\w+|ROS_\w+|rc(?:l|utils|pputils)_(?!(?:publisher|subscription|client|service|action_\w+|node)_init)\w+|rmw_\w+|assert|ASSERT|printf|fprintf|memcpy|memset|signal|sqrt\w*|"
     r"f?abs|(?:a?sin|a?cos|a?tan2?|exp|log\w*|pow|floor|ceil|round|hypot|fmod|isnan|isinf|strcmp|strlen|atoi|atof|rand|srand|"
     r"usleep|sleep|exit|min|max|setvbuf|perror|puts|malloc|free|getenv|clamp|swap|isfinite|emplace_back|static_assert|connect|"
     r"tolower|toupper|isspace|snprintf|sprintf|strtol|strtod|fabsf|doTransform|toMsg|fromMsg|get_logger|now)"

@@ -172,6 +172,25 @@ for _word, _kind in KINDS.items():
     _generic(_word, _kind)
 
 
+def _of_rcl(name: str, kind: EndpointKind, node_at: int, name_at: int) -> None:
+    """rcl/publisher.h, subscription.h, service.h, client.h, rcl_action/action_server.h, action_client.h, in C. The
+    type stands in a structure that is not followed."""
+
+    def function(run: Machine, call: Call) -> Value:
+        owners = nodes_in(run, call.value(node_at))
+        if not owners:
+            return _homeless(run, call, name)
+        return add(run, owners[0], kind, call.value(name_at), "", call)
+
+    library_function(name)(function)
+
+
+for _word, _kind in KINDS.items():
+    _of_rcl(f"rcl_{_word}_init", _kind, 1, 3)
+_of_rcl("rcl_action_server_init", EndpointKind.ACTION_SERVER, 1, 4)
+_of_rcl("rcl_action_client_init", EndpointKind.ACTION_CLIENT, 1, 3)
+
+
 @library_function("rclcpp::wait_for_message")
 def _wait_for_message(run: Machine, call: Call) -> Value:
     owners = [obj for value in call.values for obj in nodes_in(run, value)]

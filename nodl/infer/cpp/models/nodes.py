@@ -5,6 +5,7 @@ Source: rclcpp/include/rclcpp/node.hpp, rclcpp_lifecycle/lifecycle_node.hpp, nod
 
 from __future__ import annotations
 
+import itertools
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.findings import NodeRecord
@@ -22,6 +23,7 @@ from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Map,
     NodePart,
     Obj,
     Param,
@@ -85,6 +87,7 @@ def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, fr
             words = tuple(_word(run, item) for item in atom.items)
             if words not in record.arguments:
                 record.arguments.append(words)
+            _read_parameters(run, record, words, node, frame)
         else:
             record.gap(
                 run.place(node, frame), "remap rules given in code (NodeOptions.arguments) are not known"
@@ -96,6 +99,20 @@ def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, fr
         if isinstance(atom, Seq):
             for item in atom.items:
                 _override(record, item)
+        for name, value in atom.entries if isinstance(atom, Map) else ():
+            _override(record, (Seq((name, value)),))
+
+
+def _read_parameters(
+    run: Machine, record: NodeRecord, words: tuple[str | None, ...], node: Node, frame: Frame
+) -> None:
+    """rcl/src/rcl/arguments.c: ``-p name:=value`` and files of parameters, given to the node in code."""
+    for flag, word in itertools.pairwise(words):
+        if flag in ("-p", "--param") and word is not None and ":=" in word:
+            name, _, value = word.partition(":=")
+            record.overrides[name] = literal(value)
+        elif flag in ("--params-file", "-p", "--param"):
+            record.gap(run.place(node, frame), f"parameters given in code ({flag} {word}) are not known")
 
 
 def _asked_for(run: Machine, record: NodeRecord, options: Obj, node: Node, frame: Frame) -> None:
@@ -163,6 +180,8 @@ for _name in (
     "get_node_waitables_interface",
     "get_node_time_source_interface",
     "get_node_type_descriptions_interface",
+    "get_rcl_node_handle",
+    "get_shared_rcl_node_handle",
 ):
     node_method(_name)(_self)
 
@@ -222,7 +241,7 @@ node_method(
     "add_pre_set_parameters_callback", "add_post_set_parameters_callback", "remove_on_set_parameters_callback",
     "remove_pre_set_parameters_callback", "remove_post_set_parameters_callback", "set_on_parameters_set_callback",
     "get_clients_info_by_service", "get_servers_info_by_service", "assert_liveliness", "get_callback_groups",
-    "callback_group_in_node", "get_rcl_node_handle", "get_shared_rcl_node_handle", "get_context",
+    "callback_group_in_node", "get_context",
     "get_default_callback_group",
     "get_notify_guard_condition", "get_associated_with_executor_atomic",
     "get_parameter_overrides", "list_parameters", "describe_parameter", "describe_parameters", "get_parameter_types",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
     Class,
@@ -108,10 +109,15 @@ class _Collector:
         body = node.child_by_field_name("body")
         prefix = "::".join((*scope, *([name] if name else [])))
         self.index.enums.add(name)
+        number: int | None = -1
+        numbers: dict[str, int] = {}
         for child in children(body):
             if child.type == "enumerator":
                 constant = text(child.child_by_field_name("name"))
                 full = f"{prefix}::{constant}" if prefix else constant
+                number = _enumerated(child.child_by_field_name("value"), number, numbers)
+                if number is not None:
+                    numbers[constant] = self.index.enumerator_numbers[full] = number
                 for key in (constant, f"{name}::{constant}", full):
                     self.index.enumerators.setdefault(key, full)
 
@@ -184,12 +190,10 @@ class _Collector:
                 self._declare(made, cls)
             return
         for declared in declared_names(node):
-            self._variable(node, *declared, scope, cls)
+            self._variable(node, declared, scope, cls)
 
-    def _variable(
-        self, node: Node, name: str, value: Node | None, pointer: bool, scope: Scope, cls: Class | None
-    ) -> None:
-        written = type_text(node)
+    def _variable(self, node: Node, declared: Declared, scope: Scope, cls: Class | None) -> None:
+        name, value, pointer, written = declared
         static = any(text(c) == "static" for c in node.named_children if c.type == "storage_class_specifier")
         if cls is not None:
             cls.fields[name] = Field(name, written, value, static, pointer, node)
@@ -309,19 +313,36 @@ def _marks(declarator: Node | None) -> str:
     return "".join(c for c in written[: max(1, len(written) - len(written.lstrip("&* ")))] if c in "&*")
 
 
+def _enumerated(value: Node | None, before: int | None, numbers: Mapping[str, int]) -> int | None:
+    """The number of an enumerator: as written, that of another, else one more than the one before."""
+    if value is None:
+        return None if before is None else before + 1
+    written = text(value).rstrip("uUlL")
+    return numbers.get(written) if not written.isdecimal() or written[0] == "0" != written else int(written)
+
+
 def _initialiser(item: Node) -> tuple[str, Node]:
     inner = children(item)
     return re.sub(r"\s+", "", text(inner[0])), inner[-1]
 
 
-def declared_names(node: Node) -> list[tuple[str, Node | None, bool]]:
-    """Name, initial value and whether it is a pointer, for each variable of a declaration."""
-    found: list[tuple[str, Node | None, bool]] = []
+class Declared(NamedTuple):
+    """One variable of a declaration. ``type``: of the variable itself; that of an array is a ``std::array``."""
+
+    name: str
+    value: Node | None
+    pointer: bool
+    type: str
+
+
+def declared_names(node: Node) -> list[Declared]:
+    """The variables of a declaration."""
+    found: list[Declared] = []
     values = node.children_by_field_name("default_value")
     for declarator in node.children_by_field_name("declarator"):
         value = None
         inner: Node | None = declarator
-        pointer = False
+        pointer, array = False, False
         while inner is not None and inner.type not in (
             "identifier",
             "field_identifier",
@@ -330,10 +351,14 @@ def declared_names(node: Node) -> list[tuple[str, Node | None, bool]]:
             if inner.type == "init_declarator":
                 value = inner.child_by_field_name("value")
             pointer = pointer or inner.type in ("pointer_declarator", "reference_declarator")
+            array = array or inner.type == "array_declarator"
             inner = inner.child_by_field_name("declarator") or next(
                 (c for c in inner.named_children if c.type.endswith(("declarator", "identifier"))), None
             )
         if inner is not None:
             later = [v for v in values if v.start_byte >= declarator.end_byte]
-            found.append((text(inner), value or (later[0] if later else None), pointer))
+            written = type_text(node)
+            if array and (pointer or written not in ("char", "unsigned char")):
+                written, pointer = f"std::array<{written}{' *' if pointer else ''}>", False
+            found.append(Declared(text(inner), value or (later[0] if later else None), pointer, written))
     return found

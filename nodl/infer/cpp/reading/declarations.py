@@ -135,6 +135,7 @@ class FileIndex:
     using: list[str] = field(default_factory=list)  # using namespace
     enums: set[str] = field(default_factory=set)
     enumerators: dict[str, str] = field(default_factory=dict)  # qualified and last name -> qualified
+    enumerator_numbers: dict[str, int] = field(default_factory=dict)  # by qualified name
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
 

@@ -37,6 +37,7 @@ class Names:
         self.globals: dict[str, list[Global]] = {}
         self.aliases: dict[str, list[tuple[FileIndex, str, str, Scope]]] = {}
         self.enumerators: dict[str, str] = {}
+        self.enumerator_numbers: dict[str, int] = {}
         self.enums: set[str] = set()
         self._bases: dict[str, tuple[str, ...]] = {}
         self.depends: frozenset[str] = frozenset()  # what the packages of the program depend on
@@ -54,6 +55,7 @@ class Names:
             last = qualified.rpartition("::")[2]
             self.aliases.setdefault(last, []).append((index, qualified, target, scope))
         self.enumerators.update(index.enumerators)
+        self.enumerator_numbers.update(index.enumerator_numbers)
         self.enums |= index.enums
 
     def _attach(self) -> None:

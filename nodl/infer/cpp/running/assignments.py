@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.running.contents import copied
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine, expression
+from nodl.infer.cpp.running.numbers import added, as_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,
@@ -17,7 +18,6 @@ from nodl.infer.cpp.running.values import (
     Unknown,
     Value,
     as_one_map,
-    concatenated,
     join,
     open_sequence,
     plain,
@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 @expression("assignment_expression")
 def assignment(run: Machine, node: Node, frame: Frame) -> Value:
-    from nodl.infer.cpp.running.operators import computed, has_text
+    from nodl.infer.cpp.running.operators import has_text
 
     left, operator = node.child_by_field_name("left"), text(node.child_by_field_name("operator"))
     right = node.child_by_field_name("right")
@@ -47,16 +47,32 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
         value = copied(run, value, node, frame)
     elif operator == "+=":
         before = run.evaluate(left, frame)
-        if has_text(before):
-            value = concatenated(before, value)
-        elif len(before) == 1 and len(value) == 1:
-            value = computed("+", before[0], value[0])
+        if has_text(before) and any(isinstance(atom, int | float) for atom in value):
+            value = unknown("a text and a letter, or a text from some letter on")
+        elif has_text(before):
+            value = added(before, value)
         else:
-            value = unknown("a computed value")
+            value = _combined("+", before, value)
     else:
-        value = unknown("a computed value")
-    assign(run, left, value, frame)
+        value = _combined(operator[:-1], run.evaluate(left, frame), value)
+    assign(run, left, _as_declared(run, left, value, frame), frame)
     return value
+
+
+def _combined(operator: str, before: Value, value: Value) -> Value:
+    from nodl.infer.cpp.running.operators import computed
+
+    if len(before) == 1 and len(value) == 1:
+        return computed(operator, before[0], value[0])
+    return unknown("a computed value")
+
+
+def _as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
+    """A number as the type of the variable holds it."""
+    if not any(isinstance(atom, int | float) for atom in value):
+        return value
+    written = declared_type(run, left, frame)
+    return value if written is None or written[1] else as_type(written[0].name, value)
 
 
 def _braced(run: Machine, left: Node, right: Node, frame: Frame) -> Value:
@@ -84,6 +100,39 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
         argument = inner.child_by_field_name("argument")
         if argument is not None:
             assign(run, argument, value, frame)
+    elif inner.type == "conditional_expression":
+        for side in ("consequence", "alternative"):
+            target_side = inner.child_by_field_name(side)
+            if target_side is not None:
+                assign(run, target_side, join(run.evaluate(target_side, frame), value), frame)
+    elif inner.type == "call_expression":
+        _assign_result(run, inner, value, frame)
+
+
+def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None:
+    """``f() = x``: an option or element of a known library; else what is written is not known."""
+    from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
+
+    function = call.child_by_field_name("function")
+    name = text(function.child_by_field_name("field")) if function is not None else ""
+    owner = function.child_by_field_name("argument") if function is not None else None
+    holders = run.evaluate(owner, frame) if owner is not None else BOTTOM
+    models = [LIBRARY_METHODS.get((atom.type.name, name)) for atom in holders if isinstance(atom, Obj)]
+    if models and all(models):
+        for atom, model in zip(holders, models, strict=True):
+            if model is not None:
+                model(run, Call(call, frame, [value], (), (), atom))
+    elif owner is not None and name in ("at", "front", "back") and holders:
+        assign(run, owner, tuple(_one_of(atom, value) for atom in holders), frame)
+    elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value):
+        run.gap(call, frame, f"what {text(call)[:60]} = ... writes to is not known")
+
+
+def _one_of(atom: object, value: Value) -> object:
+    """A container one of whose elements is written."""
+    if isinstance(atom, Seq):
+        return open_sequence((*atom.items, value))
+    return atom._replace(open=True) if isinstance(atom, Map) else Unknown("a text whose letters are written")
 
 
 def _assign_name(run: Machine, name: str, value: Value, frame: Frame) -> None:

@@ -33,7 +33,7 @@ from nodl.infer.cpp.syntax import text
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Function
+    from nodl.infer.cpp.reading.declarations import Class, Function
 
 PATIENCE = 5
 """Rounds after which a variable that callbacks still change counts as not known."""
@@ -220,11 +220,28 @@ def _find_overrides(run: Machine) -> None:
         if obj.cls is None:
             continue
         hosted = bool(obj.foreign_base or obj.is_node)
+        known = hosted and _PLAIN_NODES.issuperset(_library_bases(run, obj.cls))
         for cls in run.names.ancestry(obj.cls):
             for name, methods in run.names.methods.get(cls, {}).items():
                 in_force = hosted and methods == run.names.find_methods(obj.cls, name)
                 for method in methods:
-                    hook = in_force and (method.virtual or name in HOOKS)
+                    hook = in_force and (name in HOOKS or (method.virtual and not known))
                     if hook or name.startswith("~"):
                         frame = Frame(method.file, method.scope, None, obj)
                         run.callbacks.setdefault((method, obj), (Bound(method, obj), frame))
+
+
+_PLAIN_NODES = frozenset({"rclcpp::Node", "rclcpp_lifecycle::LifecycleNode"})
+"""Of whose methods only the transitions of ``HOOKS`` are virtual."""
+
+
+def _library_bases(run: Machine, cls: Class) -> set[str]:
+    """The bases whose source is not in reach, but for those of the standard library."""
+    names = run.names
+    outside = [
+        names.resolve(written, each.scope, each.file).name
+        for each in names.ancestry(cls)
+        for written, base in names.bases(each)
+        if base is None
+    ]
+    return {name for name in outside if not name.startswith("std::")}

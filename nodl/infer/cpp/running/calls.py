@@ -15,10 +15,10 @@ from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import call_functions, call_methods, call_values
 from nodl.infer.cpp.running.machine import Machine, expression
-from nodl.infer.cpp.running.method_calls import by_model, is_library_method, method_call, on_object
-from nodl.infer.cpp.running.objects import is_plain_type, made
-from nodl.infer.cpp.running.standard import CASTS, STANDARD
-from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
+from nodl.infer.cpp.running.method_calls import by_model, is_library_method, method_call, of_this, on_object
+from nodl.infer.cpp.running.objects import cast, is_plain_type, made
+from nodl.infer.cpp.running.standard import CASTS, STANDARD, may_write
+from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, unknown
 from nodl.infer.cpp.running.variables import current_object, member, variable
 from nodl.infer.cpp.syntax import children, text, unwrapped
@@ -57,7 +57,8 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
 def _named_call(run: Machine, node: Node, callee: Node, given: list[Node], frame: Frame) -> Value:
     name = callee_name(callee)
     if name in CASTS:
-        return run.evaluate(given[0], frame) if given else BOTTOM
+        value = run.evaluate(given[0], frame) if given else BOTTOM
+        return cast(run, types_of(run, callee, frame)[0], value) if name == "static_cast" else value
     if "::" not in name:
         owner = frame.owner_of(name)
         if owner is not None:
@@ -79,7 +80,7 @@ def _own_method(
     head, separator, last = name.rpartition("::")
     if not separator:
         if this_object.cls is not None:
-            methods = run.names.find_methods(this_object.cls, name) or _hidden(run, this_object, name, frame)
+            methods = of_this(run, this_object, name, frame) or _hidden(run, this_object, name, frame)
             if methods:
                 values = [run.evaluate(each, frame) for each in given]
                 return call_methods(
@@ -147,6 +148,11 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
         values = [run.evaluate(each, frame) for each in given]
         return call_functions(run, functions, values, node, frame, types)
     standard = STANDARD.get(qualified)
+    if may_write(qualified):
+        values = [run.evaluate(each, frame) for each in given]
+        given_back = standard(run, values, node, frame, types) if standard is not None else BOTTOM
+        changed_by_standard(run, qualified, given, frame)
+        return given_back or unknown_call(run, qualified, values, node, [], frame)
     if standard is not None:
         values = [run.evaluate(each, frame) for each in given]
         return standard(run, values, node, frame, types)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
@@ -23,7 +23,14 @@ if TYPE_CHECKING:
 
 
 def construct(
-    run: Machine, kind: Type, arguments: Sequence[Value], node: Node, frame: Frame, *, heap: bool = False
+    run: Machine,
+    kind: Type,
+    arguments: Sequence[Value],
+    node: Node,
+    frame: Frame,
+    *,
+    heap: bool = False,
+    members: Mapping[str, Value] | None = None,
 ) -> Value:
     """An object of ``kind``: by its source, by the table of libraries, or one of which nothing is known."""
     cls = run.names.class_of(kind, frame.scope, frame.file)
@@ -34,9 +41,14 @@ def construct(
     made_object = run.obj(key, kind, cls=cls, heap=heap)
     run.handle(node, frame)
     if cls is not None:
+        made_object.data["members"] = members or {}
         _start_fields(run, made_object, cls)
         construct_class(run, made_object, cls, kind, arguments, node, frame)
         return (made_object,)
+    if kind.name in ("std::thread", "std::jthread") and arguments:
+        from nodl.infer.cpp.running.standard import STANDARD
+
+        STANDARD[kind.name](run, arguments, node, frame, ())
     model = LIBRARY_CLASSES.get(kind.name)
     if model is not None:
         found = model(run, made_object, list(arguments), node, frame)
@@ -112,9 +124,11 @@ def construct_class(
     else:
         _bases(run, this, cls, given, arguments, node, inner)
         _members(run, this, cls, given, node, inner)
+    this.building, outside = cls, this.building
     if constructor is not None and constructor.body is not None:
         outcome = run.execute(constructor.body, inner)
         run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+    this.building = outside
     inner.active, inner.finished = False, not inner.captured
     if constructor is not None:
         run.active.pop()
@@ -204,8 +218,12 @@ def foreign_base(
 
 
 def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: Node, inner: Frame) -> None:
+    known: Mapping[str, Value] = this.data.get("members", {})  # of an aggregate
     for name, member in cls.fields.items():
         if member.static:
+            continue
+        if name in known:
+            run.store.set((this, name), known[name])
             continue
         where = given.get(name)
         frame = (
@@ -253,10 +271,17 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: 
 
 def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:
     """The overload that takes so many arguments; of several, the one whose parameters look like them."""
+    found = candidates(functions, arguments)
+    return found[0] if found else None
+
+
+def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Sequence[Function]:
+    """The overloads that fit best: more than one where their looks do not decide."""
     fitting = [each for each in functions if _takes(each, len(arguments))]
     if len(fitting) <= 1:
-        return fitting[0] if fitting else (functions[0] if len(functions) == 1 else None)
-    return max(fitting, key=lambda each: sum(map(_likeness, each.parameters, arguments)))
+        return fitting or (functions if len(functions) == 1 else ())
+    scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
+    return [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
 
 
 def _takes(function: Function, count: int) -> bool:

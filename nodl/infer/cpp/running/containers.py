@@ -2,34 +2,36 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.running import texts
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.objects import made
+from nodl.infer.cpp.running.numbers import added
+from nodl.infer.cpp.running.objects import ORDERED, SETS, as_set, made
 from nodl.infer.cpp.running.operators import element
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
-    NPOS,
     Group,
     Map,
+    Obj,
     Param,
     Seq,
     Text,
     Unknown,
     Value,
-    concatenated,
     literal,
     open_sequence,
     plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type
-from nodl.infer.cpp.syntax import children
+from nodl.infer.cpp.syntax import children, text
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -54,7 +56,8 @@ CONTAINER_METHODS = frozenset({
     "resize", "reserve", "pop_back", "rbegin", "cbegin", "cend", "rfind", "compare", "string", "count",
     "assign", "value_or",
     "has_value", "starts_with", "ends_with", "replace", "contains", "find_first_of", "find_last_of", "first",
-    "second", "fill",
+    "second", "fill", "pop_front", "swap", "remove_prefix", "remove_suffix", "pop", "unique", "remove",
+    "sort", "reverse",
 })  # fmt: skip
 
 
@@ -82,11 +85,11 @@ def container_call(
     if isinstance(atom, Param) and is_list and name in ("size", "empty", "at", "front", "back"):
         items, exact = items_of(run, atom)
         if len(items) != 1 or not isinstance(items[0][0], Unknown):
-            return _sequence_call(run, Seq(tuple(items), not exact), name, None, values, frame)
+            return _sequence_call(run, Seq(tuple(items), not exact), name, None, values, given, frame)
     if isinstance(atom, Text | Param) and not isinstance(atom, Seq):
         return _text_call(run, atom, name, receiver, values, node, frame)
     if isinstance(atom, Seq | Group):
-        return _sequence_call(run, atom, name, receiver, values, frame)
+        return _sequence_call(run, atom, name, receiver, values, given, frame)
     for value in values:
         for each in value:
             run.later(each, frame)
@@ -106,6 +109,7 @@ def _added(
 ) -> Value:
 
     written = declared_type(run, receiver, frame) if receiver is not None else None
+    kind = written[0].name if written is not None else ""
     inner = written[0].arguments[0] if written is not None and written[0].arguments else None
     if (
         name.startswith("emplace")
@@ -125,11 +129,28 @@ def _added(
             handed_over(run, f"an element that {name}() makes", listed, node, frame)
     run.handle(node, frame)
     if receiver is not None and isinstance(atom, Seq):
-        longer = (*atom.items, value)
-        assign(run, receiver, (open_sequence(longer) if atom.open else Seq(longer),), frame)
+        ordered = kind in ORDERED or not (
+            name in ("push_back", "emplace_back", "push") or _is_begin(given, receiver)
+        )
+        longer = (
+            (value, *atom.items)
+            if name.endswith("_front") or _is_begin(given, receiver)
+            else (*atom.items, value)
+        )
+        open_now = atom.open or (ordered and not name.endswith("_front"))
+        if kind in SETS and not atom.open:
+            assign(run, receiver, (as_set(longer),), frame)
+        else:
+            assign(run, receiver, (open_sequence(longer) if open_now else Seq(longer),), frame)
     elif receiver is not None:
         assign(run, receiver, (open_sequence((value, (atom,))),), frame)
     return value
+
+
+def _is_begin(given: list[Node], receiver: Node | None) -> bool:
+    """``x.insert(x.begin(), ...)``."""
+    start = re.sub(r"\s", "", text(given[0])) if given else ""
+    return receiver is not None and start in (f"{text(receiver)}.begin()", f"{text(receiver)}.cbegin()")
 
 
 def _inserted(
@@ -157,12 +178,20 @@ def _map_call(
     frame: Frame,
 ) -> Value:
     if name in ("emplace", "insert_or_assign", "try_emplace") and len(values) >= 2 and receiver is not None:
-        assign(run, receiver, (with_entry(atom, values[0], values[1]),), frame)
+        key, value = _new_entry(run, name, values, node, receiver, frame)
+        assign(run, receiver, (_entered(atom, key, value, name == "insert_or_assign"),), frame)
     elif name == "insert" and values and receiver is not None:
         pairs = [each for each in values[0] if isinstance(each, Group | Seq) and len(each.items) == 2]
+        pairs += [Group(entry) for each in values[0] if isinstance(each, Map) for entry in each.entries]
         for pair in pairs:
-            atom = with_entry(atom, pair.items[0], pair.items[1])
+            atom = _entered(atom, pair.items[0], pair.items[1], False)
         assign(run, receiver, (atom if pairs else atom._replace(open=True),), frame)
+    elif name == "erase" and receiver is not None:
+        assign(run, receiver, (_without(atom, values[0] if values else BOTTOM),), frame)
+    elif name in ("count", "contains") and values and _is_definite(atom, values[0]):
+        return (not _is_missing(atom, values[0]),)
+    elif name == "empty" and not atom.open:
+        return (not atom.entries,)
     elif name == "clear" and receiver is not None:
         assign(run, receiver, (Map(()),), frame)
     elif name == "at" and values:
@@ -179,15 +208,73 @@ def _map_call(
     return unknown(f"the result of {name}()")
 
 
+def _new_entry(
+    run: Machine, name: str, values: list[Value], node: Node, receiver: Node, frame: Frame
+) -> tuple[Value, Value]:
+    """Key and value of ``emplace(key, arguments of the value ...)``."""
+    key, rest = values[0], values[1:]
+    if len(rest) == 2 and all(
+        isinstance(a, Group) for value in rest for a in value
+    ):  # std::piecewise_construct
+        key = rest[0][0].items[0] if rest[0] and rest[0][0].items else BOTTOM
+        rest = list(rest[1][0].items) if rest[1] else []
+    written = declared_type(run, receiver, frame)
+    inner = written[0].arguments[1] if written is not None and len(written[0].arguments) > 1 else None
+    cls = (
+        run.names.class_of(inner, frame.scope, frame.file)
+        if inner is not None and not inner.pointer
+        else None
+    )
+    whole = len(rest) == 1 and any(isinstance(a, Obj) and a.cls is cls for a in rest[0])
+    if inner is None or cls is None or whole:
+        return key, rest[0] if rest else BOTTOM
+    return key, construct(run, inner, rest, node, frame)
+
+
+def _entered(atom: Map, key: Value, value: Value, replace: bool) -> Map:
+    """A key that a map already has keeps its value, unless that is to be replaced."""
+    if replace or _is_missing(atom, key):
+        return with_entry(atom, key, value)
+    if _is_definite(atom, key):
+        return atom
+    return atom._replace(entries=(*atom.entries, (key, value)), open=True)
+
+
+def _without(atom: Map, key: Value) -> Map:
+    if _is_definite(atom, key):
+        return atom._replace(entries=tuple(entry for entry in atom.entries if entry[0] != key))
+    return atom._replace(open=True)
+
+
+def _is_definite(atom: Map, key: Value) -> bool:
+    """Whether it is certain which entry has this key, or that none has."""
+    return (
+        not atom.open
+        and len(key) == 1
+        and plain(key[0]) is not None
+        and all(len(known) == 1 and plain(known[0]) is not None for known, _ in atom.entries)
+    )
+
+
 def _is_missing(atom: Map, key: Value) -> bool:
     """Whether a map certainly has no such key."""
-    if len(key) != 1 or plain(key[0]) is None:
-        return False
-    return all(len(known) == 1 and plain(known[0]) is not None and known != key for known, _ in atom.entries)
+    return _is_definite(atom, key) and all(known != key for known, _ in atom.entries)
+
+
+_REARRANGES = frozenset({
+    "erase", "resize", "pop_back", "pop_front", "assign", "swap", "pop", "remove", "unique", "sort", "reverse",
+    "splice", "merge", "remove_if", "extract",
+})  # fmt: skip
 
 
 def _sequence_call(
-    run: Machine, atom: Seq | Group, name: str, receiver: Node | None, values: list[Value], frame: Frame
+    run: Machine,
+    atom: Seq | Group,
+    name: str,
+    receiver: Node | None,
+    values: list[Value],
+    given: list[Node],
+    frame: Frame,
 ) -> Value:
     exact = isinstance(atom, Group) or not atom.open
     if name in ("at", "front", "back"):
@@ -196,8 +283,10 @@ def _sequence_call(
         return element(run, atom, values[0] if values else BOTTOM)
     if name in ("end", "cend", "rend"):
         return (END,)
-    if name in ("begin", "cbegin", "rbegin", "data", "value_or"):
+    if name in ("begin", "cbegin", "rbegin", "data"):
         return (atom,)
+    if name == "value_or":  # an optional that holds nothing reads as an empty list
+        return (values[0] if values else BOTTOM) if exact and not atom.items else (atom,)
     if name == "size":
         return (len(atom.items),) if exact else unknown("a size")
     if name == "empty":
@@ -215,12 +304,52 @@ def _sequence_call(
         count = min(values[0][0], 256)
         filled = [*atom.items[:count], *([unknown("an element that is not set")] * (count - len(atom.items)))]
         assign(run, receiver, (Seq(tuple(filled)),), frame)
+    elif name in ("pop_back", "pop_front") and exact and receiver is not None and isinstance(atom, Seq):
+        assign(run, receiver, (Seq(atom.items[:-1] if name == "pop_back" else atom.items[1:]),), frame)
     elif (
-        name in ("erase", "resize", "pop_back", "assign", "swap", "pop", "remove")
+        name == "erase"
+        and exact
+        and receiver is not None
+        and isinstance(atom, Seq)
+        and _is_begin(given, receiver)
+    ):
+        assign(run, receiver, (Seq(atom.items[1:]) if len(given) == 1 else open_sequence(atom.items),), frame)
+    elif name == "assign" and receiver is not None and len(values) == 1:
+        assign(run, receiver, values[0], frame)
+    elif name == "swap" and receiver is not None and len(given) == 1 and isinstance(atom, Seq):
+        before = run.evaluate(given[0], frame)
+        assign(run, given[0], (atom,), frame)
+        assign(run, receiver, before, frame)
+    elif name == "count" and exact and values and len(values[0]) == 1 and plain(values[0][0]) is not None:
+        listed = [plain(item[0]) if len(item) == 1 else None for item in atom.items]
+        return unknown("a count") if None in listed else (listed.count(plain(values[0][0])),)
+    elif (
+        name
+        in (
+            "erase",
+            "resize",
+            "pop_back",
+            "pop_front",
+            "assign",
+            "swap",
+            "pop",
+            "remove",
+            "unique",
+            "sort",
+            "reverse",
+            "splice",
+            "merge",
+            "remove_if",
+            "extract",
+        )
         and receiver is not None
         and isinstance(atom, Seq)
     ):
-        more = (unknown("an element of a list"),) if name in ("resize", "assign") else ()
+        more = (
+            (unknown("an element of a list"),)
+            if name in ("resize", "assign", "swap", "splice", "merge")
+            else ()
+        )
         assign(run, receiver, (open_sequence((*atom.items, *more)),), frame)
     return unknown(f"the result of {name}()")
 
@@ -252,43 +381,14 @@ def _text_call(
         if name == "str" and values and receiver is not None:
             assign(run, receiver, values[0], frame)
         return (atom,)
-    if name in ("append", "push_back", "operator+=") and values:
-        found = concatenated((atom,), values[0])
-        if receiver is not None:
-            assign(run, receiver, found, frame)
-        return found
-    if name == "clear" and receiver is not None:
-        assign(run, receiver, literal(""), frame)
-        return BOTTOM
-    return _computed_text(run, atom, name, receiver, values, frame)
-
-
-def _computed_text(
-    run: Machine, atom: Text | Param, name: str, receiver: Node | None, values: list[Value], frame: Frame
-) -> Value:
     known = run.settled_text(atom)
-    numbers = [value[0] for value in values if len(value) == 1 and isinstance(value[0], int)]
-    texts = [plain(value[0]) for value in values if len(value) == 1]
-    if known is None:
-        if name in ("erase", "replace", "insert", "pop_back", "assign") and receiver is not None:
-            assign(run, receiver, unknown(f"what {name}() makes of a text"), frame)
-        return unknown(f"the result of {name}()")
-    if name == "empty":
-        return (not known,)
-    if name in ("find", "rfind") and texts and texts[0] is not None:
-        found = known.find(texts[0]) if name == "find" else known.rfind(texts[0])
-        return (found,) if found >= 0 else (NPOS,)
-    if name in ("size", "length"):
-        return (len(known),)
-    if name in ("front", "back") and known:
-        return literal(known[0 if name == "front" else -1])
-    if name == "at" and numbers and 0 <= numbers[0] < len(known):
-        return literal(known[numbers[0]])
-    if name == "substr" and len(numbers) == len(values):
-        start = numbers[0] if numbers else 0
-        return literal(known[start : start + numbers[1]] if len(numbers) > 1 else known[start:])
-    if name in ("starts_with", "ends_with") and texts and texts[0] is not None:
-        return (known.startswith(texts[0]) if name == "starts_with" else known.endswith(texts[0]),)
-    if name in ("erase", "replace", "insert", "pop_back", "assign", "resize") and receiver is not None:
-        assign(run, receiver, unknown(f"what {name}() makes of a text"), frame)
-    return unknown(f"the result of {name}()")
+    if name in texts.CHANGES and receiver is not None:
+        after = texts.changed(known, name, values) if known is not None else None
+        if after is None and name in ("append", "push_back") and len(values) == 1:
+            found = added((atom,), values[0])
+        else:
+            found = literal(after) if after is not None else unknown(f"what {name}() makes of a text")
+        assign(run, receiver, found, frame)
+        return found
+    found_value = texts.asked(known, name, values) if known is not None else None
+    return unknown(f"the result of {name}()") if found_value is None else found_value

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine, expression
-from nodl.infer.cpp.running.objects import as_map, made
+from nodl.infer.cpp.running.numbers import SIZES
+from nodl.infer.cpp.running.objects import as_map, cast, made
 from nodl.infer.cpp.running.operators import has_text
 from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
 from nodl.infer.cpp.running.variables import variable
@@ -25,7 +26,15 @@ _ESCAPES = {"n": "\n", "t": "\t", "\\": "\\", '"': '"', "'": "'", "0": "\0", "r"
 def string_literal(run: Machine, node: Node, frame: Frame) -> Value:
     whole = text(node)
     inner = whole[whole.find('"') + 1 : -1]
-    return literal(re.sub(r"\\(.)", lambda m: _ESCAPES.get(m[1], m[1]), inner))
+    return literal(re.sub(r"\\(x[0-9a-fA-F]+|[0-7]{1,3}|u[0-9a-fA-F]{4}|.)", lambda m: _escaped(m[1]), inner))
+
+
+def _escaped(written: str) -> str:
+    if written[0] in "xu" and len(written) > 1:
+        return chr(int(written[1:], 16))
+    if written.isdigit() and written[0] in "01234567":
+        return chr(int(written, 8))
+    return _ESCAPES.get(written, written)
 
 
 @expression("raw_string_literal")
@@ -41,7 +50,9 @@ def concatenated_string(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("user_defined_literal")
 def user_defined(run: Machine, node: Node, frame: Frame) -> Value:
     inner = children(node)
-    return run.evaluate(inner[0], frame) if inner else unknown("a literal")
+    suffix = text(inner[-1]) if len(inner) > 1 else ""
+    plain = suffix in ("s", "sv") and inner[0].type.endswith("string_literal")
+    return run.evaluate(inner[0], frame) if plain else unknown(f"a literal with {suffix or 'a suffix'}")
 
 
 @expression("char_literal")
@@ -164,9 +175,14 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
     return construct(run, kind._replace(pointer=False), given, node, frame, heap=True)
 
 
+@expression("sizeof_expression")
+def size_of(run: Machine, node: Node, frame: Frame) -> Value:
+    size = SIZES.get(text(node.child_by_field_name("type") or node.child_by_field_name("value")).strip("() "))
+    return unknown("a size") if size is None else (size,)
+
+
 @expression(
     "delete_expression",
-    "sizeof_expression",
     "alignof_expression",
     "offsetof_expression",
     "requires_expression",
@@ -176,8 +192,9 @@ def nothing_known(run: Machine, node: Node, frame: Frame) -> Value:
 
 
 @expression("cast_expression")
-def cast(run: Machine, node: Node, frame: Frame) -> Value:
-    return run.evaluate(node.child_by_field_name("value"), frame)
+def c_cast(run: Machine, node: Node, frame: Frame) -> Value:
+    kind = run.type_of(text(node.child_by_field_name("type")), frame)
+    return cast(run, kind, run.evaluate(node.child_by_field_name("value"), frame))
 
 
 @expression("lambda_expression")
@@ -196,7 +213,10 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         if child.type == "lambda_capture_initializer" and len(children(child)) >= 2:
             named = children(child)
             run.local(inner, text(named[0]).lstrip("&"), run.evaluate(named[-1], frame))
-    names = {text(child) for child in captures if child.type == "identifier"}
+    if frame.blocks or frame.kept:
+        owners = {name: frame.owner_of(name) for name in words_of(node)}
+        inner.kept = {name: owner for name, owner in owners.items() if owner is not None}
+    names = {text(child) for child in captures if child.type == "identifier" and not _is_by_reference(child)}
     if "=" in {text(child) for child in captures} | {text(node.child_by_field_name("captures"))[1:2]}:
         names |= set(words_of(node))
     for name in sorted(names):
@@ -204,6 +224,10 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         if owner is not None and name not in inner.names:
             run.local(inner, name, run.store.get((owner, name)) or BOTTOM, owner.types.get(name, ""))
     return (Lambda(node, inner),)
+
+
+def _is_by_reference(capture: Node) -> bool:
+    return capture.prev_sibling is not None and capture.prev_sibling.type == "&"
 
 
 def words_of(node: Node) -> list[str]:

@@ -41,6 +41,11 @@ class Frame:
     exit_values: list[Value] = field(default_factory=list)
     mark: int = 0
     loops: list[Loop] = field(default_factory=list)
+    blocks: list[dict[str, tuple[bool, Value, str | None]]] = field(default_factory=list)
+    """For each block that runs: what names that it declares stood for before."""
+    kept: dict[str, Frame] = field(
+        default_factory=dict
+    )  # of a lambda: what it captured of blocks that may have ended
     depth: int = 0
     finished: bool = False  # nobody can see its variables any more
     captured: bool = False  # a lambda can
@@ -52,5 +57,7 @@ class Frame:
         while frame is not None:
             if name in frame.names:
                 return frame
+            if name in frame.kept:
+                return frame.kept[name]
             frame = frame.outer
         return None

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
 from nodl.infer.cpp.reading.collect import parameters_of
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.constructors import bind_parameters, chosen
+from nodl.infer.cpp.running.constructors import bind_parameters, candidates, chosen
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
@@ -33,7 +34,10 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
         if isinstance(atom, Lambda):
             found.append(call_lambda(run, atom, values, node, frame))
         elif isinstance(atom, Bound):
-            found.append(invoke(run, atom.function, atom.this, values, node, frame, ()))
+            found += [
+                invoke(run, atom.function, this, given, node, frame, ())
+                for this, given in _bound(atom, values)
+            ]
         elif (
             isinstance(atom, Obj) and atom.cls is not None and run.names.find_methods(atom.cls, "operator()")
         ):
@@ -49,7 +53,17 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             name = text(node.child_by_field_name("function"))[:60]
             handed_over(run, f"{name}()", values, node, frame)
             found.append(unknown(f"the result of {name}()"))
+    run.left = run.left if len(found) == 1 else None
     return join(*found) if found else unknown("the result of a call")
+
+
+def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Sequence[Value]]]:
+    """The object and arguments of a call; a method without its object gets that as its first argument."""
+    function = atom.function
+    objects = [each for each in values[0] if isinstance(each, Obj)] if values else []
+    if atom.this is None and function.owner and objects and len(values) == len(function.parameters) + 1:
+        return [(each, values[1:]) for each in objects]
+    return [(atom.this, values)]
 
 
 def _placed(fixed: Sequence[Value], values: Sequence[Value]) -> list[Value]:
@@ -99,10 +113,24 @@ def call_functions(
     frame: Frame,
     types: Sequence[Type],
 ) -> Value:
-    function = chosen(functions, values)
-    if function is None:
+    fitting = candidates(functions, values)
+    if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
-    return invoke(run, function, None, values, node, frame, types)
+    return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
+
+
+def _any_of(run: Machine, calls: Sequence[Callable[[], Value]]) -> Value:
+    """One of several calls, nobody knows which."""
+    if len(calls) == 1:
+        return calls[0]()
+    found: list[Value] = []
+
+    def once(call: Callable[[], Value]) -> int:
+        found.append(call())
+        return NEXT
+
+    run.branches([partial(once, call) for call in calls])
+    return join(*found)
 
 
 def call_methods(
@@ -131,7 +159,11 @@ def call_methods(
                 run, Call(node, frame, list(values), list(types), [], this_object)
             )
         return unknown_call(run, name, values, node, [], frame)
-    return invoke(run, function, this_object, values, node, frame, types, bindings)
+    fitting = candidates(methods, values) if function in methods else [function]
+    calls = [
+        partial(invoke, run, each, this_object, values, node, frame, types, bindings) for each in fitting
+    ]
+    return _any_of(run, calls)
 
 
 def invoke(
@@ -166,6 +198,7 @@ def invoke(
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
     _write_back(run, function, inner, node, frame)
+    run.left = node.id if not outcome & NEXT and not inner.exits else None
     inner.active, inner.finished = False, not inner.captured
     return inner.returned
 

@@ -10,7 +10,7 @@ from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.frames import Frame, Loop
 from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Machine, statement
-from nodl.infer.cpp.running.statements import bind_names, condition_value
+from nodl.infer.cpp.running.statements import bind_names, condition_value, in_a_block
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.values import Value, join, unknown
 from nodl.infer.cpp.syntax import text, unwrapped, walk
@@ -24,6 +24,7 @@ MAX_ROUNDS = 3
 
 
 @statement("for_range_loop")
+@in_a_block
 def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     right = node.child_by_field_name("right")
     subject = run.evaluate(right, frame)
@@ -86,6 +87,7 @@ def _iteration(run: Machine, body: Node, frame: Frame, start: int, breaks: list[
 
 
 @statement("for_statement")
+@in_a_block
 def for_statement(run: Machine, node: Node, frame: Frame) -> int:
     initializer = node.child_by_field_name("initializer")
     iterator = _iterator(node)
@@ -136,6 +138,7 @@ def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: 
 
 
 @statement("while_statement")
+@in_a_block
 def while_statement(run: Machine, node: Node, frame: Frame) -> int:
     return _counted(run, node, frame, node.child_by_field_name("condition"), None)
 

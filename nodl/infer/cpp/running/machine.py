@@ -99,6 +99,9 @@ class Machine:
         self.dead: dict[tuple[str, int, int], str] = {}
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[Function] = []
+        self.left: object = (
+            None  # the last call that certainly came to no end: it threw, or ended the program
+        )
         self.steps = 0
         self.limit = MAX_STEPS
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
@@ -166,6 +169,7 @@ class Machine:
             self.store.undo(mark)
         if going:
             self.store.merge(going)
+        self.left = None
         return outcome
 
     def settle(self, mark: int, alternatives: list[Changes], going: bool) -> None:
@@ -179,6 +183,9 @@ class Machine:
     # --- variables ----------------------------------------------------------------------------------------
 
     def local(self, frame: Frame, name: str, value: Value, written_type: str = "") -> None:
+        if frame.blocks and name not in frame.blocks[-1]:
+            before = self.store.get((frame, name)) or BOTTOM
+            frame.blocks[-1][name] = (name in frame.names, before, frame.types.get(name))
         frame.names.add(name)
         if written_type:
             frame.types[name] = written_type

@@ -37,6 +37,7 @@ from nodl.infer.cpp.syntax import text, unwrapped
 if TYPE_CHECKING:
     from tree_sitter import Node
 
+    from nodl.infer.cpp.reading.declarations import Function
     from nodl.infer.cpp.reading.type_names import Type
 
 
@@ -92,6 +93,7 @@ def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame
             run.store.undo(before)
     if alternatives:
         run.store.merge(alternatives)
+        run.left = None
     return join(*found)
 
 
@@ -101,6 +103,8 @@ def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
     cls = run.names.class_of(written[0], frame.scope, frame.file) if written is not None else None
     if cls is not None:
         return any(map(run.makes_interfaces, run.names.find_methods(cls, name)))
+    if CREATES.fullmatch(name):
+        return True
     if written is not None and written[0].name not in ("", "auto"):
         return False
     return any(run.makes_interfaces(f) for table in run.names.methods.values() for f in table.get(name, ()))
@@ -162,7 +166,9 @@ def on_object(
 ) -> Value:
     types = types_of(run, callee, frame)
     if atom.cls is not None:
-        methods = run.names.find_methods(atom.cls, name)
+        argument = callee.child_by_field_name("argument")
+        own = argument is not None and argument.type == "this"
+        methods = of_this(run, atom, name, frame) if own else run.names.find_methods(atom.cls, name)
         if methods:
             values = [run.evaluate(each, frame) for each in given]
             return call_methods(run, methods, atom, values, node, frame, types)
@@ -183,6 +189,24 @@ def on_object(
                 run.later(each, frame)
         return unknown(f"the result of {name}()")
     return unknown_call(run, f"{atom.type.name}::{name}", values, node, given, frame, receiver=atom)
+
+
+def of_this(run: Machine, this: Obj, name: str, frame: Frame) -> list[Function]:
+    """What ``name()`` calls inside of a class: its own while it is made as a base, or if it is not virtual."""
+    assert this.cls is not None
+    methods = run.names.find_methods(this.cls, name)
+    owner = frame.function.owner if frame.function is not None else ""
+    cls = run.names.find_class(owner, frame.scope, frame.file) if owner else None
+    ancestry = run.names.ancestry(this.cls)
+    if this.building is not None and this.building is not this.cls:
+        return run.names.find_methods(this.building, name) or methods
+    if cls is None or cls is this.cls or cls not in ancestry or not methods:
+        return methods
+    lexical = run.names.find_methods(cls, name)
+    every = [m for each in ancestry for m in run.names.methods.get(each, {}).get(name, ())]
+    if any(each.virtual for each in (*every, *run.names.declarations(this.cls, name))):
+        return methods
+    return lexical or methods
 
 
 def by_model(run: Machine, atom: Obj, name: str, call: Call) -> Value | None:

@@ -6,10 +6,26 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.type_names import NO_TYPE
-from nodl.infer.cpp.running.contents import copied
+from nodl.infer.cpp.running.contents import copied, items_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Seq, Value, literal, unknown
+from nodl.infer.cpp.running.numbers import as_type
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    END,
+    Const,
+    Group,
+    Map,
+    Obj,
+    Seq,
+    Text,
+    Unknown,
+    Value,
+    literal,
+    open_sequence,
+    plain,
+    unknown,
+)
 from nodl.infer.cpp.syntax import children, text
 
 if TYPE_CHECKING:
@@ -23,6 +39,8 @@ SEQUENCES = frozenset({
     "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
     "vector", "std::multiset", "std::queue", "std::stack",
 })  # fmt: skip
+SETS = frozenset({"std::set", "std::unordered_set", "set"})
+ORDERED = frozenset({*SETS, "std::multiset", "std::priority_queue"})
 MAPS = frozenset({"std::map", "std::unordered_map", "std::multimap", "map"})
 _TEXTS = frozenset(
     {
@@ -54,7 +72,8 @@ def declared_value(
     if value is None:
         return BOTTOM if pointer or kind.pointer else default_value(run, node, kind, frame)
     if pointer or kind.pointer or _is_auto(written) or kind.name in _SCALARS:
-        return initial_value(run, value, frame, pointer or (_is_auto(written) and "&" in written))
+        found = initial_value(run, value, frame, pointer or (_is_auto(written) and "&" in written))
+        return found if pointer or kind.pointer else as_type(kind.name, found)
     if value.type not in ("argument_list", "initializer_list"):
         found = copied(run, run.evaluate(value, frame), node, frame)
         return converted(run, kind, found, node, frame)
@@ -93,32 +112,97 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
 
     cls = run.names.class_of(kind, frame.scope, frame.file)
     if cls is None and kind.name in SEQUENCES:
-        items = [run.evaluate(each, frame) for each in given]
-        if (
-            len(given) == 1
-            and given[0].type != "initializer_list"
-            and any(isinstance(a, Seq) for a in items[0])
-        ):
-            return items[0]
-        if (
-            node.type == "declaration"
-            and any(
-                c.type == "init_declarator" and text(c).rstrip().endswith(")") for c in node.named_children
-            )
-            and len(given) == 2
-        ):
-            return (Seq((items[1],), open=True),)
-        return (Seq(tuple(items)),)
+        return _sequence(run, node, kind, given, frame)
     if cls is None and kind.name in MAPS:
         return as_map([run.evaluate(each, frame) for each in given])
     if cls is None and (kind.name in _TEXTS or kind.name in _SCALARS or kind.last in run.names.enums):
-        return run.evaluate(given[0], frame) if given else default_value(run, node, kind, frame)
+        if kind.name in _TEXTS and given:
+            return text_of(run, [run.evaluate(each, frame) for each in given])
+        return (
+            as_type(kind.name, run.evaluate(given[0], frame))
+            if given
+            else default_value(run, node, kind, frame)
+        )
     if cls is not None and is_aggregate(run, cls) and given:
         return _aggregate(run, node, kind, cls, given, frame)
     values = [run.evaluate(each, frame) for each in given]
     if cls is None and len(values) == 1 and _all_of(kind, values[0]):
         return values[0]  # a copy of a library's object
     return construct(run, kind, values, node, frame)
+
+
+def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
+    """In braces its elements; in parentheses a copy, a part of another one, or so many equal elements."""
+    inner = kind.arguments[0] if kind.arguments else NO_TYPE
+    is_class = run.names.class_of(inner, frame.scope, frame.file) is not None and not inner.pointer
+    items = [
+        made(run, each, inner, children(each), frame)
+        if is_class and each.type == "initializer_list"
+        else run.evaluate(each, frame)
+        for each in given
+    ]
+    if len(given) == 1 and given[0].type != "initializer_list" and any(isinstance(a, Seq) for a in items[0]):
+        return items[0]
+    parent = given[0].parent if given else None
+    if parent is None or parent.type != "argument_list":
+        return (as_set(items) if kind.name in SETS else Seq(tuple(items)),)
+    if len(items) > 1 and END in items[1]:
+        parts = [items_of(run, atom) for atom in items[0]]
+        listed = [item for part, _ in parts for item in part]
+        return (Seq(tuple(listed)) if len(parts) == 1 and parts[0][1] else open_sequence(listed),)
+    one = items[1] if len(items) > 1 else default_value(run, node, inner, frame) if inner.name else BOTTOM
+    return (open_sequence((one,)),)
+
+
+def as_set(items: Sequence[Value]) -> Seq:
+    """Each element once, in order; in any order, any number of times where one is not known."""
+    known = [plain(item[0]) if len(item) == 1 else None for item in items]
+    if None in known or (len(set(known)) > 1 and not all(isinstance(item[0], Text) for item in items)):
+        return open_sequence(items)
+    return Seq(
+        tuple(
+            {
+                str(text): item
+                for text, item in sorted(zip(known, items, strict=True), key=lambda p: str(p[0]))
+            }.values()
+        )
+    )
+
+
+def cast(run: Machine, kind: Type, value: Value) -> Value:
+    """``static_cast<T>(x)``: a number as T holds it, the enumerator of a number, else the object itself."""
+    if kind.last not in run.names.enums:
+        return as_type(kind.name, value)
+    numbers = run.names.enumerator_numbers
+    owner = f"::{kind.last}::"
+    found: list[object] = []
+    for atom in value:
+        same = [full for full, each in numbers.items() if each == atom and owner in f"::{full}"]
+        if isinstance(atom, int) and same:
+            found.append(Const(same[0], atom))
+        else:
+            found.append(atom if isinstance(atom, Const) else Unknown("an enumerator"))
+    return tuple(found)
+
+
+def text_of(run: Machine, values: Sequence[Value]) -> Value:
+    """``std::string(...)``: of a text, of so many letters, of a part of a text. Two letters in braces look the same."""
+    if len(values) == 1:
+        only = values[0]
+        return (
+            only if not any(isinstance(atom, int | float | Seq) for atom in only) else unknown("a made text")
+        )
+    known = [
+        run.settled_text(value[0]) if len(value) == 1 and isinstance(value[0], Text) else None
+        for value in values
+    ]
+    numbers = [value[0] if len(value) == 1 and isinstance(value[0], int) else -1 for value in values]
+    whole = known[0]
+    if len(values) == 2 and numbers[0] >= 0 and known[1] is not None and len(known[1]) == 1:
+        return literal(known[1] * min(numbers[0], 256))
+    if len(values) == 3 and whole is not None and 0 <= numbers[1] <= len(whole) and numbers[2] >= 0:
+        return literal(whole[numbers[1] : numbers[1] + numbers[2]])
+    return unknown("a text made of several values")
 
 
 def _all_of(kind: Type, value: Value) -> bool:
@@ -139,16 +223,17 @@ def as_map(items: Sequence[Value]) -> Value:
 
 
 def is_aggregate(run: Machine, cls: Class) -> bool:
-    return not run.names.find_methods(cls, cls.name) and cls.name not in cls.declared
+    return not (cls.bases or run.names.find_methods(cls, cls.name) or cls.name in cls.declared)
 
 
 def _aggregate(
     run: Machine, node: Node, kind: Type, cls: Class, given: Sequence[Node], frame: Frame
 ) -> Value:
-    from nodl.infer.cpp.running.constructors import class_frame, construct
+    from nodl.infer.cpp.running.constructors import construct
 
-    (made_object,) = construct(run, kind, [], node, frame)
     names = [f.name for f in cls.fields.values() if not f.static]
+    bindings = dict(zip(cls.templates, kind.arguments, strict=False))
+    members: dict[str, Value] = {}
     for position, item in enumerate(given):
         name, value = names[position] if position < len(names) else "", item
         if item.type == "initializer_pair":
@@ -156,14 +241,13 @@ def _aggregate(
             name, value = text(designator).lstrip("."), item.child_by_field_name("value") or item
         if name:
             member = cls.fields.get(name)
-            inner = run.type_of(member.type, class_frame(run, made_object, cls, frame)) if member else NO_TYPE
-            given_value = (
+            inner = run.names.resolve(member.type, cls.scope, cls.file, bindings) if member else NO_TYPE
+            members[name] = (
                 made(run, value, inner, children(value), frame)
                 if value.type == "initializer_list" and inner.name
                 else run.evaluate(value, frame)
             )
-            run.store.set((made_object, name), given_value)
-    return (made_object,)
+    return construct(run, kind, [], node, frame, members=members)
 
 
 def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
@@ -172,6 +256,8 @@ def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
 
     if kind.name in _TEXTS:
         return literal("")
+    if kind.name == "std::array" and kind.arguments and not kind.arguments[0].pointer:
+        return (open_sequence((default_value(run, node, kind.arguments[0], frame),)),)
     if kind.name in SEQUENCES:
         return (Seq(()),)
     if kind.name in MAPS:

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import NEXT, Machine, expression
+from nodl.infer.cpp.running.numbers import added, arithmetic
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -68,10 +68,10 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     right = run.evaluate(right_node, frame)
     if operator == ">>" and has_text(left):
         return _extracted(run, left_node, left, right_node, frame)
-    if operator == "<<":
-        return _streamed(run, left_node, left, right, frame)
+    if operator == "<<" and not (len(left) == 1 and isinstance(left[0], int)):
+        return _streamed(run, left_node, left, right_node, right, frame)
     if operator == "+" and (has_text(left) or has_text(right)):
-        return concatenated(left, right)
+        return added(left, right)
     if operator == "/" and (has_text(left) or has_text(right)):
         return concatenated(left, literal("/"), right)
     if len(left) == 1 and len(right) == 1:
@@ -107,18 +107,29 @@ def computed(operator: str, left: object, right: object) -> Value:
     if operator in ("==", "!="):
         same = _same(left, right)
         return unknown("a comparison") if same is None else (same == (operator == "=="),)
-    if not isinstance(left, int | float) or not isinstance(right, int | float):
-        return unknown("a computed value")
-    try:
-        return (_ARITHMETIC[operator](left, right),)
-    except (KeyError, ZeroDivisionError, TypeError, ValueError, OverflowError):
-        return unknown("a computed value")
+    left, right = number_of(left), number_of(right)
+    return arithmetic(operator, left, right)
+
+
+def number_of(atom: object) -> object:
+    """An enumerator as its number."""
+    return atom.number if isinstance(atom, Const) and atom.number is not None else atom
 
 
 def _same(left: object, right: object) -> bool | None:
+    if isinstance(left, int | float) and isinstance(right, int | float):
+        return left == right
     first, second = plain(left), plain(right)
     if first is not None and second is not None:
         return first == second
+    if isinstance(left, Const) and isinstance(right, Const) and not {END, NPOS} & {left, right}:
+        return left == right if None in (left.number, right.number) else left.number == right.number
+    if (
+        Const in (type(left), type(right))
+        and isinstance(number_of(left), int)
+        and isinstance(number_of(right), int)
+    ):
+        return number_of(left) == number_of(right)
     if isinstance(left, Const) and isinstance(right, Const):
         return left == right
     if END in (left, right) and isinstance(left if right == END else right, Obj | Group | Text | Bound):
@@ -128,19 +139,23 @@ def _same(left: object, right: object) -> bool | None:
     return None
 
 
-_ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
-    "+": lambda a, b: a + b, "-": lambda a, b: a - b, "*": lambda a, b: a * b,
-    "/": lambda a, b: a // b if isinstance(a, int) and isinstance(b, int) else a / b,
-    "%": lambda a, b: a % b, "<": lambda a, b: a < b, ">": lambda a, b: a > b, "<=": lambda a, b: a <= b,
-    ">=": lambda a, b: a >= b, "|": lambda a, b: a | b, "&": lambda a, b: a & b,
-}  # fmt: skip
+_MANIPULATORS = re.compile(
+    r"std::(?:hex|oct|fixed|scientific|setw|setfill|setprecision|setbase|boolalpha|(?:no)?show\w+|(?:no)?uppercase|left|right|"
+    r"internal|put_\w+)\b"
+)
 
 
-def _streamed(run: Machine, target: Node | None, left: Value, right: Value, frame: Frame) -> Value:
-    """``stream << text``; the stream is a text that grows."""
+def _streamed(
+    run: Machine, target: Node | None, left: Value, written: Node | None, right: Value, frame: Frame
+) -> Value:
+    """``stream << text``; the stream is a text that grows, until something changes how it writes."""
     if not has_text(left):
         return left or unknown("a stream")
-    found = concatenated(left, right) if right else left
+    if written is not None and _MANIPULATORS.match(text(written)):
+        found = unknown("a stream that writes in a way of its own")
+    else:
+        pieces = tuple(literal(f"{atom:g}")[0] if isinstance(atom, float) else atom for atom in right)
+        found = concatenated(left, pieces) if right else left
     inner = target
     while inner is not None and inner.type == "binary_expression":
         inner = inner.child_by_field_name("left")
@@ -182,7 +197,10 @@ def pointer(run: Machine, node: Node, frame: Frame) -> Value:
         found = method_pointer(run, argument, frame)
         if found is not None:
             return found
-    return run.evaluate(argument, frame)
+    found = run.evaluate(argument, frame)
+    if argument is not None and argument.type == "subscript_expression" and has_text(found):
+        return unknown("a text from some letter on")
+    return found
 
 
 def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
@@ -237,7 +255,8 @@ def subscript(run: Machine, node: Node, frame: Frame) -> Value:
 
 def element(run: Machine, atom: object, key: Value) -> Value:
     """``container[key]``."""
-
+    if not isinstance(atom, Map):
+        key = tuple(map(number_of, key))
     if isinstance(atom, Map):
         definite = [value for known, value in atom.entries if len(key) == 1 and known == key]
         if definite and not atom.open:

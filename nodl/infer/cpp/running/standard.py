@@ -18,6 +18,7 @@ from nodl.infer.cpp.running.values import (
     Lambda,
     Obj,
     Seq,
+    Text,
     Unknown,
     Value,
     concatenated,
@@ -43,6 +44,25 @@ CASTS = frozenset({
 })  # fmt: skip
 
 
+_READS = re.compile(
+    r"std::(?:to_string|to_wstring|sto\w+|min|max|minmax|clamp|abs|isnan|isinf|isfinite|distance|next|prev|count\w*|all_of|any_of|"
+    r"none_of|accumulate|reduce|inner_product|equal|mismatch|find\w*|search|adjacent_find|binary_search|lower_bound|upper_bound|"
+    r"min_element|max_element|lexicographical_compare|is_\w+|get|get_if|holds_alternative|visit|size|ssize|empty|begin|end|cbegin|"
+    r"cend|data|string\w*|vector|set|map|list|deque|array|pair|tuple|make_\w+|tie|forward_as_tuple|apply|invoke|bind\w*|ref|cref|"
+    r"function|optional|shared_ptr|unique_ptr|weak_ptr|thread|jthread|async|call_once|for_each|this_thread\w*|cout|cerr|quoted|"
+    r"tolower|toupper|isspace|isdigit|isalpha|isalnum|strlen|strcmp|printf|puts|getenv|sqrt|pow|floor|ceil|round|lround|fmod|sin|"
+    r"cos|tan|a?tan2?|asin|acos|hypot|exp|log\w*|hash|mutex|lock_guard|unique_lock|scoped_lock|chrono|any|any_cast|variant|move|"
+    r"forward|as_const|addressof|declval|less|greater|plus|minus|cmp_\w+|initializer_list|atomic\w*|runtime_error|\w+_error|"
+    r"exception|out_of_range|invalid_argument|signal|system|exit|abort|terminate|filesystem)\b.*"
+)
+"""Functions of the standard library that leave the texts and containers alone that they get."""
+
+
+def may_write(name: str) -> bool:
+    """Whether a function of the standard library may change what its arguments refer to."""
+    return name.startswith("std::") and _READS.fullmatch(name) is None
+
+
 def _standard(*names: str) -> Callable[[Standard], Standard]:
     def register(handler: Standard) -> Standard:
         STANDARD.update(dict.fromkeys(names, handler))
@@ -53,14 +73,21 @@ def _standard(*names: str) -> Callable[[Standard], Standard]:
 
 @_standard("std::string", "std::string_view", "string", "std::filesystem::path", "std::quoted")
 def _text(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
-    return values[0] if values else literal("")
+    from nodl.infer.cpp.running.objects import text_of
+
+    return text_of(run, values) if values else literal("")
 
 
 @_standard("std::to_string")
 def _to_string(
     run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]
 ) -> Value:
-    return concatenated(values[0]) if values else unknown("a text")
+    from nodl.infer.cpp.running.operators import number_of
+
+    if any(isinstance(atom, Text) and plain(atom) is not None for value in values for atom in value):
+        return unknown("the number of a letter")
+    numbers = tuple(map(number_of, values[0])) if values else BOTTOM
+    return concatenated(numbers) if values else unknown("a text")
 
 
 @_standard(
@@ -93,7 +120,7 @@ def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types
             rest = values[1:]
             targets = [atom] if isinstance(atom, Bound | Lambda) else []
         for target in targets:
-            if all(_is_placeholder(value) for value in rest):
+            if [_placeholder(value) for value in rest] == list(range(1, len(rest) + 1)):
                 found.append(target)
             else:
                 key = ("bind", frame.file.file, node.start_byte, frame.path, target)
@@ -103,8 +130,10 @@ def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types
     return tuple(found) if found else unknown("a function")
 
 
-def _is_placeholder(value: Value) -> bool:
-    return any(isinstance(a, Unknown) and re.search(r"the value of (?:\w+::)*_\d$", a.why) for a in value)
+def _placeholder(value: Value) -> int:
+    """Of ``_1`` the number, else 0."""
+    found = [re.search(r"the value of (?:\w+::)*_(\d)$", a.why) for a in value if isinstance(a, Unknown)]
+    return next((int(match[1]) for match in found if match), 0)
 
 
 @_standard(
@@ -124,8 +153,16 @@ def _is_placeholder(value: Value) -> bool:
 def _calls_back(
     run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]
 ) -> Value:
-    for atom in _bind(run, list(values), node, frame, types):
-        run.later(atom, frame)
+    from nodl.infer.cpp.running.invocation import call_values
+
+    callee = next(
+        (at for at, value in enumerate(values) if any(isinstance(a, Lambda | Bound) for a in value)), 0
+    )
+    for atom in _bind(run, list(values[callee:]), node, frame, types):
+        if isinstance(atom, Obj) and atom.data.get("partial"):
+            call_values(run, (atom,), [], node, frame)  # with its arguments
+        else:
+            run.later(atom, frame)
     for value in values:
         for atom in value:
             run.later(atom, frame)
@@ -155,7 +192,7 @@ def same(left: Value, right: Value) -> bool | None:
 
 
 @_standard("std::function", "std::optional", "std::make_optional", "std::shared_ptr", "std::unique_ptr", "std::begin",
-           "std::weak_ptr", "std::remove_reference", "std::launder", "std::exchange")  # fmt: skip
+           "std::weak_ptr", "std::mem_fn", "std::remove_reference", "std::launder", "std::exchange")  # fmt: skip
 def _itself(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
     return values[0] if values else BOTTOM
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.frames import Frame, Loop
-from nodl.infer.cpp.running.machine import BREAK, CONTINUE, NEXT, RETURN, Machine, statement
+from nodl.infer.cpp.running.machine import BREAK, CONTINUE, NEXT, RETURN, Machine, StatementHandler, statement
 from nodl.infer.cpp.running.objects import declared_value
 from nodl.infer.cpp.running.values import BOTTOM, Group, Value, join, truth, unknown
 from nodl.infer.cpp.syntax import children, parse_expression, text, unwrapped, walk
@@ -17,8 +18,41 @@ if TYPE_CHECKING:
     from tree_sitter import Node
 
 
+def in_a_block(handler: StatementHandler) -> StatementHandler:
+    """Names that the statement declares end with it; what they stood for before is back."""
+
+    def run_block(run: Machine, node: Node, frame: Frame) -> int:
+        loops = [(loop, len(loop.breaks), len(loop.continues)) for loop in frame.loops]
+        frame.blocks.append({})
+        outcome = handler(run, node, frame)
+        for name, (existed, value, written) in frame.blocks.pop().items():
+            if not existed:
+                frame.names.discard(name)
+                continue
+            left = [
+                c
+                for loop, breaks, continues in loops
+                for c in (*loop.breaks[breaks:], *loop.continues[continues:])
+            ]
+            for changes in left:
+                if (frame, name) in changes:
+                    changes[(frame, name)] = value
+            run.store.set((frame, name), value)
+            frame.types[name] = written or ""
+        return outcome
+
+    return run_block
+
+
+@statement("compound_statement")
+def braces(run: Machine, node: Node, frame: Frame) -> int:
+    parent = node.parent
+    if parent is None or parent.type in ("function_definition", "lambda_expression"):
+        return block(run, node, frame)
+    return _inner_block(run, node, frame)
+
+
 @statement(
-    "compound_statement",
     "declaration_list",
     "case_statement",
     "labeled_statement",
@@ -27,6 +61,9 @@ if TYPE_CHECKING:
 )
 def block(run: Machine, node: Node, frame: Frame) -> int:
     return sequence(run, children(node), frame)
+
+
+_inner_block = in_a_block(block)
 
 
 def sequence(run: Machine, listed: list[Node], frame: Frame) -> int:
@@ -44,8 +81,10 @@ def sequence(run: Machine, listed: list[Node], frame: Frame) -> int:
 @statement("expression_statement")
 def expression_statement(run: Machine, node: Node, frame: Frame) -> int:
     for child in children(node):
+        run.left = None
         run.evaluate(child, frame)
-        if child.type == "call_expression" and text(child.child_by_field_name("function")) in _ENDS:
+        ends = child.type == "call_expression" and text(child.child_by_field_name("function")) in _ENDS
+        if ends or run.left == child.id:
             return RETURN
     return NEXT
 
@@ -91,6 +130,7 @@ class _Switch(Loop):
 
 
 @statement("if_statement")
+@in_a_block
 def if_statement(run: Machine, node: Node, frame: Frame) -> int:
     condition = node.child_by_field_name("condition")
     for child in children(condition):
@@ -134,6 +174,7 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 
 
 @statement("switch_statement")
+@in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     subject = condition_atoms(run, node.child_by_field_name("condition"), frame)
     cases = [c for c in children(node.child_by_field_name("body")) if c.type == "case_statement"]
@@ -222,7 +263,7 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
     for declarator in node.children_by_field_name("declarator"):
         if declarator.type == "function_declarator":
             _vexing(run, node, declarator, written, frame)
-    for name, value, pointer in declared_names(node):
+    for name, value, pointer, written in declared_names(node):
         if any(
             d.type == "function_declarator" and text(d).startswith(name)
             for d in node.children_by_field_name("declarator")
@@ -234,8 +275,11 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
             bind_names(run, names, run.evaluate(value, frame), frame)
             break
         kind = written + ("&" if pointer else "")
-        found = declared_value(run, node, written, value, pointer, frame)
-        run.local(frame, name, found, kind)
+        initial = partial(declared_value, run, node, written, value, pointer, frame)
+        if _is_static(node):
+            _static_local(run, node, name, kind, initial, frame)
+        else:
+            run.local(frame, name, initial(), kind)
     structured = next((n for n in node.named_children if n.type == "init_declarator"
                        and any(c.type == "structured_binding_declarator" for c in walk(n))), None)  # fmt: skip
     if structured is not None:
@@ -243,6 +287,24 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
                  and n.parent.type == "structured_binding_declarator"]  # fmt: skip
         bind_names(run, names, run.evaluate(structured.child_by_field_name("value"), frame), frame)
     return NEXT
+
+
+def _is_static(node: Node) -> bool:
+    return any(
+        text(child) == "static" for child in node.named_children if child.type == "storage_class_specifier"
+    )
+
+
+def _static_local(
+    run: Machine, node: Node, name: str, kind: str, initial: Callable[[], Value], frame: Frame
+) -> None:
+    """A variable that is made once and keeps its value from call to call."""
+    key = ("static", frame.file.file, node.start_byte, name, str(sorted(frame.bindings.items())))
+    kept = run.frames.setdefault(key, Frame(frame.file, frame.scope))
+    if run.store.get((kept, name)) is None:
+        run.local(kept, name, initial(), kind)
+    frame.names.discard(name)
+    frame.kept[name] = kept
 
 
 def _vexing(run: Machine, node: Node, declarator: Node, written: str, frame: Frame) -> None:

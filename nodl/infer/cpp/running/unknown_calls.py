@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,18 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Seq, Text, Value, join, unknown
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Map,
+    Obj,
+    Param,
+    Seq,
+    Text,
+    Value,
+    join,
+    open_sequence,
+    unknown,
+)
 from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import text, unwrapped
 
@@ -88,11 +100,56 @@ def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame
         if target is None or target.type not in ("identifier", "field_expression"):
             continue
         declared = declared_type(run, target, frame)
-        if declared is None or declared[0].name not in ("std::string", "string", "std::vector"):
-            continue
-        owner = frame.owner_of(text(target))
-        if owner is not None and "const" in owner.types.get(text(target), "").split():
-            continue
-        before = run.evaluate(target, frame)
-        if any(isinstance(atom, Text | Seq | Param) for atom in before):
-            assign(run, target, join(before, unknown(f"what {name}() may have written")), frame)
+        if declared is not None and declared[0].name in ("std::string", "string", "std::vector"):
+            _changed(run, name, target, frame)
+
+
+def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:
+    """``std::reverse(x.begin(), x.end())``, ``std::getline(stream, x)``: every variable among the arguments, also that
+    of ``std::back_inserter(x)``, may have changed."""
+    seen: set[str] = set()
+    for each in given:
+        for target in _variables(each):
+            if text(target) not in seen:
+                seen.add(text(target))
+                _changed(run, name, target, frame)
+
+
+def _variables(given: Node) -> list[Node]:
+    """Variables and members that an argument names, but for those in closures."""
+    if given.type in ("identifier", "field_expression") and not (
+        given.parent is not None
+        and given.parent.type == "call_expression"
+        and given == given.parent.named_children[0]
+    ):
+        return [given]
+    if given.type == "lambda_expression":
+        return []
+    if given.type == "field_expression":  # the method of a call: its object
+        argument = given.child_by_field_name("argument")
+        return _variables(argument) if argument is not None else []
+    return [found for child in given.named_children for found in _variables(child)]
+
+
+def _changed(run: Machine, name: str, target: Node, frame: Frame) -> None:
+    owner = frame.owner_of(text(target))
+    if owner is not None and "const" in owner.types.get(text(target), "").split():
+        return
+    before = run.evaluate(target, frame)
+    if any(isinstance(atom, Text | Seq | Map | Param) for atom in before):
+        assign(run, target, join(*(_after(atom, name) for atom in before)), frame)
+
+
+def _after(atom: object, name: str) -> Value:
+    """A list keeps its elements, in another order, and may have others."""
+    if isinstance(atom, Seq):
+        more = () if _ORDERS.fullmatch(name) else (unknown(f"what {name}() may have written"),)
+        return (open_sequence((*atom.items, *more)),)
+    if isinstance(atom, Map):
+        return (atom._replace(open=True),)
+    return unknown(f"what {name}() may have written")
+
+
+_ORDERS = re.compile(
+    r"std::(?:\w*sort|reverse|rotate|\w*shuffle|\w*partition|nth_element|\w+_heap|\w+_permutation)"
+)

@@ -45,6 +45,7 @@ class Const(NamedTuple):
     """An enumerator, by its qualified name."""
 
     name: str
+    number: int | None = None
 
 
 END = Const("the end of a container")
@@ -113,6 +114,7 @@ class Obj:
     heap: bool = False
     foreign_base: str = ""
     is_node: bool = False  # the node itself; else something that belongs to it
+    building: Class | None = None  # the class whose constructor runs: no method of a derived class is called
 
     def __repr__(self) -> str:
         return f"<{self.type.name}>"

@@ -120,10 +120,10 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
         for each in run.names.ancestry(cls) if cls is not None else ():
             if last in each.fields and each.fields[last].static:
                 return static_member(run, each, last)
-    if name in run.names.enumerators:
-        return (Const(run.names.enumerators[name]),)
-    if separator and f"{head.rpartition('::')[2]}::{last}" in run.names.enumerators:
-        return (Const(run.names.enumerators[f"{head.rpartition('::')[2]}::{last}"]),)
+    for key in (name, f"{head.rpartition('::')[2]}::{last}" if separator else name):
+        full = run.names.enumerators.get(key)
+        if full is not None:
+            return (Const(full, run.names.enumerator_numbers.get(full)),)
     function = run.names.find_functions(name, frame.scope, frame.file)
     if function:
         return tuple(Bound(each, None) for each in function)

@@ -1,0 +1,196 @@
+"""Names that a program computes as C++ does; what was read otherwise before is not in the result, or is not certain.
+
+What each program makes was had by running it on rclcpp.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.workspace import HEAD, gaps, in_class, infer
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+PUB = "void pub(std::string t) { create_publisher<std_msgs::msg::String>(t, 1); }\n"
+
+
+def certain(tmp_path: Path, source: str) -> set[str]:
+    """Names that are known in full."""
+    system = infer(tmp_path, source)
+    return {e.name.text for node in system.nodes for e in node.endpoints if e.name.is_literal}
+
+
+# what the constructor does, members and classes before it, what is made, what is not
+PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
+    "a capture by reference sees later values, one by value does not": (
+        'std::string t = "one"; auto v = [this, t]() { pub(t + "_v"); }; auto r = [this, &t]() { pub(t + "_r"); };'
+        't = "two"; v(); r();',
+        "", "", {"one_v", "two_r"}, {"one_r", "two_v"},
+    ),
+    "a name in a block ends with the block": (
+        'std::string t = "outer"; { std::string t = "inner"; pub(t + "_b"); } pub(t);'
+        'for (int i = 0; i < 1; ++i) { auto t = std::string("loop"); pub(t + "_l"); } pub(t + "_2");',
+        "", "", {"inner_b", "outer", "loop_l", "outer_2"}, {"inner", "loop", "loop_2", "inner_2"},
+    ),
+    "behind a block the member of that name is meant again": (
+        'for (int i = 0; i < 1; ++i) { auto topic = std::string("local"); pub(topic); } pub(topic + "_m");',
+        'std::string topic = "member";', "", {"local", "member_m"}, {"local_m"},
+    ),
+    "a static variable of a function keeps its value": (
+        "next(); next();", 'void next() { static int i = 0; pub("s" + std::to_string(i++)); }', "",
+        {"s0", "s1"}, set(),
+    ),
+    "a text beside a number is a pointer that moves on": (
+        'const char * t = "abcd"; pub(t + 1); std::string k = "k"; k += \'a\' + 1; pub(k);',
+        "", "", {"bcd"}, {"abcd", "abcd1", "k", "ka1", "k1"},
+    ),
+    "numbers are those of their types": (
+        'uint8_t u = 250; u += 10; pub("u" + std::to_string(u)); pub("d" + std::to_string(-7 / 2 + 9));'
+        'bool b = 3; pub("b" + std::to_string(b)); int n = 2.9; pub("n" + std::to_string(n));'
+        'int k = 4; k <<= 1; pub("k" + std::to_string(k)); pub("c" + std::to_string(\'a\'));',
+        "", "", {"d6", "b1", "n2", "k8"}, {"u260", "d5", "b3", "n2.900000", "ca"},
+    ),
+    "a text of so many letters is no number": (
+        "pub(std::string(3, 'a')); std::string s(2, 'b'); pub(s);", "", "", {"aaa", "bb"}, {"3", "2"},
+    ),
+    "letters are written as numbers": (r'pub("\x61\142c");', "", "", {"abc"}, {"x61142c"}),
+    "a stream that writes in another way is not known": (
+        'std::ostringstream h; h << "h" << std::hex << 255; pub(h.str());', "", "", set(), {"h255"},
+    ),
+    "an algorithm may change what it gets": (
+        'std::string r = "rev"; std::reverse(r.begin(), r.end()); pub(r); std::string p = "a.b";'
+        "std::replace(p.begin(), p.end(), '.', '_'); pub(p); std::stringstream s; std::getline(s, line_); pub(line_);",
+        'std::string line_ = "kept";', "", set(), {"rev", "a.b", "kept"},
+    ),
+    "lists change as they are told to": (
+        'std::vector<std::string> v{"a", "b"}; v.erase(v.begin()); v.insert(v.begin(), "c");'
+        'for (size_t i = 0; i < v.size(); i++) pub(v[i] + std::to_string(i)); v.pop_back(); pub("n" + v.back());',
+        "", "", {"c0", "b1", "nc"}, {"a0", "b0", "a1", "nb"},
+    ),
+    "a set holds each once, a map its first": (
+        'std::set<std::string> s{"y", "x", "x"}; pub("n" + std::to_string(s.size()));'
+        'std::map<std::string, std::string> m; m["a"] = "1"; m.insert({"a", "2"}); m.emplace("b", "3"); m.erase("b");'
+        'for (auto & [k, v] : m) pub(k + v);',
+        "", "", {"n2", "a1"}, {"n3", "a2", "b3"},
+    ),
+    "texts change as they are told to": (
+        'std::string s = "base"; s.insert(0, "x_"); pub(s); s.erase(0, 2); s.pop_back(); pub(s);'
+        's.replace(0, 1, "f"); pub(s);',
+        "", "", {"x_base", "bas", "fas"}, {"base"},
+    ),
+    "arrays of C are lists": (
+        'for (auto e : names) pub(e); pub(names[1] + std::string("_1")); for (const auto & c : cfg) pub(c.t);',
+        'struct C { std::string t; int n = 0; }; const C cfg[2] = {{"c0"}, {"c1", 2}};',
+        'static const char * names[] = {"n0", "n1"};\n', {"n0", "n1", "n1_1", "c0", "c1"}, {"n", "0"},
+    ),
+    "an enumerator has a number": (
+        'Side s = static_cast<Side>(int(Side::Left) + 1); switch (s) { case Side::Left: pub("left"); break;'
+        'default: pub("right"); } pub("p" + std::to_string(B));',
+        "", "enum class Side { Left, Right }; enum Plain { A = 4, B };\n", {"right", "p5"}, {"left"},
+    ),
+    "a constructor calls no method of a derived class": (
+        "Derived d(this);", "",
+        "struct Base { explicit Base(rclcpp::Node * n) : n_(n) { go(); } virtual void go() { make(\"base\"); }\n"
+        "void make(std::string t) { n_->create_publisher<std_msgs::msg::String>(t, 1); } rclcpp::Node * n_; };\n"
+        'struct Derived : Base { using Base::Base; void go() override { make("derived"); } };\n',
+        {"base"}, {"derived"},
+    ),
+    "a method that is not virtual is not overridden": (
+        "Derived d; d.go(this);", "",
+        "struct Base { void go(rclcpp::Node * n) { n->create_publisher<std_msgs::msg::String>(name(), 1); }\n"
+        'std::string name() { return "base"; } };\n'
+        'struct Derived : Base { std::string name() { return "derived"; } };\n',
+        {"base"}, {"derived"},
+    ),
+    "overloads that look alike may both be meant": (
+        'pub(f("x"));', "",
+        'std::string f(const char *) { return "of_letters"; } std::string f(std::string) { return "of_text"; }\n',
+        {"of_letters"}, set(),
+    ),
+    "nothing follows a call that only throws": (
+        'try { fail(); pub("dead"); } catch (...) { pub("caught"); }',
+        'void fail() { throw std::runtime_error("x"); }', "", {"caught"}, {"dead"},
+    ),
+    "members of an aggregate use those before them": (
+        'Agg a{this}; Agg b{this, "given"};', "",
+        'struct Agg { rclcpp::Node * n; std::string t = "default";\n'
+        "rclcpp::PublisherBase::SharedPtr p = n->create_publisher<std_msgs::msg::String>(t, 1); };\n",
+        {"default", "given"}, set(),
+    ),
+    "a map makes its values": (
+        'm_.try_emplace("a", this, "tried"); m_.emplace(std::piecewise_construct, std::forward_as_tuple("b"),'
+        'std::forward_as_tuple(this, "piecewise"));',
+        "std::map<std::string, H> m_;",
+        "struct H { H(rclcpp::Node * n, std::string t) { n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
+        {"tried", "piecewise"}, set(),
+    ),
+    "a method in a table gets its object with the call": (
+        'table.at("a")(this);',
+        'void a() { pub("of_a"); } const std::map<std::string, std::function<void(Demo *)>> table{{"a", &Demo::a}};',
+        "", {"of_a"}, set(),
+    ),
+    "bound arguments arrive where they are bound": (
+        'std::thread t(&Demo::one, this, "thread"); std::mem_fn(&Demo::one)(*this, "mem");'
+        'auto b = std::bind(&Demo::two, this, std::placeholders::_2, std::placeholders::_1); b("p", "q");',
+        "void one(const char * x) { pub(x); } void two(const char * a, const char * b) "
+        '{ pub(std::string(a) + "_" + b); }',
+        "", {"thread", "mem", "q_p"}, {"p_q"},
+    ),
+    "a literal with a suffix of the program's own": (
+        'pub("abc"_t);', "", 'std::string operator""_t(const char * c, size_t) { return std::string(c) + "_t"; }\n',
+        set(), {"abc"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "members", "before", "made", "not_made"), PROGRAMS.values(), ids=PROGRAMS)
+def test_names_are_those_of_the_run(
+    body: str, members: str, before: str, made: set[str], not_made: set[str], tmp_path: Path
+) -> None:
+    found = certain(tmp_path, in_class(body, PUB + members, before))
+    assert made <= found
+    assert not not_made & found
+
+
+C_CALLS = {
+    "on the handle of a node": (
+        'rcl_publisher_init(&p_, get_node_base_interface()->get_rcl_node_handle(), ts, "c_pub", &o);', "c_pub",
+    ),
+    "on a node of C": ('rcl_service_init(&s_, &node_, ts, "c_srv", &o);', None),
+    "that makes the node": ('rcl_node_init(&node_, "n", "", &context, &o);', None),
+    "of rclc": ('rclc_publisher_init_default(&p_, &node_, ts, "c_pub");', None),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("call", "name"), C_CALLS.values(), ids=C_CALLS)
+def test_a_call_of_c_is_an_interface_or_a_gap(call: str, name: str | None, tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(call))
+    found = [str(e.name) for node in system.nodes for e in node.endpoints]
+    assert found == [name] if name else any("_init" in why for why in gaps(system))
+
+
+def test_what_is_no_interface_of_c_is_none(tmp_path: Path) -> None:
+    system = infer(
+        tmp_path, in_class("rcl_node_options_t o = rcl_node_get_default_options(); rcl_shutdown(&c);")
+    )
+    assert not gaps(system)
+
+
+def test_parameters_and_options_that_the_program_gives_its_node(tmp_path: Path) -> None:
+    node = 'class Demo : public rclcpp::Node { public: explicit Demo(const rclcpp::NodeOptions & o) : Node("n", o) {\n'
+    node += 'create_publisher<std_msgs::msg::String>(declare_parameter("t", "default"), 1); } };\n'
+    by_flag = 'auto o = rclcpp::NodeOptions().arguments({"--ros-args", "-p", "t:=flag"}); Demo d(o);'
+    by_reference = 'rclcpp::NodeOptions o; o.parameter_overrides() = {{"t", "reference"}}; Demo d(o);'
+    for number, (body, expected) in enumerate(((by_flag, "flag"), (by_reference, "reference"))):
+        system = infer(tmp_path / str(number), HEAD + node + f"int main() {{ {body} }}\n")
+        assert {e.name.fill({}).text for each in system.nodes for e in each.endpoints} == {expected}
+
+
+def test_what_is_written_through_a_function_is_a_gap(tmp_path: Path) -> None:
+    members = 'std::string t_ = "a"; std::string & ref() { return t_; }\n' + PUB
+    assert any(
+        "writes to is not known" in why
+        for why in gaps(infer(tmp_path, in_class('ref() = "b"; pub(t_);', members)))
+    )
