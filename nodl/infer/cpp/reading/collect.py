@@ -192,7 +192,7 @@ class _Collector:
         for declared in declared_names(node):
             self._variable(node, declared, scope, cls)
 
-    def _variable(self, node: Node, declared: Declared, scope: Scope, cls: Class | None) -> None:
+    def _variable(self, node: Node, declared: DeclaredVariable, scope: Scope, cls: Class | None) -> None:
         name, value, pointer, written = declared
         static = any(text(c) == "static" for c in node.named_children if c.type == "storage_class_specifier")
         if cls is not None:
@@ -326,7 +326,7 @@ def _initialiser(item: Node) -> tuple[str, Node]:
     return re.sub(r"\s+", "", text(inner[0])), inner[-1]
 
 
-class Declared(NamedTuple):
+class DeclaredVariable(NamedTuple):
     """One variable of a declaration. ``type``: of the variable itself; that of an array is a ``std::array``."""
 
     name: str
@@ -335,9 +335,9 @@ class Declared(NamedTuple):
     type: str
 
 
-def declared_names(node: Node) -> list[Declared]:
+def declared_names(node: Node) -> list[DeclaredVariable]:
     """The variables of a declaration."""
-    found: list[Declared] = []
+    found: list[DeclaredVariable] = []
     values = node.children_by_field_name("default_value")
     for declarator in node.children_by_field_name("declarator"):
         value = None
@@ -360,5 +360,7 @@ def declared_names(node: Node) -> list[Declared]:
             written = type_text(node)
             if array and (pointer or written not in ("char", "unsigned char")):
                 written, pointer = f"std::array<{written}{' *' if pointer else ''}>", False
-            found.append(Declared(text(inner), value or (later[0] if later else None), pointer, written))
+            found.append(
+                DeclaredVariable(text(inner), value or (later[0] if later else None), pointer, written)
+            )
     return found
