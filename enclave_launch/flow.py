@@ -17,7 +17,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from enclave_launch.admission.middleware import middleware_of, why_not
-from enclave_launch.diagnostics import Diagnostic, middleware_refused, program_not_executable
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.admission import middleware_refused
+from enclave_launch.diagnostics.evaluation import program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, mixed_enclaves, on_zenoh

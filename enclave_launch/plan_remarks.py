@@ -8,21 +8,22 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 
 from enclave_launch.admission.handshakes import failing
-from enclave_launch.diagnostics import (
-    Diagnostic,
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.admission import domains_shared, handshake_fails
+from enclave_launch.diagnostics.enclaves import (
     container_elsewhere,
-    domains_shared,
     enclave_attribute_unused,
     enclave_shared_with_launcher,
     enclave_too_deep,
     enclave_ungranted,
     executable_without_enclave,
-    handshake_fails,
-    library_version,
     machine_elsewhere,
+)
+from enclave_launch.diagnostics.evaluation import parameters_unknown
+from enclave_launch.diagnostics.permissions import (
+    library_version,
     no_manifest,
     node_name_unknown,
-    parameters_unknown,
     recording_incomplete,
 )
 from enclave_launch.plan import (

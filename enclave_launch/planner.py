@@ -12,10 +12,8 @@ from enclave_launch import plan_remarks
 from enclave_launch.admission import prefix_refusals, refusals, remarks
 from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.middleware import middleware_of
-from enclave_launch.diagnostics import (
-    Code,
-    not_foreseeable,
-)
+from enclave_launch.diagnostics import Code
+from enclave_launch.diagnostics.evaluation import not_foreseeable
 from enclave_launch.enclave import EnclaveScope, assign_enclave
 from enclave_launch.plan import (
     InterfaceLookup,

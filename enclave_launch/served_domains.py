@@ -9,7 +9,8 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from enclave_launch.admission.domains import covers, domain_of
-from enclave_launch.diagnostics import Diagnostic, domain_not_served
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.admission import domain_not_served
 from enclave_launch.errors import ManifestError
 from enclave_launch.plan import LaunchPlan, enclave_domains
 from keystore.formats.domains import Domains

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 from enclave_launch.description.entity import LaunchDescriptionEntity
-from enclave_launch.diagnostics import launch_file_deprecated
+from enclave_launch.diagnostics.evaluation import launch_file_deprecated
 
 if TYPE_CHECKING:
     from enclave_launch.description.action import Action

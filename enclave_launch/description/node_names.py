@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 from enclave_launch.description.launch_context import LaunchContext
-from enclave_launch.diagnostics import node_name_repeated
+from enclave_launch.diagnostics.evaluation import node_name_repeated
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute as make_namespace_absolute
 from enclave_launch.ros_rules.namespaces import prefix_namespace as prefix_namespace
 from nodl import names

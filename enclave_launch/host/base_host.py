@@ -7,8 +7,8 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.diagnostics import (
-    Diagnostic,
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.evaluation import (
     executable_not_built,
     package_not_installed,
     program_not_installed,

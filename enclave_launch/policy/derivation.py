@@ -12,7 +12,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.diagnostics import Diagnostic, permissions_large, policy_answers
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.permissions import permissions_large, policy_answers
 from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule

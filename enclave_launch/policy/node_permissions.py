@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Literal, NamedTuple
 
-from enclave_launch.diagnostics import (
-    Diagnostic,
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.permissions import (
     action_remap_idle,
     interface_unknown,
     name_unremappable,

@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from enclave_launch.diagnostics import Diagnostic, policy_denies_need, policy_enclave_unused, policy_file
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.permissions import policy_denies_need, policy_enclave_unused, policy_file
 from enclave_launch.policy.node_permissions import Reason
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules

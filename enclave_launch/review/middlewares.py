@@ -10,8 +10,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH, middleware_of
-from enclave_launch.diagnostics import (
-    Diagnostic,
+from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics.admission import (
     enclave_on_both,
     launcher_apart,
     names_apart,

@@ -219,6 +219,7 @@ def _add_inspection(group: argparse._ArgumentGroup) -> None:
 
 
 def add_evaluation_options(group: argparse._ArgumentGroup) -> None:
+    """Options that decide how a launch file is evaluated, of every command that reads one."""
     group.add_argument(
         "--prefix",
         metavar="DIR",

@@ -161,6 +161,7 @@ def _resolve(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
 
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:
+    """What the options say about evaluation and permissions."""
     from enclave_launch.enclave import EnclaveScope
     from enclave_launch.options import ResolveOptions
 

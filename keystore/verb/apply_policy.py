@@ -9,6 +9,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore apply-policy``."""
     common.add_keystore(parser)
     parser.add_argument("policy", metavar="POLICY.xml", type=Path, help="SROS2 policy, version 0.2.0")
     common.add_domains(parser)
@@ -16,6 +17,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.formats.policy_xml import read_policy
     from keystore.steps.enclaves import apply_policy
 

@@ -26,10 +26,12 @@ DEFAULT_LOCK_TIMEOUT = 30.0
 
 
 def add_keystore(parser: argparse.ArgumentParser) -> None:
+    """The keystore that the verb works on."""
     parser.add_argument("keystore", metavar="KEYSTORE", type=Path, help="root directory of the keystore")
 
 
 def add_format(parser: argparse.ArgumentParser) -> None:
+    """Text for a person or JSON for a program."""
     parser.add_argument("--format", choices=("text", "json"), default="text", help="how to print (text)")
 
 
@@ -48,6 +50,7 @@ def add_signing(parser: argparse.ArgumentParser) -> None:
 
 
 def add_lock(parser: argparse.ArgumentParser) -> None:
+    """How long to wait for others that change the keystore."""
     parser.add_argument(
         "--lock-timeout", metavar="SECONDS", type=_seconds, default=DEFAULT_LOCK_TIMEOUT,
         help="how long to wait for another run (30)",
@@ -62,6 +65,7 @@ def _seconds(text: str) -> float:
 
 
 def add_domains(parser: argparse.ArgumentParser) -> None:
+    """The DDS domains of the permissions; read by ``domains``."""
     parser.add_argument(
         "--domain-id", metavar="IDS", help="domains of the permissions (default: the governance's)"
     )
@@ -75,6 +79,7 @@ def domains(arguments: argparse.Namespace) -> Domains | None:
 
 
 def add_revocation(parser: argparse.ArgumentParser) -> None:
+    """Whether what was issued before is revoked when rights are taken away."""
     parser.add_argument(
         "--no-revoke", action="store_true",
         help="where rights are taken away or a life is shortened: do not revoke the certificate of before; copies "
@@ -83,6 +88,7 @@ def add_revocation(parser: argparse.ArgumentParser) -> None:
 
 
 def add_validity(parser: argparse.ArgumentParser) -> None:
+    """How long certificates and permissions hold; read by ``span``."""
     parser.add_argument(
         "--valid-for",
         metavar="TIME",
@@ -94,6 +100,7 @@ def add_validity(parser: argparse.ArgumentParser) -> None:
 
 
 def add_subjects(parser: argparse.ArgumentParser) -> None:
+    """How certificate subjects are written."""
     parser.add_argument(
         "--compatible-subjects", action="store_true",
         help="CN=/path as SROS2 writes it, for use with 'ros2 security create_permission'; on Cyclone DDS "
@@ -119,6 +126,7 @@ def add_provisioning(parser: argparse.ArgumentParser) -> None:
 
 
 def access(arguments: argparse.Namespace) -> CaAccess:
+    """How CA keys are opened, from the arguments of ``add_signing``."""
     from keystore.signing.ca_access import CaAccess, Secret
 
     given = vars(arguments)
@@ -140,6 +148,7 @@ class Span:
 
 
 def span(arguments: argparse.Namespace) -> Span:
+    """From the arguments of ``add_validity``. Raises ``InvalidInputError``."""
     from keystore.formats.validity import DEFAULT_BACKDATE
 
     text: str | None = arguments.valid_for
@@ -173,10 +182,12 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
 
 
 def print_json(content: Any) -> None:
+    """One JSON document with sorted keys."""
     print(json_text(content, indent=2, sort_keys=True, default=str))
 
 
 def print_lines(lines: Iterable[str]) -> None:
+    """Each on a line of its own."""
     for line in lines:
         print(line)
 

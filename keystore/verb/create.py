@@ -12,6 +12,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore create``."""
     common.add_keystore(parser)
     parser.add_argument(
         "--domain-id", metavar="IDS", default="0", help="domains of the governance: 0, 0-10, 3,7 or all"
@@ -42,6 +43,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.formats.domains import Domains
     from keystore.formats.governance_yaml import load_governance_yaml
     from keystore.formats.role import Role

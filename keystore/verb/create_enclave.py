@@ -11,6 +11,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore create-enclave``."""
     common.add_keystore(parser)
     parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+", help="absolute name, such as /front/camera")
     parser.add_argument("--allow-all", action="store_true", help="grant every topic, service and action")
@@ -19,6 +20,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.steps.enclaves import create_enclaves
 
     options = common.provision_options(arguments, domains=common.domains(arguments))

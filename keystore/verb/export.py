@@ -16,6 +16,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore export``."""
     common.add_keystore(parser)
     parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True)
     parser.add_argument(
@@ -45,6 +46,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     if arguments.hosts or arguments.host:
         return _export_hosts(arguments)
     from keystore.steps.bundle import PublicFiles, export

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore fleet``."""
     parser.add_argument("what", metavar="status", choices=("status",))
     parser.add_argument("places", metavar="DIR", type=Path, nargs="+", help="bundles, or directories of them")
     parser.add_argument("--keystore", metavar="KEYSTORE", type=Path, help="the CA's own, to compare with")
@@ -28,6 +29,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print the table. Returns 1 when a host is not as it should be."""
     from keystore.formats.validity import parse_duration
     from keystore.steps.fleet import fleet_status
     from keystore.verb.status import ENDED, SOON

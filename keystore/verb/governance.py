@@ -12,6 +12,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore governance``."""
     common.add_keystore(parser)
     parser.add_argument(
         "file", metavar="FILE.yaml", type=Path, help="see docs: version, domain_rules, topic_rules"
@@ -20,6 +21,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.formats.governance_yaml import load_governance_yaml
     from keystore.steps.governance_setting import GovernanceOptions, set_governance
 

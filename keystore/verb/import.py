@@ -14,6 +14,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore import``."""
     common.add_keystore(parser)
     parser.add_argument("bundle", metavar="BUNDLE", type=Path, help="HOST.bundle of secure-keystore export")
     parser.add_argument(
@@ -28,6 +29,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.disk.versions import Versions
     from keystore.steps.importing import ImportOptions, import_bundle
 

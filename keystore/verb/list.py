@@ -8,11 +8,13 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore list``."""
     common.add_keystore(parser)
     common.add_format(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.steps.enclaves import list_enclaves
 
     names = list_enclaves(arguments.keystore)

@@ -12,6 +12,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore remove``."""
     common.add_keystore(parser)
     parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+")
     parser.add_argument("--no-revoke", action="store_true", help="only delete: copies elsewhere stay valid")
@@ -19,6 +20,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.steps.removal import RemoveOptions, remove
 
     options = RemoveOptions(

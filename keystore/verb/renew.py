@@ -21,6 +21,7 @@ _ROLES = ("identity", "permissions", "both")
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore renew``."""
     common.add_keystore(parser)
     parser.add_argument("enclaves", metavar="ENCLAVE", nargs="*", help="enclaves to renew in any case")
     parser.add_argument("--within", metavar="TIME", default="30d", help="what ends sooner is renewed (30d)")
@@ -39,6 +40,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.formats.validity import parse_end, utc_now
     from keystore.steps.creation import CreateOptions
 

@@ -15,6 +15,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore request``."""
     common.add_keystore(parser)
     parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+")
     parser.add_argument(
@@ -27,6 +28,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.steps.host_keys import RequestOptions, request, requests_text
 
     options = RequestOptions(arguments.token, common.access(arguments), arguments.lock_timeout)

@@ -13,6 +13,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore shares``."""
     common.add_keystore(parser)
     parser.add_argument("--drop", metavar="OWNER", help="drop the shares of this launch")
     common.add_format(parser)
@@ -20,6 +21,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.errors import printable
     from keystore.steps.enclaves import drop_shares
     from keystore.steps.options import ProvisionOptions

@@ -13,6 +13,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore sign``."""
     common.add_keystore(parser)
     parser.add_argument("requests", metavar="FILE", type=Path, help="what secure-keystore request wrote")
     parser.add_argument(
@@ -26,6 +27,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.formats.strict_yaml import read_given
     from keystore.steps.host_keys import parse_requests
     from keystore.steps.request_signing import SigningOptions, accept_certificates, sign_requests

@@ -20,6 +20,7 @@ SOON, ENDED = 3, 4
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore status``."""
     common.add_keystore(parser)
     parser.add_argument("--within", metavar="TIME", default="30d", help="what counts as soon (30d)")
     parser.add_argument(
@@ -29,6 +30,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print what ends when. Returns 3 where something ends soon, 4 where it has ended."""
     from keystore.formats.validity import parse_duration
     from keystore.steps.expiry import status
 

@@ -11,6 +11,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore tool-enclave``."""
     from keystore.formats.tool_needs import TABLE
 
     parser.usage = "secure-keystore tool-enclave KEYSTORE --for TOOL [TARGET ...] [options]"
@@ -31,6 +32,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.formats.validity import iso
     from keystore.steps.tool_enclaves import create_tool_enclave
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore verify``."""
     common.add_keystore(parser)
     common.add_format(parser)
     common.add_signing(parser)
@@ -36,6 +37,7 @@ def counted(number: int, what: str) -> str:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print the findings. Returns 1 when one of them is an error."""
     from keystore.formats.governance_yaml import governance_of
     from keystore.verification import Requirements, verify
 

@@ -14,6 +14,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-keystore zenoh``."""
     common.add_keystore(parser)
     parser.add_argument(
         "--enclave", metavar="PATTERN", action="append",
@@ -29,6 +30,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from keystore.disk import layout
     from keystore.steps.zenoh_configuration import RESTART, ZenohOptions, matching_enclaves, write_zenoh
 

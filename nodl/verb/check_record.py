@@ -26,6 +26,7 @@ JUDGED = ("manifest", "inference", "library")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    """Add ``secure-nodl check-record``."""
     parser = subparsers.add_parser(
         "check-record",
         help="hold manifests, inference and the library against recorded nodes",
@@ -66,6 +67,7 @@ class Judgement(NamedTuple):
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print how descriptions and record differ. Returns 1 when they do, 2 for wrong usage."""
     from nodl.ament_index import search_prefixes
     from nodl.lookup import ManifestLookup
 

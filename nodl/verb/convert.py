@@ -16,6 +16,7 @@ from nodl.verb.options import add_prefix_argument
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    """Add ``secure-nodl convert``."""
     parser = subparsers.add_parser(
         "convert", help="v1 to v2 or v2 to v1; what gets lost is told", description=__doc__
     )
@@ -33,6 +34,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print or write the documents in the other version. Returns 0."""
     prefixes = search_prefixes(arguments.prefix)
     nodes = [node for file in arguments.files for node in read_document(file, prefixes=prefixes)]
     versions = {node.version for node in nodes}

@@ -21,6 +21,7 @@ FORMATS = ("text", "json", "policy", "v1", "v2")
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add ``secure-nodl infer``."""
     parser = subparsers.add_parser(
         "infer", help="infer nodes and their interfaces from source, without running it", description=__doc__
     )

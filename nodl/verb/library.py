@@ -15,6 +15,7 @@ from nodl.verb.show import description_lines
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    """Add ``secure-nodl library``."""
     parser = subparsers.add_parser(
         "library", help="the manifests of widely used packages: list, show, where, check", description=__doc__
     )

@@ -33,6 +33,7 @@ _UNITS = {None: 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
+    """Add ``secure-nodl observe``."""
     parser = subparsers.add_parser(
         "observe",
         help="observe a running system: its graph, manifests or a policy of what runs",
@@ -83,6 +84,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print what was seen. Returns 1 when nothing was, 2 for wrong usage."""
     from nodl.graph.observation import observed_text, read_observed
 
     if arguments.merge_only and not arguments.runs:
@@ -229,6 +231,7 @@ def _domain_id(arguments: argparse.Namespace) -> int:
 
 
 def domain(text: str) -> int:
+    """A DDS domain, 0 to 232. Raises ``ValueError``."""
     number = int(text)
     if not 0 <= number <= 232:
         raise ValueError
@@ -236,6 +239,7 @@ def domain(text: str) -> int:
 
 
 def seconds(text: str) -> float:
+    """``90``, ``90s``, ``5m`` or ``1h`` in seconds. Raises ``ValueError``."""
     match = _SECONDS.match(text)
     if not match:
         raise ValueError

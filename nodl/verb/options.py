@@ -7,6 +7,7 @@ import os
 
 
 def add_prefix_argument(parser: argparse.ArgumentParser) -> None:
+    """Where packages are looked for."""
     parser.add_argument(
         "--prefix",
         metavar="DIR",

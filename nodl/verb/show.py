@@ -25,6 +25,7 @@ _LABELS = {
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    """Add ``secure-nodl show``."""
     parser = subparsers.add_parser(
         "show", help="print the interfaces of a document, package or executable", description=__doc__
     )
@@ -37,6 +38,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print the interfaces. Returns 1 when one is missing."""
     prefixes = search_prefixes(arguments.prefix)
     missing: list[str] = []
     if os.path.isfile(arguments.subject):
@@ -78,6 +80,7 @@ def _listing(places: Iterable[str]) -> str:
 
 
 def description_lines(node: NodeInterface) -> Iterator[str]:
+    """One node as text: its names, then a line for each endpoint, then its parameters."""
     program = node.executable or node.plugin or "?"
     where = f"{node.package}/{program}" if node.package else program
     namespace = f" in {node.namespace}" if node.namespace else ""

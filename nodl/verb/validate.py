@@ -14,6 +14,7 @@ from nodl.verb.options import add_prefix_argument
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+    """Add ``secure-nodl validate``."""
     parser = subparsers.add_parser(
         "validate", help="check documents; errors come with file and line", description=__doc__
     )
@@ -26,6 +27,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Print each fault. Returns 1 when there is one, 2 when there is no document."""
     files = arguments.files or [str(path) for path in sorted(Path().glob("*.nodl.*"))]
     if not files:
         print(f"no documents here; name some, such as package{V1_SUFFIX}", file=sys.stderr)

@@ -14,7 +14,7 @@ from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.sources import LaunchDescriptionSource
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
-from enclave_launch.diagnostics import include_left_out
+from enclave_launch.diagnostics.evaluation import include_left_out
 from enclave_launch.host.current import current_release
 from enclave_launch.host.loading import CyclicIncludeError
 from enclave_launch.ros_rules.distro import Feature

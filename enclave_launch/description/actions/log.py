@@ -8,7 +8,7 @@ from enclave_launch.description.action import Action
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.templates import TemplateAction, template
-from enclave_launch.diagnostics import log_level_missing
+from enclave_launch.diagnostics.evaluation import log_level_missing
 from enclave_launch.host.current import current_host, current_release
 from enclave_launch.ros_rules.distro import Feature
 

@@ -18,7 +18,7 @@ from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
 from enclave_launch.description.parameters.types import EvaluatedParameters, EvaluatedParameterValue
-from enclave_launch.diagnostics import parameter_file_missing
+from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.rcl_parameters import section_applies

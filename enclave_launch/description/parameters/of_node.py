@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.descriptions import Parameter
 from enclave_launch.description.parameters.evaluate import evaluate_parameters
-from enclave_launch.diagnostics import parameter_file_missing
+from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import (

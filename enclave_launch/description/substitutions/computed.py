@@ -18,7 +18,7 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.templates import TemplateSubstitution, described, template
-from enclave_launch.diagnostics import command_stderr
+from enclave_launch.diagnostics.evaluation import command_stderr
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan check``."""
     add_plan_arguments(parser)
     parser.add_argument("--format", choices=("text", "json", "sarif"), default="text")
     parser.add_argument("--strict", action="store_true", help="warnings count as errors")
@@ -33,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Print the findings. Returns 1 for an error that nobody accepted (``--strict``: for any finding)."""
     found = judged(read_plan(options.words, options), options.expect, options.keystore, options.within)
     sys.stdout.write(_text(found, options.format))
     open_ones = [told for told, accepted in found if accepted is None]

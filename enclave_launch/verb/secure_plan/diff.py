@@ -28,6 +28,7 @@ BEFORE = "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan diff``."""
     parser.add_argument("before", metavar="BEFORE", help=BEFORE)
     parser.add_argument("words", nargs="+", metavar=WORDS, help="what it is compared with")
     add_resolving_options(parser)
@@ -35,6 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Print the difference. Returns 1 when rights grew."""
     from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
     from enclave_launch.review.changes import changes
 

@@ -37,6 +37,7 @@ class CannotObserve(EnclaveLaunchError):
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan drift``."""
     add_plan_arguments(parser)
     group = parser.add_argument_group("what to look at")
     group.add_argument("--domain-id", type=int, metavar="N", help="default: the domain that the plan is for")
@@ -75,6 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Print how the domain differs from the plan. Returns 1 for an alarm."""
     from enclave_launch.drift.compare import Circumstances, compare
     from enclave_launch.drift.expected import expected_in
     from enclave_launch.drift.finding import Level

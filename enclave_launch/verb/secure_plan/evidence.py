@@ -29,6 +29,7 @@ SIGNED = "statement.dsse.json"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan evidence``."""
     add_plan_arguments(parser)
     parser.add_argument(
         "-o", "--output", type=Path, metavar="DIR", required=True, help="a new or empty folder"
@@ -48,6 +49,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Write the files. Returns 1 when the checks find an error that nobody accepted."""
     from enclave_launch.report.evidence.documents import evidence_files
     from enclave_launch.report.evidence.statement import statement
 

@@ -31,6 +31,7 @@ ENGINES = ("systemd", "compose", "kubernetes")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan export``."""
     add_plan_arguments(parser)
     parser.add_argument("--format", choices=ENGINES, required=True)
     parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
@@ -68,6 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from enclave_launch.deployment.folder import write_folder
     from enclave_launch.deployment.placement import ONLY_HOST, place
     from enclave_launch.deployment.processes import deployed_processes

@@ -17,6 +17,7 @@ from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan flow``."""
     add_plan_arguments(parser)
     parser.add_argument(
         "--from", dest="influence_from", metavar="ENCLAVE|NODE", help="where the influence begins"
@@ -26,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from enclave_launch.report.flows import paths_text, reach_text
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.review.information_flow import flow_graph, shortest_paths

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan hosts``."""
     add_plan_arguments(parser)
     parser.add_argument(
         "--hosts", type=Path, metavar="FILE", help="which nodes or enclaves belong to which host"
@@ -36,6 +37,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Print who runs where. Returns 1 when a process has no host, or an enclave several."""
     from enclave_launch.deployment.placement import place
     from enclave_launch.deployment.processes import deployed_processes
     from enclave_launch.report.hosts import enclaves_yaml, hosts_document, hosts_text

@@ -25,6 +25,7 @@ FORMATS = ("html", "markdown", "dot", "mermaid")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan report``."""
     add_plan_arguments(parser)
     parser.add_argument("--format", choices=FORMATS, default="html")
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
@@ -33,6 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from enclave_launch.boundary.new_file import write_text
 
     document = read_plan(options.words, options)

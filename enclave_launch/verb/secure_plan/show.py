@@ -10,11 +10,13 @@ from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan show``."""
     add_plan_arguments(parser)
     parser.add_argument("--format", choices=("text", "json"), default="text")
 
 
 def run(options: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from enclave_launch.report.review_text import plan_text
     from enclave_launch.review.document import plan_from_document
 

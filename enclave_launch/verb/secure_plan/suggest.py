@@ -9,6 +9,7 @@ from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the arguments of ``secure-plan suggest``."""
     add_plan_arguments(parser)
     parser.add_argument(
         "--similarity",
@@ -20,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
+    """Do it, and print what was done. Returns 0."""
     from enclave_launch.report.review_text import suggestions_text
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.review.similarity import merges, splits

@@ -1,0 +1,112 @@
+"""What a person is told about a launch: typed values, each worded in this room and nowhere else.
+
+A ``Diagnostic`` is a value like any other: reports print it, programs ask for its ``code`` and ``location`` (JSON,
+SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it stands in (``LaunchPlan.problems`` or
+``warnings``). Pure.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import NamedTuple
+
+from enclave_launch.source_location import SourceLocation
+
+
+class Code(str, Enum):
+    """Stable names, for programs; ``meaning`` says what all diagnostics of a code have in common."""
+
+    meaning: str
+
+    # of the evaluation
+    ARGUMENT_UNKNOWN = "argument-unknown", "A launch argument was given that no launch file looks at"
+    COMMAND_STDERR = "command-stderr", "A command of the launch file wrote to stderr"
+    EXECUTABLE_NOT_BUILT = (
+        "executable-not-built",
+        "A placeholder stands for an executable that a package lacks",
+    )
+    INCLUDE_LEFT_OUT = "include-left-out", "An included file belongs to a package that is not installed"
+    LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description calls itself deprecated"
+    LOG_LEVEL_MISSING = "log-level-missing", "The action log needs a level since this distribution"
+    NODE_NAME_REPEATED = "node-name-repeated", "Several nodes have the same fully qualified name"
+    NOT_FORESEEABLE = "not-foreseeable", "An action only exists once a callback has run"
+    PACKAGE_NOT_INSTALLED = "package-not-installed", "A placeholder stands for a package"
+    PARAMETERS_UNKNOWN = (
+        "parameters-unknown",
+        "A parameter file cannot be read, so names made from it are not known",
+    )
+    PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file is not there"
+    ROS_DISTRO_UNKNOWN = "ros-distro-unknown", "ROS_DISTRO names no distribution that is known here"
+    PROGRAM_NOT_INSTALLED = "program-not-installed", "A placeholder stands for what a program would write"
+    PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start is not there"
+    # of interfaces and permissions
+    ACTION_REMAP_IDLE = "action-remap-idle", "A remap rule for an action has no effect in this distribution"
+    INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not (wholly) known"
+    LIBRARY_VERSION = "library-version", "A document of the library was written for another version"
+    RECORDING_INCOMPLETE = "recording-incomplete", "What was learnt of a node may not be all of it"
+    NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"
+    NO_MANIFEST = "no-manifest", "Nothing says what a node or component does"
+    NODE_NAME_IMPOSSIBLE = "node-name-impossible", "No node can run under the name it is given"
+    NODE_NAME_UNKNOWN = "node-name-unknown", "A node names itself in a way that nobody can foresee"
+    PATTERN_ACCEPTED = "pattern-accepted", "A partly known name became a wildcard"
+    PERMISSIONS_LARGE = "permissions-large", "The permissions of an enclave come near what DDS can carry"
+    POLICY_ANSWERS = "policy-answers", "The policy file says what the manifest leaves open"
+    POLICY_DENIES_NEED = "policy-denies-need", "The policy file takes away what a node needs"
+    POLICY_ENCLAVE_UNUSED = "policy-enclave-unused", "The policy file has an enclave that this launch has not"
+    POLICY_FILE = "policy-file", "A remark about the policy file itself"
+    # of processes and enclaves
+    CONTAINER_ELSEWHERE = (
+        "container-elsewhere",
+        "A component goes into a container that is not of this launch",
+    )
+    ENCLAVE_ATTRIBUTE_UNUSED = "enclave-attribute-unused", "The process names another enclave itself"
+    ENCLAVE_OF_SEVERAL_LAUNCHES = (
+        "enclave-of-several-launches",
+        "Another launch on the keystore uses the enclave too",
+    )
+    ENCLAVE_SHARED_WITH_LAUNCHER = "enclave-shared-with-launcher", "A process has the launcher's enclave"
+    ENCLAVE_TOO_DEEP = "enclave-too-deep", "No certificate can be made for an enclave"
+    ENCLAVE_UNGRANTED = "enclave-ungranted", "An enclave of an executable may do nothing"
+    MACHINE_ELSEWHERE = "machine-elsewhere", "The launch file means a process for another host"
+    EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
+    # of what could take an enclave away
+    CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, on which nothing here was tried"
+    HANDSHAKE_FAILS = "handshake-fails", "Processes on two DDS implementations cannot authenticate each other"
+    DOMAIN_INVALID = "domain-invalid", "A process has an impossible ROS_DOMAIN_ID"
+    DOMAIN_NOT_SERVED = "domain-not-served", "A process is in a domain that the permissions leave out"
+    DOMAINS_SHARED = "domains-shared", "An enclave may join the domains of several processes"
+    MIDDLEWARES_APART = "middlewares-apart", "Nodes on DDS and nodes on Zenoh cannot talk to each other"
+    ZENOH_CANNOT_GRANT = "zenoh-cannot-grant", "A permission that DDS can express and Zenoh cannot"
+    ZENOH_ROUTER_TRUSTED = "zenoh-router-trusted", "On Zenoh the router is trusted with every message"
+    LIBRARY_PRELOADED = "library-preloaded", "The launch file loads a library into a process"
+    MIDDLEWARE_REFUSED = "middleware-refused", "The middleware of a process is not known to read enclaves"
+    PREFIX_REFUSED = "prefix-refused", "Something between launch and a program may change its environment"
+    SECURITY_CONFIGURED = "security-configured", "A DDS configuration has security properties of its own"
+    VARIABLE_OVERRIDDEN = "variable-overridden", "A security variable of the launch file has no effect"
+
+    def __new__(cls, value: str, meaning: str = "") -> Code:
+        code = str.__new__(cls, value)
+        code._value_ = value
+        code.meaning = meaning
+        return code
+
+    def __str__(self) -> str:
+        return str.__str__(self)
+
+
+class Diagnostic(NamedTuple):
+    """``subject``: the node, program, enclave or file it is about; ``remedy``: what to do next, empty when nothing
+    is wrong. ``str`` is the whole as one message for a person."""
+
+    code: Code
+    subject: str
+    text: str
+    location: SourceLocation | None = None
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        place = f"{self.location}: " if self.location else ""
+        if self.location and self.location.element:
+            place += f"<{self.location.element}> "
+        remedy = f"; {self.remedy}" if self.remedy else ""
+        return f"{place}{self.text}{remedy}"

@@ -1,0 +1,98 @@
+"""What evaluation tells of a launch file and the world it is read in. Pure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from enclave_launch.boundary.suggestion import did_you_mean
+from enclave_launch.boundary.terminal import quoted
+from enclave_launch.diagnostics import Code, Diagnostic
+from enclave_launch.source_location import SourceLocation
+
+
+def argument_unknown(name: str, alike: str) -> Diagnostic:
+    """``alike``: the question after the name that was probably meant, or empty."""
+    text = f"no launch file declares or reads the argument {name!r}{alike}"
+    return Diagnostic(Code.ARGUMENT_UNKNOWN, name, text, None, "secure-launch --show-args lists them")
+
+
+def command_stderr(message: str, command: str) -> Diagnostic:
+    """``message``: launch's sentence with what ``$(command ...)`` wrote to stderr; told with ``on_stderr="warn"``."""
+    return Diagnostic(Code.COMMAND_STDERR, command, message)
+
+
+def include_left_out(path: str) -> Diagnostic:
+    """Told with ``--allow-missing-packages``, which goes on without the file."""
+    return Diagnostic(
+        Code.INCLUDE_LEFT_OUT, path, f"not included, because its package is not installed or lacks it: {path}"
+    )
+
+
+def launch_file_deprecated(file: str | None, reason: str) -> Diagnostic:
+    """``file`` is ``None`` for a description that comes from no file."""
+    what = "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
+    return Diagnostic(Code.LAUNCH_FILE_DEPRECATED, file or "", f"{what}: {reason}")
+
+
+def log_level_missing() -> Diagnostic:
+    """As launch says it since the release in which ``log`` takes a level."""
+    return Diagnostic(
+        Code.LOG_LEVEL_MISSING, "log", "the action log now expects a level; log_info is the one without"
+    )
+
+
+def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
+    """In the words of launch_ros; ``count`` nodes have the name by now."""
+    text = (
+        f"{started_by}: there are now at least {count} nodes with the name {node} "
+        "created within this launch context"
+    )
+    return Diagnostic(Code.NODE_NAME_REPEATED, node, text)
+
+
+def not_foreseeable(what: str, location: SourceLocation) -> Diagnostic:
+    """What a callback of the launch file makes when it is called."""
+    return Diagnostic(Code.NOT_FORESEEABLE, what, f"not foreseeable: {what}", location)
+
+
+def executable_not_built(package: str, executable: str, placeholder: str) -> Diagnostic:
+    """Told with ``--allow-missing-packages``; ``placeholder`` is the path that stands for it."""
+    text = f"package '{package}' has no executable '{executable}' yet; using {placeholder} in its place"
+    return Diagnostic(Code.EXECUTABLE_NOT_BUILT, f"{package}/{executable}", text)
+
+
+def package_not_installed(package: str, placeholder: str) -> Diagnostic:
+    """Told with ``--allow-missing-packages``; ``placeholder`` is the path that stands for it."""
+    text = f"package '{package}' is not installed; using {placeholder} in its place"
+    return Diagnostic(Code.PACKAGE_NOT_INSTALLED, package, text)
+
+
+def parameter_file_missing(path: str) -> Diagnostic:
+    """In the words of launch_ros, which goes on without the file."""
+    return Diagnostic(Code.PARAMETER_FILE_MISSING, path, f"Parameter file path is not a file: {path}")
+
+
+def parameters_unknown(process: str, path: str, why: str, place: SourceLocation) -> Diagnostic:
+    """Names that follow from the parameters in ``path`` are then gaps."""
+    text = f"the parameters that {process} would read from {path} are not known: {why}"
+    return Diagnostic(
+        Code.PARAMETERS_UNKNOWN, process, text, place, "rcl would not start the node with it: mend the file"
+    )
+
+
+def program_not_installed(program: str) -> Diagnostic:
+    """Told with ``--allow-missing-packages``, for ``$(command ...)``."""
+    text = f"program '{program}' is not installed; a placeholder stands for what it would write"
+    return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
+
+
+def program_not_executable(program: str, text: str, location: SourceLocation | None) -> Diagnostic:
+    """``text`` says what the start of the process would fail with."""
+    return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)
+
+
+def ros_distro_unknown(name: str, known: Sequence[str], taken: str) -> Diagnostic:
+    """``taken`` is the distribution whose rules are followed instead, one of ``known``."""
+    text = f"ROS_DISTRO={quoted(name)} is not a distribution that is known here: the rules of {taken} are followed"
+    remedy = f"set it, or give --distro{did_you_mean(name, known)}"
+    return Diagnostic(Code.ROS_DISTRO_UNKNOWN, name, text, None, remedy)

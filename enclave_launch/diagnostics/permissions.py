@@ -1,0 +1,105 @@
+"""What is told of interfaces, and of the permissions that follow from them. Pure."""
+
+from __future__ import annotations
+
+from enclave_launch.diagnostics import Code, Diagnostic
+from enclave_launch.source_location import SourceLocation
+
+_OTHER_NAME = "it could not start: give it another name or namespace"
+
+
+IN_MANIFEST = (
+    "describe it in a manifest (secure-nodl infer makes a first one from the source), installed with the package or "
+    "named with --nodl"
+)
+
+
+def library_version(program: str, doubt: str, location: SourceLocation) -> Diagnostic:
+    """``doubt`` names the document, its version and the one that is installed."""
+    remedy = "compare them (secure-nodl library show), and keep a corrected copy in a folder for --library"
+    return Diagnostic(Code.LIBRARY_VERSION, program, f"library document {doubt}", location, remedy)
+
+
+def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocation) -> Diagnostic:
+    """``manifest`` is what ``--learn`` wrote, with the reason in it."""
+    remedy = "record it once more where it gets so far (--learn); runs are united"
+    return Diagnostic(
+        Code.RECORDING_INCOMPLETE,
+        node,
+        f"node {node} is learnt incompletely ({manifest}): {why}",
+        place,
+        remedy,
+    )
+
+
+def action_remap_idle(node: str, rule: str, action: str, distro: str, place: SourceLocation) -> Diagnostic:
+    """Before a release remaps whole actions, a rule for an action's name changes nothing."""
+    text = (
+        f"remap rule {rule} has no effect on action {action} of node {node}: {distro} remaps only the five names "
+        f"below {action}/_action/, one by one"
+    )
+    return Diagnostic(Code.ACTION_REMAP_IDLE, node, text, place)
+
+
+def interface_unknown(node: str, why: str, program: str, place: SourceLocation) -> Diagnostic:
+    """``why`` names the endpoint; ``program`` is what a manifest would describe."""
+    remedy = f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
+    return Diagnostic(Code.INTERFACE_UNKNOWN, node, f"node {node}: {why}", place, remedy)
+
+
+def policy_answers(unknown: Diagnostic) -> Diagnostic:
+    """A gap of the manifest that the policy file closes is told as a remark."""
+    text = f"{unknown.text}; the policy file says what it may do"
+    return Diagnostic(Code.POLICY_ANSWERS, unknown.subject, text, unknown.location)
+
+
+def name_unremappable(node: str, name: str, place: SourceLocation) -> Diagnostic:
+    """rcl reads ``__`` in a remap rule as a special name (``__node``, ``__ns``)."""
+    text = f"node {node}: '{name}' contains '__', which no remap rule can name"
+    return Diagnostic(Code.NAME_UNREMAPPABLE, node, text, place)
+
+
+def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
+    """``subject``: ``package/executable``, ``package/plugin`` or a node; ``why``: where it was looked for."""
+    return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, IN_MANIFEST)
+
+
+def node_name_unknown(subject: str, why: str, place: SourceLocation) -> Diagnostic:
+    """The plan has no name for the node, so no permission can be derived."""
+    return Diagnostic(
+        Code.NODE_NAME_UNKNOWN, subject, f"{subject}: {why}", place, "give it a name: set name="
+    )
+
+
+def node_name_impossible(node: str, why: str, place: SourceLocation) -> Diagnostic:
+    """rcl refuses the name; ``why`` says which rule it breaks."""
+    return Diagnostic(Code.NODE_NAME_IMPOSSIBLE, node, f"node {node}: {why}", place, _OTHER_NAME)
+
+
+def pattern_accepted(node: str, operation: str, name: str, note: str, place: SourceLocation) -> Diagnostic:
+    """Told with ``--accept-patterns``: ``name`` is granted as a wildcard."""
+    return Diagnostic(Code.PATTERN_ACCEPTED, node, f"node {node} may {operation} {name}: {note}", place)
+
+
+def permissions_large(enclave: str, text: str) -> Diagnostic:
+    """In the words of ``keystore.formats.permissions_size``."""
+    return Diagnostic(Code.PERMISSIONS_LARGE, enclave, text)
+
+
+def policy_enclave_unused(path: str) -> Diagnostic:
+    """The policy file may serve several launches."""
+    text = f"enclave {path} of the policy file is not used by this launch and was left out"
+    return Diagnostic(Code.POLICY_ENCLAVE_UNUSED, path, text)
+
+
+def policy_denies_need(
+    denied: str, enclave: str, node: str, need: str, why: str, place: SourceLocation
+) -> Diagnostic:
+    """A denial of the policy file counts before what the manifest asks for."""
+    text = f"{denied} is denied in enclave {enclave}, but node {node} needs {need} ({why})"
+    return Diagnostic(Code.POLICY_DENIES_NEED, node, text, place)
+
+
+def policy_file(subject: str, text: str) -> Diagnostic:
+    """In the words of the keystore's own reader, which knows the place."""
+    return Diagnostic(Code.POLICY_FILE, subject, text)
