@@ -3,9 +3,9 @@
     python -m bench.watch [STARTS [PROCESSES]]
 
 STARTS launches of 2 to 50 talkers, every other one secured, two at a time in domains of their own, each with
-``--watch`` and up for longer than the watch waits before it tells what is missing: every finding would be a false alarm.
-Then one launch of PROCESSES talkers, unsecured: processor time of the watch's observer and of the supervisor from start
-to steady, and for each minute of the steady state, with and without ``--watch``.
+``--watch`` and up for longer than the watch waits before it tells what is missing: every finding would be a false
+alarm. Then one launch of PROCESSES talkers, unsecured: processor time of the watch's observer and of the supervisor
+from start to steady, and for each minute of the steady state, with and without ``--watch``.
 """
 
 from __future__ import annotations

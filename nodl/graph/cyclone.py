@@ -7,6 +7,7 @@ participants of a process by the permissions of the first.
 from __future__ import annotations
 
 import re
+import socket
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from nodl.graph.model import Graph
 from nodl.graph.quality import INFINITE, Quality
 from nodl.graph.seen import SeenEndpoint, SeenParticipant, claimed_enclave
 from nodl.graph.state import GraphState
+from nodl.graph.udp_ports import UdpPorts
 from nodl.graph.wire_names import DISCOVERY_TOPIC
 
 _MOST_AT_ONCE = 4096
@@ -80,10 +82,12 @@ class CycloneObserver:
         ]
         self._guids: dict[int, str] = {}  # by handle of the instance, for the notice that it ended
         self._vendors: dict[str, SeenParticipant] = {}
+        self._ports = UdpPorts()
         self.state = GraphState(self._participant.guid.bytes.hex())
 
     def look(self) -> int:
         """Gives how many changes there have been in all."""
+        self._ports = UdpPorts()
         for reader, read in self._readers:
             for sample in reader.take(N=_MOST_AT_ONCE):
                 self._take_in(sample, read)
@@ -123,6 +127,9 @@ class CycloneObserver:
 
     def _participant_seen(self, sample: Any) -> None:
         seen = participant_from(sample.key.bytes.hex(), sample.qos)
+        if seen.pid is None:
+            pid = self._ports.pid(_properties(sample.qos).get("__NetworkAddresses", "").split(","))
+            seen = seen._replace(pid=pid, host=socket.gethostname() if pid else seen.host)
         self._vendors[seen.guid] = seen
         self.state.participant(seen)
 
@@ -209,14 +216,8 @@ def _library(name: str) -> str:
 
 def participant_from(guid: str, qos: Any) -> SeenParticipant:
     """What the participant's QoS tells of it; never its security properties, which name files of keys."""
-    properties: dict[str, str] = {}
-    user_data = b""
-    for policy in qos:
-        kind = type(policy).__qualname__
-        if kind == "Policy.Property":
-            properties[policy.key] = policy.value
-        elif kind == "Policy.Userdata":
-            user_data = bytes(policy.data)
+    properties = _properties(qos)
+    user_data = next((bytes(each.data) for each in qos if type(each).__qualname__ == "Policy.Userdata"), b"")
     pid = properties.get("__Pid") or properties.get("fastdds.physical_data.process", "")
     host = properties.get("__Hostname") or properties.get("fastdds.physical_data.host", "")
     return SeenParticipant(
@@ -227,6 +228,10 @@ def participant_from(guid: str, qos: Any) -> SeenParticipant:
         properties.get("__ProcessName", ""),
         _is_cyclone(guid, properties),
     )
+
+
+def _properties(qos: Any) -> dict[str, str]:
+    return {each.key: each.value for each in qos if type(each).__qualname__ == "Policy.Property"}
 
 
 def _is_cyclone(guid: str, properties: Mapping[str, str]) -> bool:

@@ -179,6 +179,7 @@ def test_an_observers_enclave_shows_the_whole_graph_of_a_secured_system_and_a_fo
     (process,) = graph.processes
     assert [(i.kind.value, i.name) for i in process.interfaces] == [("publisher", "/chatter")]
     assert process.participant.claims_security and process.participant.enclave == "/talker"
+    assert process.participant.pid == program.pid, "which it does not say; its UDP port does"
     from keystore.steps.tool_enclaves import enclaves_by_guid
 
     assert enclaves_by_guid(root)[process.participant.subject_hash] == "/talker"

@@ -126,7 +126,12 @@ def test_each_intruder_beside_a_secured_launch_is_told(
         )  # the talker's own key and permissions
         told = launch.wait_until_told("enclave-of-another")
         assert told["subject"] == "/intruder" and told["enclave"] == "/"
-        assert {each["kind"] for each in launch.told} == {"not-secured", "other-ca", "enclave-of-another"}
+        double = start(cyclone, str(root / "enclaves"), enclave="/").tell("node /talker", "list")
+        told = launch.wait_until_told("stranger")  # right in enclave and name: only its process gives it away
+        assert f"process {double.pid} " in told["who"]
+        assert {each["kind"] for each in launch.told} == {
+            "not-secured", "other-ca", "enclave-of-another", "stranger",
+        }  # fmt: skip
 
 
 def drift(environment: dict[str, str], *words: str) -> tuple[int, dict[str, Any]]:
