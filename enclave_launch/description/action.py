@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.entity import LaunchDescriptionEntity, creation_location
-from enclave_launch.host.outcomes import is_users, once
+from enclave_launch.host.user_code import executed_once, is_users
 
 if TYPE_CHECKING:
     from enclave_launch.description.conditions import Condition
@@ -26,7 +26,7 @@ class Action(LaunchDescriptionEntity):
         super().__init_subclass__(**kwargs)
         execute = vars(cls).get("execute")
         if execute is not None and is_users(execute):
-            cls.execute = once(execute)  # type: ignore[method-assign]
+            cls.execute = executed_once(execute)  # type: ignore[method-assign]
 
     def __init__(self, *, condition: Condition | None = None) -> None:
         self.__condition = condition

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Iterable, MutableMapping
+from collections.abc import Callable, Iterable, MutableMapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from enclave_launch.description.events.dispatch import Buckets, EventQueue, HandlerTable, QueuedEvent
@@ -37,8 +37,9 @@ class ContextState(NamedTuple):
 class Locals:
     """Read-only attribute access to the locals of the event being handled."""
 
-    def __init__(self, values: dict[str, Any]) -> None:
+    def __init__(self, values: dict[str, Any], looked_at: Callable[[str], None]) -> None:
         self.__dict__["_values"] = values
+        self.__dict__["_looked_at"] = looked_at
 
     def __getattr__(self, key: str) -> Any:
         values: dict[str, Any] = self.__dict__["_values"]
@@ -46,6 +47,7 @@ class Locals:
             raise AttributeError(
                 f"context.locals does not contain attribute '{key}', it contains: [{', '.join(values)}]"
             )
+        self.__dict__["_looked_at"](key)
         return values[key]
 
     def __setattr__(self, key: str, value: object) -> None:
@@ -75,6 +77,7 @@ class LaunchContext:
         self.__locals: dict[str, Any] = {}
         self.__locals_stack: list[dict[str, Any]] = []
         self.__combined: dict[str, Any] | None = None
+        self.event_looked_at = False  # by code that asks about the event being handled
         self.configurations_looked_at: set[str] = set()
         self.__configurations: dict[str, Any] = WatchedConfigurations(self.configurations_looked_at)
         self.__configurations_stack: list[dict[str, Any]] = []
@@ -159,7 +162,11 @@ class LaunchContext:
 
     @property
     def locals(self) -> Locals:
-        return Locals(self.get_locals_as_dict())
+        return Locals(self.get_locals_as_dict(), self.__note_look)
+
+    def __note_look(self, key: str) -> None:
+        if key in self.__locals and not key.startswith("current_launch_file_"):
+            self.event_looked_at = True
 
     # Environment: ``os.environ`` itself, as Python launch files rely on it
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import MEBIBYTE
 from enclave_launch.host.current import current_release
-from enclave_launch.host.outcomes import is_users, once
+from enclave_launch.host.user_code import is_users, once
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:

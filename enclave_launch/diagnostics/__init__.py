@@ -25,6 +25,10 @@ class Code(str, Enum):
         "executable-not-built",
         "A placeholder stands for an executable that a package lacks",
     )
+    FUNCTION_CALLED_AGAIN = (
+        "function-called-again",
+        "Code that an event calls is called for the plan and again when that happens",
+    )
     INCLUDE_LEFT_OUT = "include-left-out", "An included file belongs to a package that is not installed"
     LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description calls itself deprecated"
     LOG_LEVEL_MISSING = "log-level-missing", "The action log needs a level since this distribution"

@@ -21,6 +21,15 @@ def command_stderr(message: str, command: str) -> Diagnostic:
     return Diagnostic(Code.COMMAND_STDERR, command, message)
 
 
+def function_called_again(function: str, event: str, location: SourceLocation) -> Diagnostic:
+    """What a function of the launch file was called for in vain: ``event`` calls it once more."""
+    text = (
+        f"{function} is called for the plan, to know what it starts, and again at {event}: it started nothing"
+    )
+    remedy = "what it does must do no harm when it is done before"
+    return Diagnostic(Code.FUNCTION_CALLED_AGAIN, function, text, location, remedy)
+
+
 def include_left_out(path: str) -> Diagnostic:
     """Told with ``--allow-missing-packages``, which goes on without the file."""
     return Diagnostic(

@@ -14,6 +14,7 @@ from enclave_launch.description.events.dispatch import chain, run_handler
 from enclave_launch.description.events.event import Shutdown, TimerEvent
 from enclave_launch.description.events.process import ProcessStarted, process_event_arguments
 from enclave_launch.description.location import location_of, place_of
+from enclave_launch.host.user_code import only_acts
 from enclave_launch.process import Reaction, Unforeseeable
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError
 
@@ -93,6 +94,8 @@ class Explorer:
         self._note(handler, event)
         mark = chain(mark, _label(handler, event))
         if id(event) in self._made_up and handler.computes() and not _is_ours(handler):
+            if only_acts(getattr(handler, "callback", None)):
+                return
             self._host.unforeseeable(
                 Unforeseeable(f"what a callback returns for {mark}", self._place(handler))
             )

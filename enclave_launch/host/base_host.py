@@ -103,7 +103,9 @@ class BaseHost:
             return f"{MISSING_PREFIX}/bin/{name}"
         return found
 
-    def run_command(self, command: Sequence[str], *, merge_stderr: bool = False) -> CommandResult:
+    def run_command(
+        self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
+    ) -> CommandResult:
         """With ``--allow-missing-packages`` a program that is not there "writes" a marked placeholder."""
         if self.allow_missing_packages and command:
             import shutil
@@ -112,13 +114,15 @@ class BaseHost:
                 program = os.path.basename(command[0])
                 self.warn(program_not_installed(program))
                 return CommandResult(0, f"<output of {program}, which is not installed>", "")
-        return self._run_command(command, merge_stderr)
+        return self._run_command(command, merge_stderr, at_event)
 
-    def _run_command(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
+    def _run_command(self, command: Sequence[str], merge_stderr: bool, at_event: bool) -> CommandResult:
         if self.outcomes is None:
             return self._run_now(command, merge_stderr)
         key = ("command", tuple(command), merge_stderr)
-        return self.outcomes.call(key, lambda: self._run_now(command, merge_stderr))
+        return self.outcomes.call(
+            key, lambda: self._run_now(command, merge_stderr), at_event=at_event, worth=_succeeded
+        )
 
     def _run_now(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
         import subprocess
@@ -162,3 +166,8 @@ class BaseHost:
         from enclave_launch.description.logging import launch_config
 
         return launch_config.log_dir
+
+
+def _succeeded(result: CommandResult) -> bool:
+    """What a command of an event could not say when it was asked for the plan, it may say at the event."""
+    return result.returncode == 0 and not result.stderr

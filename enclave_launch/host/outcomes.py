@@ -9,8 +9,9 @@ So the first visit notes what each piece of user code gave and changed, in order
   what it changed of the context and the environment is done again;
 - ``$(command)``, ``$(eval)`` and names at random are asked once.
 
-What only an event or a timer calls runs again when that happens: it asks about that moment. A function that itself
-started something runs again as well, for that is what it is for. Used once: a further run evaluates anew.
+What an event or a timer calls asks about that moment: what it gave is taken there only where it gave something and all
+that it looked at is as it was (``moment``). A function that itself started something runs again as well, for that is
+what it is for. Used once: a further run evaluates anew.
 """
 
 from __future__ import annotations
@@ -19,10 +20,10 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from functools import wraps
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 from enclave_launch.host.environment import changed, environment_snapshot
+from enclave_launch.host.moment import Moment, looked_at
 
 if TYPE_CHECKING:
     import logging
@@ -34,13 +35,28 @@ _OURS = "enclave_launch."
 
 
 class Outcome(NamedTuple):
-    """One call: what it gave or raised, and what it changed. ``again``: it cannot stand for another call."""
+    """One call: what it gave or raised, and what it changed. ``again``: it cannot stand for another call. ``moment``:
+    it can where that holds."""
 
     result: Any = None
     error: Exception | None = None
     effects: Effects | None = None
     again: bool = False
     said: tuple[logging.LogRecord, ...] = ()
+    moment: Moment | None = None
+
+    def given(self) -> Any:
+        """What the caller gets. Raises what the call raised."""
+        if self.error is not None:
+            raise self.error
+        return _fresh(self.result)
+
+
+_AGAIN = Outcome(again=True)
+
+
+def _anything(result: Any) -> bool:
+    return result is not None and result != []
 
 
 class Outcomes:
@@ -68,11 +84,27 @@ class Outcomes:
         self._replaying = True
         return True
 
-    def call(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None = None) -> T:
-        """What ``function`` gives, or gave when it was called with this key before. ``context``: what it may change."""
+    def call(
+        self,
+        key: Hashable,
+        function: Callable[[], T],
+        context: LaunchContext | None = None,
+        *,
+        at_event: bool = False,
+        worth: Callable[[T], bool] = _anything,
+    ) -> T:
+        """What ``function`` gives, or gave when it was called with this key before. ``context``: what it may change;
+        ``worth``: what of an event's is kept at all."""
         if self._inside:
             return function()
-        return self._replay(key, function, context) if self._replaying else self._note(key, function, context)
+        if self._replaying:
+            return self._replay(key, function, context)
+        noted: T = (
+            self._note_at_event(key, function, context, worth)
+            if at_event
+            else self._note(key, function, context)
+        )
+        return noted
 
     def keep(self, *objects: object) -> tuple[int, ...]:
         """Their ids, as part of a key."""
@@ -103,74 +135,54 @@ class Outcomes:
         if self._inside and record not in self._said:
             self._said.append(record)
 
-    def _note(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None) -> T:
+    def _note(self, key: Hashable, function: Callable[[], Any], context: LaunchContext | None) -> Any:
+        outcome = self._observed(function, context)
+        self._add(key, outcome)
+        return outcome.given()
+
+    def _note_at_event(
+        self,
+        key: Hashable,
+        function: Callable[[], Any],
+        context: LaunchContext | None,
+        worth: Callable[[Any], bool],
+    ) -> Any:
+        with looked_at(context) as looks:
+            outcome = self._observed(function, context)
+        moment = looks.moment(context)
+        kept = moment is not None and outcome.error is None and worth(_fresh(outcome.result))
+        self._add(key, outcome._replace(moment=moment) if kept else _AGAIN)
+        return outcome.given()
+
+    def _observed(self, function: Callable[[], Any], context: LaunchContext | None) -> Outcome:
         before = _Before(context)
         self._said = []
         self._inside = True
         try:
-            result = function()
+            result = _reusable(function())
         except Exception as error:  # whatever user code raises: it raises it again
-            self._add(key, Outcome(error=error, effects=before.effects(), said=tuple(self._said)))
-            raise
+            return Outcome(error=error, effects=before.effects(), said=tuple(self._said))
         finally:
             self._inside = False
-        again = before.something_started()
-        if again:
-            self._add(key, Outcome(again=True))
-            return result
-        kept = _reusable(result)
-        self._add(key, Outcome(kept, effects=before.effects(), said=tuple(self._said)))
-        first: T = _fresh(kept)
-        return first
+        if before.something_started():
+            return Outcome(result, again=True)
+        return Outcome(result, effects=before.effects(), said=tuple(self._said))
 
     def _add(self, key: Hashable, outcome: Outcome) -> None:
-        self._noted.setdefault(key, deque()).append(outcome)
+        self._noted.setdefault(key, deque()).append(_AGAIN if outcome.again else outcome)
 
     def _replay(self, key: Hashable, function: Callable[[], T], context: LaunchContext | None) -> T:
         noted = self._noted.get(key)
         outcome = noted.popleft() if noted else None
         if outcome is None or outcome.again:
             return function()
+        if outcome.moment is not None and not outcome.moment.holds(context):
+            return function()
         if outcome.effects is not None:
             outcome.effects.apply(context)
         _say(outcome.said)
-        if outcome.error is not None:
-            raise outcome.error
-        result: T = _fresh(outcome.result)
-        return result
-
-
-def is_users(function: object) -> bool:
-    """Is it code of the launch file or of a package it imports, and not ours?"""
-    inner = function
-    while hasattr(inner, "func"):  # functools.partial
-        inner = inner.func
-    return not str(getattr(inner, "__module__", "")).startswith(_OURS)
-
-
-def called_once(
-    owner: object, function: object, call: Callable[[], T], context: LaunchContext, *more: Hashable
-) -> T:
-    """``call()``, which calls ``function`` of ``owner``: the user's is called once for plan and start together.
-
-    What an event or a timer calls asks about that moment, and is called then.
-    """
-    outcomes = context.host.outcomes
-    if outcomes is None or context.on_event is not None or not is_users(function):
-        return call()
-    return outcomes.call((getattr(function, "__qualname__", ""), *outcomes.keep(owner), *more), call, context)
-
-
-def once(method: Callable[..., T]) -> Callable[..., T]:
-    """A method ``(self, context)`` of a class that is not ours, called once for plan and start together."""
-
-    @wraps(method)
-    def remembering(self: Any, context: LaunchContext) -> T:
-        if getattr(context, "host", None) is None:  # upstream allows ``perform(None)``
-            return method(self, context)
-        return called_once(self, method, lambda: method(self, context), context)
-
-    return remembering
+        given: T = outcome.given()
+        return given
 
 
 class _Items(NamedTuple):

@@ -90,8 +90,11 @@ class Host(Protocol):
     def find_program(self, name: str) -> str | None:
         """Its path on the ``PATH``; ``None`` when it is not there."""
 
-    def run_command(self, command: Sequence[str], *, merge_stderr: bool = False) -> CommandResult:
-        """Run it without a shell, in our directory and environment. Raises ``FileNotFoundError``."""
+    def run_command(
+        self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
+    ) -> CommandResult:
+        """Run it without a shell, in our directory and environment. ``at_event``: the answer may be another when that
+        happens. Raises ``FileNotFoundError``."""
 
     def write_parameter_file(self, text: str) -> str:
         """Keep ``text`` for a process about to start; give the path to pass (``<params:N>`` in a dry run)."""

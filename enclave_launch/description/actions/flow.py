@@ -24,7 +24,7 @@ from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.substitutions.variables import local_name
 from enclave_launch.frontend import yaml_scalar
-from enclave_launch.host.outcomes import called_once
+from enclave_launch.host.user_code import called_for_entities
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ class OpaqueFunction(Action):
         def call() -> list[LaunchDescriptionEntity] | None:
             return self.__function(context, *self.__args, **self.__kwargs)
 
-        return called_once(self, self.__function, call, context)
+        return called_for_entities(self, self.__function, call, context)
 
 
 class OpaqueCoroutine(Action):
@@ -210,7 +210,7 @@ class ForEach(Action):
     def _round(
         self, context: LaunchContext, values: Mapping[str, Any]
     ) -> list[LaunchDescriptionEntity] | None:
-        return called_once(self, self._function, lambda: self._function(**values), context)
+        return called_for_entities(self, self._function, lambda: self._function(**values), context)
 
 
 @expose_action("for", feature=Feature.FOR_LOOP)
@@ -257,7 +257,7 @@ class ForLoop(Action):
         return entities
 
     def _round(self, context: LaunchContext, index: int) -> list[LaunchDescriptionEntity] | None:
-        return called_once(self, self._function, lambda: self._function(i=index), context)
+        return called_for_entities(self, self._function, lambda: self._function(i=index), context)
 
 
 class _ParsedBody:

@@ -14,6 +14,7 @@ from enclave_launch.description.events.event import (
     IncludeLaunchDescription,
     Shutdown,
 )
+from enclave_launch.host.user_code import called_for_entities
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import SomeEntitiesType
@@ -164,7 +165,7 @@ class OnActionEventBase(BaseEventHandler):
         super().handle(event, context)
         if self.__entities:
             return self.__entities  # type: ignore[return-value]
-        return self.callback(event, context) if self.callback is not None else None
+        return None if self.callback is None else _answer(self, self.callback, event, context)
 
     def computes(self) -> bool:
         return self.callback is not None
@@ -187,6 +188,15 @@ class OnActionEventBase(BaseEventHandler):
     def first_accepted(self, started: Sequence[Any]) -> Any:
         """The first of the started processes that this handler is about, ``None`` without one."""
         return next((action for action in started if self.accepts(action)), None)
+
+
+def _answer(
+    handler: BaseEventHandler,
+    callback: Callable[..., SomeEntitiesType | None],
+    event: Event,
+    context: LaunchContext,
+) -> SomeEntitiesType | None:
+    return called_for_entities(handler, callback, lambda: callback(event, context), context)
 
 
 def _checked(on_event: Any) -> list[LaunchDescriptionEntity | None]:
@@ -261,8 +271,7 @@ class OnShutdown(BaseEventHandler):
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         super().handle(event, context)
         if callable(self.__on_shutdown):
-            assert isinstance(event, Shutdown)
-            return self.__on_shutdown(event, context)
+            return _answer(self, self.__on_shutdown, event, context)
         return self.__on_shutdown
 
     def computes(self) -> bool:

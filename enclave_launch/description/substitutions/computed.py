@@ -54,7 +54,9 @@ class Command(TemplateSubstitution):
                 "expected 'on_stderr' to be one of: 'fail', 'ignore', 'warn' or 'capture'"
             )
         try:
-            result = context.host.run_command(words, merge_stderr=mode == "capture")
+            result = context.host.run_command(
+                words, merge_stderr=mode == "capture", at_event=context.on_event is not None
+            )
         except FileNotFoundError as error:
             raise SubstitutionFailure(f"file not found: {error}") from error
         _check(context, text, mode, result)
@@ -127,7 +129,11 @@ class PythonExpression(Substitution):
         outcomes = context.host.outcomes
         if outcomes is None:
             return str(eval(expression, {}, names))
-        return outcomes.call(("eval", expression), lambda: str(eval(expression, {}, names)))
+        return outcomes.call(
+            ("eval", expression),
+            lambda: str(eval(expression, {}, names)),
+            at_event=context.on_event is not None,
+        )
 
 
 def _literal_names(modules: Any) -> list[str]:
