@@ -147,7 +147,26 @@ def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> Zenoh
         find_router(search_prefixes(launch.plan.planner.source.prefixes)) if zenoh.router.is_here else None
     )
     environment = {name: value for name, value in os.environ.items() if name not in launch.secret_variables}
-    return ZenohRouter(place, program, environment, say)
+    return ZenohRouter(place, program, environment, say, _explained(zenoh.keystore, environment, say))
+
+
+def _explained(
+    keystore: Path, environment: Mapping[str, str], say: Callable[[str], None]
+) -> Callable[[str], bool]:
+    """Reads what the router traces of its access control, where the user asked it to, and says what it means: the trace
+    has two lines for each message that passes, too."""
+    if "interceptor" not in environment.get("RUST_LOG", ""):
+        return lambda line: False
+    from keystore.steps.zenoh_denials import Explainer
+
+    explainer = Explainer(keystore)
+
+    def heard(line: str) -> bool:
+        if (said := explainer.read(line)) is not None:
+            say("\n".join(said.lines))
+        return "zenoh::net::routing::interceptor" in line
+
+    return heard
 
 
 def check_router(plan: LaunchPlan, keystore: str) -> None:

@@ -24,7 +24,7 @@ from keystore.errors import KeystoreError
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
-    "import", "request", "sign", "fleet", "governance", "shares", "tool-enclave", "zenoh",
+    "import", "request", "sign", "fleet", "governance", "shares", "tool-enclave", "zenoh", "denials",
 )  # fmt: skip
 
 

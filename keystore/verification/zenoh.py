@@ -1,9 +1,14 @@
-"""The files for Zenoh: whether the router enforces what is signed, and whether it is who it says it is."""
+"""The files for Zenoh: whether the router enforces what is signed, and whether it is who it says it is.
+
+Where a file is not what follows from the keystore, each difference is told: settings, who is admitted, and in ROS words
+who may do more or less than was signed.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime
+from itertools import islice
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
@@ -19,8 +24,12 @@ from keystore.disk.zenoh_files import (
 from keystore.errors import KeystoreError
 from keystore.formats.certificate import read_certificate
 from keystore.formats.zenoh.address import RouterAddress
+from keystore.formats.zenoh.comparison import Difference, differences, read_configuration
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
+
+_TOLD = 40
+"""Differences of one file, beyond which only their number is told."""
 
 
 def check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
@@ -43,11 +52,13 @@ def _again(view: KeystoreView) -> str:
 
 def _router(view: KeystoreView, address: RouterAddress, now: datetime) -> Iterator[Finding]:
     wanted = router_file(view, zenoh_enclaves(view), address)
-    if safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != wanted.content:
+    found = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER)
+    if found != wanted.content:
         yield Finding(
             Severity.ERROR, "zenoh-rules", layout.ZENOH_ROUTER,
             "does not enforce what is signed: it was changed, or is of before a change", _again(view),
         )  # fmt: skip
+        yield from _told(view, layout.ZENOH_ROUTER, wanted.content, found or b"")
     for gap in wanted.gaps:
         yield Finding(Severity.WARNING, "zenoh-gap", layout.ZENOH_ROUTER, gap)
     if (problem := identity_problem(view, now)) is not None:
@@ -57,11 +68,13 @@ def _router(view: KeystoreView, address: RouterAddress, now: datetime) -> Iterat
 def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
     for enclave in zenoh_enclaves(view):
         file = session_file(enclave)
-        if safe_files.read_if_there(view.root, file) != session_content(view, enclave, address):
+        wanted, found = session_content(view, enclave, address), safe_files.read_if_there(view.root, file)
+        if found != wanted:
             yield Finding(
                 Severity.ERROR, "zenoh-session", file,
                 "not what was written for it: its processes may talk past the router, or not find it", _again(view),
             )  # fmt: skip
+            yield from _told(view, file, wanted, found or b"")
     for enclave in view.enclaves():
         pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(enclave)}/{layout.CERT}")
         if pem is not None and read_certificate(pem, enclave).names_hosts:
@@ -69,3 +82,23 @@ def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
                 Severity.EXPOSURE, "zenoh-impostor", f"{layout.enclave_directory(enclave)}/{layout.CERT}",
                 "names hosts, so that its holder could play the router there", repair.run(view.root, "renew", enclave),
             )  # fmt: skip
+
+
+def _told(view: KeystoreView, file: str, wanted: bytes, found: bytes) -> Iterator[Finding]:
+    """What differs, in ROS words."""
+    all_of = differences(read_configuration(wanted, file), read_configuration(found, file))
+    for one in islice(all_of, _TOLD):
+        severity = Severity.ERROR if one.more else Severity.WARNING
+        yield Finding(severity, f"zenoh-{one.code}", file, _sentence(one), _again(view))
+    if rest := sum(1 for _ in all_of):
+        yield Finding(Severity.NOTE, "zenoh-more", file, f"differs in {rest} more places")
+
+
+def _sentence(one: Difference) -> str:
+    if one.code == "setting":
+        return one.text
+    if one.code == "subject":
+        return f"admits {one.who}: not signed" if one.more else f"does not admit {one.who}: signed"
+    return (
+        f"lets {one.who} {one.text}: not signed" if one.more else f"does not let {one.who} {one.text}: signed"
+    )

@@ -16,6 +16,7 @@ ROUTER = """
 import os, signal, threading, zenoh
 over = threading.Event()
 signal.signal(signal.SIGINT, lambda *_: over.set())
+zenoh.try_init_log_from_env()
 print("router begins", flush=True)
 session = zenoh.open(zenoh.Config.from_file(os.environ["ZENOH_ROUTER_CONFIG_URI"]))
 over.wait()

@@ -7,6 +7,9 @@
     router           all enclaves -> the file of ``rmw_zenohd``: it enforces
     address          where the router is
     session          the file of one enclave's processes: clients of that router
+    meaning          key expressions -> ROS words: the way back
+    comparison       two files -> who may do what else, and which protection is gone
+    trace            the router's log -> what it refused
 
 Where DDS-Security signs a document for each participant and every participant checks its peers, Zenoh has one
 place that enforces: the router's own configuration, by the common name of each client's certificate. The

@@ -14,7 +14,8 @@ from keystore.formats.zenoh import key_expressions
 from keystore.formats.zenoh.grants import Grants, Use
 from keystore.formats.zenoh.key_expressions import cache, data_keys, domain_chunks, endpoint_tokens, history
 
-_TOKENS = {Use.PUBLISH: "MP", Use.SUBSCRIBE: "MS", Use.CALL: "SC", Use.SERVE: "SS"}
+GRAPH_KINDS = {"MP": Use.PUBLISH, "MS": Use.SUBSCRIBE, "SC": Use.CALL, "SS": Use.SERVE}
+"""What a token of an endpoint says of it (liveliness_utils.cpp)."""
 
 
 class AccessRule(NamedTuple):
@@ -95,6 +96,6 @@ def _graph(enclave: str, grants: Grants, chunks: tuple[str, ...]) -> Iterator[Ac
 
 
 def _endpoints(enclave: str, grants: Grants, chunks: Iterable[str]) -> Iterator[str]:
-    for use, kind in _TOKENS.items():
+    for kind, use in GRAPH_KINDS.items():
         for name in grants.of(use):
             yield from endpoint_tokens(chunks, kind, enclave, name, grants.types_of(use, name))

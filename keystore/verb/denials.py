@@ -1,0 +1,54 @@
+"""Explain what a Zenoh router refused, from its log: who, what, why, and the policy that allows it.
+
+Zenoh tells neither side. Start the router with RUST_LOG=zenoh::net::routing::interceptor=trace (a router that
+secure-launch starts inherits it, and secure-launch explains what it says), and give its log here, or pipe it:
+
+  RUST_LOG=zenoh::net::routing::interceptor=trace ros2 run rmw_zenoh_cpp rmw_zenohd 2>&1 | secure-keystore denials ks
+
+exit status: 0 nothing was refused, 1 something was
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from keystore.verb import common
+
+
+def describe(parser: argparse.ArgumentParser) -> None:
+    common.add_keystore(parser)
+    parser.add_argument(
+        "log", metavar="LOG", nargs="*", type=Path, help="its output, in order (default: stdin)"
+    )
+    common.add_format(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    from keystore.steps.zenoh_denials import Explainer
+
+    explainer, found = Explainer(arguments.keystore), []
+    for said in filter(None, map(explainer.read, _lines(arguments.log))):
+        found.append(said)
+        if arguments.format == "text":
+            common.print_lines(said.lines)
+    if arguments.format == "json":
+        common.print_json({"version": 1, "denials": [said._asdict() for said in found]})
+    return 1 if found else 0
+
+
+def _lines(logs: Iterable[Path]) -> Iterator[str]:
+    """Raises ``InvalidInputError`` for a file that cannot be read."""
+    from keystore.errors import InvalidInputError, printable
+
+    files = list(logs)
+    if not files:
+        yield from (line.decode(errors="replace") for line in sys.stdin.buffer)
+    for file in files:
+        try:
+            with file.open("rb") as opened:
+                yield from (line.decode(errors="replace") for line in opened)
+        except OSError as error:
+            raise InvalidInputError(f"{printable(file)}: {error.strerror}") from None
