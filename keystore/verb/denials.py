@@ -19,6 +19,7 @@ from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
+    """Declares the keystore, the logs and how to print."""
     common.add_keystore(parser)
     parser.add_argument(
         "log", metavar="LOG", nargs="*", type=Path, help="its output, in order (default: stdin)"
@@ -27,6 +28,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
+    """Tells each refusal once; returns 1 where there is one. Raises a ``KeystoreError`` for what cannot be read."""
     from keystore.steps.zenoh_denials import Explainer
 
     explainer, found = Explainer(arguments.keystore), []
