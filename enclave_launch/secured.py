@@ -157,9 +157,9 @@ def _explained(
     has two lines for each message that passes, too."""
     if "interceptor" not in environment.get("RUST_LOG", ""):
         return lambda line: False
-    from keystore.steps.zenoh_denials import Explainer
+    from keystore.steps.zenoh_denials import RouterLogExplainer
 
-    explainer = Explainer(keystore)
+    explainer = RouterLogExplainer(keystore)
 
     def heard(line: str) -> bool:
         if (said := explainer.read(line)) is not None:

@@ -46,7 +46,7 @@ class Explanation(NamedTuple):
         return [*found, *(f"    {line}" for line in self.policy.splitlines())]
 
 
-class Explainer:
+class RouterLogExplainer:
     """Explains a log line by line, each refusal once. ``keystore``: of the router that writes it."""
 
     def __init__(self, keystore: Path | str) -> None:

@@ -29,9 +29,9 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Tells each refusal once; returns 1 where there is one. Raises a ``KeystoreError`` for what cannot be read."""
-    from keystore.steps.zenoh_denials import Explainer
+    from keystore.steps.zenoh_denials import RouterLogExplainer
 
-    explainer, found = Explainer(arguments.keystore), []
+    explainer, found = RouterLogExplainer(arguments.keystore), []
     for said in filter(None, map(explainer.read, _lines(arguments.log))):
         found.append(said)
         if arguments.format == "text":

@@ -24,7 +24,7 @@ from keystore.disk.zenoh_files import (
 from keystore.errors import KeystoreError
 from keystore.formats.certificate import read_certificate
 from keystore.formats.zenoh.address import RouterAddress
-from keystore.formats.zenoh.comparison import Difference, differences, read_configuration
+from keystore.formats.zenoh.comparison import ZenohDifference, differences, read_configuration
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
@@ -94,7 +94,7 @@ def _told(view: KeystoreView, file: str, wanted: bytes, found: bytes) -> Iterato
         yield Finding(Severity.NOTE, "zenoh-more", file, f"differs in {rest} more places")
 
 
-def _sentence(one: Difference) -> str:
+def _sentence(one: ZenohDifference) -> str:
     if one.code == "setting":
         return one.text
     if one.code == "subject":

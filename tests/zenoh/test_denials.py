@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from keystore import RenewOptions, renew
 from keystore.formats.zenoh.meaning import meaning
 from keystore.formats.zenoh.trace import RUST_LOG, RouterLog
-from keystore.steps.zenoh_denials import Explainer, Explanation
+from keystore.steps.zenoh_denials import Explanation, RouterLogExplainer
 from keystore.verb import main
 from tests.keystore.kit import filled, options
 from tests.zenoh import kit
@@ -153,7 +153,7 @@ cache; the second belongs to another thread; the token at the end is of no use t
 
 
 def told(keystore: Path, log: str) -> list[Explanation]:
-    return [said for said in map(Explainer(keystore).read, log.splitlines()) if said]
+    return [said for said in map(RouterLogExplainer(keystore).read, log.splitlines()) if said]
 
 
 def test_only_what_was_sent_and_dropped_counts_in_the_log_of_rmw_zenohd(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ _NAMED = 3  # messages, beyond which it is said that there are some
 _LARGEST = 64 << 20  # bytes; a router of 1,000 nodes with 20 interfaces each has 12
 
 
-class Permission(NamedTuple):
+class MessagePermission(NamedTuple):
     """One message on one key, in one direction; ``allowed`` is False for a rule that denies."""
 
     flow: str
@@ -29,16 +29,16 @@ class Permission(NamedTuple):
     allowed: bool = True
 
 
-class Configuration(NamedTuple):
+class ZenohConfiguration(NamedTuple):
     """``settings``: path -> value of all that is no rule; ``admitted``: common name of a certificate -> permissions;
     ``enclaves``: whose name it is, as the file says."""
 
     settings: Mapping[str, object]
-    admitted: Mapping[str, frozenset[Permission]]
+    admitted: Mapping[str, frozenset[MessagePermission]]
     enclaves: Mapping[str, str]
 
 
-class Difference(NamedTuple):
+class ZenohDifference(NamedTuple):
     """``code``: ``setting``, ``subject`` or ``rights``. ``more``: whether somebody may do more than the first one lets
     them; ``who``: an enclave or the name of a certificate, in words, "" for a setting."""
 
@@ -48,7 +48,7 @@ class Difference(NamedTuple):
     text: str
 
 
-def read_configuration(text: bytes, place: str) -> Configuration:
+def read_configuration(text: bytes, place: str) -> ZenohConfiguration:
     """Raises ``InvalidInputError`` for what is not JSON of such a configuration, as this program writes it."""
     content: Any = None
     try:
@@ -61,17 +61,21 @@ def read_configuration(text: bytes, place: str) -> Configuration:
         raise InvalidInputError(f"{place} is not a configuration of Zenoh in JSON") from None
     own = {name: control[name] for name in ("enabled", "default_permission") if name in control}
     settings = dict(_flat({**content, "access_control": own} if own else content, ""))
-    return Configuration(settings, admitted, {name: one for one, names in named.items() for name in names})
+    return ZenohConfiguration(
+        settings, admitted, {name: one for one, names in named.items() for name in names}
+    )
 
 
-def differences(before: Configuration, after: Configuration) -> Iterator[Difference]:
+def differences(before: ZenohConfiguration, after: ZenohConfiguration) -> Iterator[ZenohDifference]:
     """What ``after`` has otherwise: settings, who is admitted, and what each of them may do."""
     yield from _settings(before.settings, after.settings)
     for name in sorted(before.admitted.keys() | after.admitted.keys()):
         old, new = before.admitted.get(name), after.admitted.get(name)
         if old is None or new is None:
             who = _who(name, before.enclaves.get(name) or after.enclaves.get(name, ""))
-            yield Difference("subject", old is None, who, f"{len(_grouped(old or new or ()))} permissions")
+            yield ZenohDifference(
+                "subject", old is None, who, f"{len(_grouped(old or new or ()))} permissions"
+            )
         else:
             yield from _rights(_enclave(name, before), old, new)
 
@@ -82,21 +86,23 @@ def _who(name: str, enclave: str) -> str:
     return f"the certificate name {name} (enclave {enclave})" if enclave else f"the certificate name {name}"
 
 
-def _enclave(name: str, configuration: Configuration) -> str:
+def _enclave(name: str, configuration: ZenohConfiguration) -> str:
     return f"enclave {configuration.enclaves[name]}" if name != EVERYBODY else "every client"
 
 
-def _rights(who: str, old: frozenset[Permission], new: frozenset[Permission]) -> Iterator[Difference]:
+def _rights(
+    who: str, old: frozenset[MessagePermission], new: frozenset[MessagePermission]
+) -> Iterator[ZenohDifference]:
     for more, found, all_of in ((True, new - old, new), (False, old - new, old)):
         whole = _grouped(all_of)
         for what, permissions in sorted(_grouped(found).items()):
             parts = "" if permissions == whole[what] else f" ({_messages(permissions)})"
-            yield Difference("rights", more, who, f"{what}{parts}")
+            yield ZenohDifference("rights", more, who, f"{what}{parts}")
 
 
-def _grouped(permissions: Iterable[Permission]) -> dict[str, set[Permission]]:
+def _grouped(permissions: Iterable[MessagePermission]) -> dict[str, set[MessagePermission]]:
     """By what they are about, in words."""
-    found: dict[str, set[Permission]] = defaultdict(set)
+    found: dict[str, set[MessagePermission]] = defaultdict(set)
     for one in permissions:
         about = meaning(one.flow, one.message, one.key)
         text = _words(about) if about else f"{one.message} on {one.key}"
@@ -109,7 +115,7 @@ def _words(about: Meaning) -> str:
     return str(about._replace(node="", enclave="") if about.use else about)
 
 
-def _messages(permissions: Iterable[Permission]) -> str:
+def _messages(permissions: Iterable[MessagePermission]) -> str:
     named = sorted({f"{one.message} {one.flow}" for one in permissions})
     return f"of that {', '.join(named)}" if len(named) <= _NAMED else "in part"
 
@@ -124,9 +130,9 @@ def _named(control: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
 
 def _admitted(
     control: Mapping[str, Any], names: Mapping[str, tuple[str, ...]]
-) -> dict[str, frozenset[Permission]]:
+) -> dict[str, frozenset[MessagePermission]]:
     rules = {rule["id"]: frozenset(_permissions(rule)) for rule in control.get("rules") or ()}
-    found: dict[str, set[Permission]] = defaultdict(set)
+    found: dict[str, set[MessagePermission]] = defaultdict(set)
     for policy in control.get("policies") or ():
         for subject in policy["subjects"]:
             for name in names[subject]:
@@ -135,13 +141,13 @@ def _admitted(
     return {name: frozenset(permissions) for name, permissions in found.items()}
 
 
-def _permissions(rule: Mapping[str, Any]) -> Iterator[Permission]:
+def _permissions(rule: Mapping[str, Any]) -> Iterator[MessagePermission]:
     """A rule without flows is for both."""
     allowed = rule["permission"] == "allow"
     for flow in rule.get("flows") or ("ingress", "egress"):
         for message in rule["messages"]:
             for key in rule["key_exprs"]:
-                yield Permission(str(flow), str(message), str(key), allowed)
+                yield MessagePermission(str(flow), str(message), str(key), allowed)
 
 
 def _flat(value: Any, path: str) -> Iterator[tuple[str, object]]:
@@ -152,13 +158,13 @@ def _flat(value: Any, path: str) -> Iterator[tuple[str, object]]:
         yield path, value
 
 
-def _settings(before: Mapping[str, object], after: Mapping[str, object]) -> Iterator[Difference]:
+def _settings(before: Mapping[str, object], after: Mapping[str, object]) -> Iterator[ZenohDifference]:
     for path in sorted(before.keys() | after.keys()):
         old, new = before.get(path), after.get(path)
         if old != new:
             text = f"{path} is {_value(after, path)} instead of {_value(before, path)}"
             why = next((why for start, why in _WHY.items() if path.startswith(start)), "")
-            yield Difference("setting", True, "", f"{text}: {why}" if why else text)
+            yield ZenohDifference("setting", True, "", f"{text}: {why}" if why else text)
 
 
 def _value(settings: Mapping[str, object], path: str) -> str:
