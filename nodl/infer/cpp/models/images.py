@@ -10,7 +10,18 @@ from nodl.infer.cpp.models.table import PUB, SUB, owner_in, texts_in
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import Obj, Param, Text, Value, concatenated, join, literal, plain, unknown
+from nodl.infer.cpp.running.values import (
+    DerivedName,
+    Obj,
+    Param,
+    Text,
+    Value,
+    concatenated,
+    join,
+    literal,
+    plain,
+    unknown,
+)
 from nodl.name_template import ParameterPart
 
 if TYPE_CHECKING:
@@ -188,6 +199,17 @@ LIBRARY_METHODS[("image_transport::TransportHints", "getTransport")] = lambda ru
     if call.receiver is not None
     else unknown("a transport")
 )
+
+
+@library_function("image_transport::getCameraInfoTopic")
+def _camera_info_topic(run: Machine, call: Call) -> Value:
+    """image_transport/camera_common.hpp. Callers give it the name that launch has remapped, which it follows then."""
+    found: list[object] = []
+    for image in call.value(0):
+        for atom in _info_topic((image,)):
+            known = isinstance(atom, Text) and isinstance(image, Text)
+            found.append(Text((*atom.parts[:-1], DerivedName(atom.parts[-1], image))) if known else atom)
+    return tuple(found)
 
 
 for _function, _what in (

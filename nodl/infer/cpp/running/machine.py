@@ -21,6 +21,7 @@ from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
     Bound,
+    DerivedName,
     Lambda,
     NodePart,
     Obj,
@@ -249,7 +250,11 @@ class Machine:
         conditions = self.conditions(node, frame)
         for atom in concatenated(name or unknown("a name that is never set")):
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
-            found = FoundEndpoint(kind, Text(parts), type_name, source, follows=follows)
+            derived = parts[-1] if parts and isinstance(parts[-1], DerivedName) else None
+            which = (
+                Follows("camera_info", derived.image) if derived is not None and follows is None else follows
+            )
+            found = FoundEndpoint(kind, Text(parts), type_name, source, follows=which)
             record.endpoints.setdefault(found, []).append(conditions)
 
     def later(self, atom: Atom, frame: Frame) -> None:

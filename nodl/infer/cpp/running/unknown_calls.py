@@ -147,7 +147,8 @@ def _after(atom: object, name: str) -> Value:
         return (open_sequence((*atom.items, *more)),)
     if isinstance(atom, Map):
         return (atom._replace(open=True),)
-    return unknown(f"what {name}() may have written")
+    changed = unknown(f"what {name}() may have written")
+    return changed if name.startswith("std::") else join((atom,), changed)
 
 
 _ORDERS = re.compile(

@@ -37,6 +37,17 @@ class Text(NamedTuple):
     parts: tuple[Part | NodePart, ...]
 
 
+class DerivedName(str):
+    """The end of a name that a library made of the final name of an image: that of its ``camera_info``."""
+
+    image: Text
+
+    def __new__(cls, written: str, image: Text) -> DerivedName:
+        made = super().__new__(cls, written)
+        made.image = image
+        return made
+
+
 class Unknown(NamedTuple):
     why: str
 

@@ -113,3 +113,18 @@ def test_nothing_is_made_under_an_empty_name(tmp_path: Path) -> None:
 
 def test_an_empty_name_alone_is_a_gap(tmp_path: Path) -> None:
     assert any("empty" in why for why in gaps(infer(tmp_path, in_class('create_publisher<M>("", 1);'))))
+
+
+def test_settings_asked_for_by_name_follow_the_remapped_image(tmp_path: Path) -> None:
+    source = in_class(
+        'auto image = get_node_base_interface()->resolve_topic_or_service_name("image_raw", false);'
+        "info_.subscribe(this, image_transport::getCameraInfoTopic(image));"
+        'other_.subscribe(this, "left/camera_info");',
+        "message_filters::Subscriber<sensor_msgs::msg::CameraInfo> info_, other_;",
+    )
+    package(tmp_path / "src/demo", {"src/main.cpp": source}, "add_executable(filter_node src/main.cpp)")
+    install(tmp_path)
+    planned = plan(tmp_path, LAUNCH.format(parameter=""))
+    assert may(planned, "/front/camera_info")
+    assert may(planned, "/left/camera_info")
+    assert not may(planned, "/camera_info")
