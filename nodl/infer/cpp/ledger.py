@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.running.machine import Machine
 
 CREATES = re.compile(
-    r"create_(?:publisher|subscription|service|client|server|generic_\w+|sub_node|lifecycle_publisher|camera_publisher|"
+    r"create_(?:publisher|subscription|service|client|server|action_server|action_client|generic_\w+|sub_node|lifecycle_publisher|camera_publisher|"
     r"camera_subscription|subscriber)|advertise\w*|createPublisher|createSubscription|createService|createClient|"
     r"create(?:Shared|Unique|Unmanaged)?Instance|wait_for_message|createSubscriber|subscribeCamera|advertiseCamera|add_publisher|"
     r"configure_introspection|subscribe|on_parameter_event|"

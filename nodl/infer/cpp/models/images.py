@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.findings import Follows
@@ -153,7 +154,7 @@ def _chosen_by(run: Machine, owner: Obj, base: Value, call: Call, chosen: Param)
     default = _only_text(chosen) or ""
     for topic in concatenated(base):
         raw = Follows("remapped", topic, "", chosen.name, "raw", default)
-        name = concatenated((topic,), _only_if(chosen.name, default, "raw"))
+        name = concatenated((topic,), only_if(chosen.name, default, "raw"))
         run.endpoint(owner.node, SUB, name, _IMAGE, call.node, call.frame, raw)
     for transport in _TRANSPORTS:
         _transported_subscription(run, owner, base, call, transport, chosen.name, default)
@@ -171,12 +172,20 @@ def _transported_subscription(
     for topic in concatenated(base):
         wanted = transport if parameter else ""
         follows = Follows("remapped", topic, f"/{transport}", parameter, wanted, default)
-        condition = _only_if(parameter, default, transport) if parameter else literal("")
+        condition = only_if(parameter, default, transport) if parameter else literal("")
         name = concatenated((topic,), literal(f"/{transport}"), condition)
         run.endpoint(owner.node, SUB, name, _TRANSPORTS[transport], call.node, call.frame, follows)
 
 
-def _only_if(parameter: str, default: str, value: str) -> Value:
+def chosen_transport(run: Machine, chosen: Param, known: Sequence[str]) -> str | None:
+    """The default of a parameter that names a transport; ``None`` unless it, and what launch gives, is in the table."""
+    default = _only_text(chosen) or ""
+    given = run.given(chosen.record, chosen.name)
+    run.from_default.pop(chosen.name, None)  # its values are all listed
+    return default if (default if given is None else given) in known else None
+
+
+def only_if(parameter: str, default: str, value: str) -> Value:
     return (Text((ParameterPart(parameter, default, None, (("only if equal", (value,)),)),)),)
 
 

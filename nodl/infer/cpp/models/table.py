@@ -6,6 +6,7 @@ comes from (counted behind the node). Rows without interfaces were read too: tho
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -29,7 +30,8 @@ ACT, CALL = EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT
 
 
 class Makes(NamedTuple):
-    """``name``: fixed, or ``{0}``: the first text behind the node; ``type``: ``T0`` for the first template argument."""
+    """``name``: fixed, or with ``{1}``, the second argument behind the node (``{1=odom}``: where it is not given);
+    ``type``: ``T0`` for the first template argument, empty where a parameter decides."""
 
     kind: EndpointKind
     name: str
@@ -37,69 +39,69 @@ class Makes(NamedTuple):
 
 
 TF = "tf2_msgs/msg/TFMessage"
+_LIFECYCLE = "lifecycle_msgs/srv"
 
 ROWS: dict[str, tuple[Makes, ...]] = {
-    # tf2_ros/src/transform_broadcaster.cpp, static_transform_broadcaster.h, buffer_server.h, buffer_client.h
+    # ros2/geometry2 humble d0dbd516, jazzy 646342c6, rolling 1b005c65: tf2_ros/include/tf2_ros/transform_broadcaster.h,
+    # static_transform_broadcaster.h, buffer_client.h
     "tf2_ros::TransformBroadcaster": (Makes(PUB, "/tf", TF),),
     "tf2_ros::StaticTransformBroadcaster": (Makes(PUB, "/tf_static", TF),),
     "tf2_ros::BufferClient": (Makes(CALL, "{0}", "tf2_msgs/action/LookupTransform"),),
-    # diagnostic_updater/diagnostic_updater.hpp: publisher /diagnostics, parameters diagnostic_updater.*
+    # ros/diagnostics ros2 431926f: diagnostic_updater/include/diagnostic_updater/diagnostic_updater.hpp
     "diagnostic_updater::Updater": (Makes(PUB, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"),),
-    # bondcpp/src/bond.cpp: publishes and subscribes the topic that it gets
+    # ros/bond_core ros2 e6d0fc2: bondcpp/src/bond.cpp
     "bond::Bond": (Makes(PUB, "{0}", "bond/msg/Status"), Makes(SUB, "{0}", "bond/msg/Status")),
-    # rclcpp/parameter_event_handler.hpp, parameter_client.hpp
+    # ros2/rclcpp humble 99f1d8d12, jazzy 985e320de, rolling a0a2a067d: rclcpp/parameter_event_handler.hpp
     "rclcpp::ParameterEventHandler": (Makes(SUB, "/parameter_events", "rcl_interfaces/msg/ParameterEvent"),),
     "rclcpp::ParameterEventsSubscriber": (
         Makes(SUB, "/parameter_events", "rcl_interfaces/msg/ParameterEvent"),
     ),
-    # interactive_markers/src/interactive_marker_server.cpp, topics below the namespace that it gets
+    # ros-visualization/interactive_markers humble b4e6a0d, rolling 165a0e6: src/interactive_marker_server.cpp
     "interactive_markers::InteractiveMarkerServer": (
         Makes(SRV, "{0}/get_interactive_markers", "visualization_msgs/srv/GetInteractiveMarkers"),
         Makes(PUB, "{0}/update", "visualization_msgs/msg/InteractiveMarkerUpdate"),
         Makes(SUB, "{0}/feedback", "visualization_msgs/msg/InteractiveMarkerFeedback"),
     ),
-    # nav2_util/simple_action_server.hpp, service_client.hpp, odometry_utils.hpp
-    # (used where the sources of nav2_util are not in reach)
+    # Where the sources of nav2 are not in reach. ros-navigation/navigation2 humble 3c3db59d6, jazzy f4108e5b1,
+    # kilted 71a1d84f4, main a3a97043e: nav2_util (nav2_ros_common in main) simple_action_server.hpp,
+    # service_client.hpp, odometry_utils.hpp, lifecycle_service_client.hpp, twist_publisher.hpp,
+    # twist_subscriber.hpp (which parameter enable_stamped_cmd_vel makes Twist or TwistStamped)
     "nav2_util::SimpleActionServer": (Makes(ACT, "{0}", "T0"),),
     "nav2::SimpleActionServer": (Makes(ACT, "{0}", "T0"),),
     "nav2_util::ServiceClient": (Makes(CLI, "{0}", "T0"),),
-    "nav2_util::ServiceServer": (Makes(SRV, "{0}", "T0"),),
     "nav2::ServiceClient": (Makes(CLI, "{0}", "T0"),),
-    "nav2_util::OdomSmoother": (Makes(SUB, "{0}", "nav_msgs/msg/Odometry"),),
-    # no interfaces of their own: tf2_ros/create_timer_ros.h, realtime_tools, laser_geometry, message_filters
-    "tf2_ros::CreateTimerROS": (),
-    "realtime_tools::RealtimePublisher": (),
-    "realtime_tools::RealtimeBuffer": (),
-    "realtime_tools::RealtimeBox": (),
-    "realtime_tools::RealtimeThreadSafeBox": (),
-    "realtime_tools::RealtimeServerGoalHandle": (),
-    "realtime_tools::AsyncFunctionHandler": (),
-    "laser_geometry::LaserProjection": (),
-    "camera_info_manager::CameraInfoManager": (
-        Makes(SRV, "~/set_camera_info", "sensor_msgs/srv/SetCameraInfo"),
+    "nav2_util::OdomSmoother": (Makes(SUB, "{1=odom}", "nav_msgs/msg/Odometry"),),
+    "nav2_util::TwistPublisher": (Makes(PUB, "{0}", ""),),
+    "nav2_util::TwistSubscriber": (Makes(SUB, "{0}", ""),),
+    "nav2_util::LifecycleServiceClient": (
+        Makes(CLI, "{0}/change_state", f"{_LIFECYCLE}/ChangeState"),
+        Makes(CLI, "{0}/get_state", f"{_LIFECYCLE}/GetState"),
     ),
-    "image_geometry::PinholeCameraModel": (),
-    "image_geometry::StereoCameraModel": (),
-    "message_filters::Connection": (),
-    "message_filters::TimeSynchronizer": (),
-    "message_filters::Synchronizer": (),
-    "message_filters::Cache": (),
-    "message_filters::Chain": (),
-    "message_filters::PassThrough": (),
-    "message_filters::sync_policies::ApproximateTime": (),
-    "message_filters::sync_policies::ExactTime": (),
-    "tf2_ros::MessageFilter": (),
-    "diagnostic_updater::FrequencyStatus": (),
-    "diagnostic_updater::TimeStampStatus": (),
-    "diagnostic_updater::HeaderlessTopicDiagnostic": (),
-    "diagnostic_updater::TopicDiagnostic": (),
-    "diagnostic_updater::DiagnosedPublisher": (),
-    "diagnostic_updater::FrequencyStatusParam": (),
-    "diagnostic_updater::TimeStampStatusParam": (),
-    "diagnostic_updater::DiagnosticStatusWrapper": (),
-    "diagnostic_updater::FunctionDiagnosticTask": (),
-    "diagnostic_updater::CompositeDiagnosticTask": (),
 }
+NONE = (
+    "tf2_ros::CreateTimerROS", "tf2_ros::MessageFilter",
+    # ros-controls/realtime_tools humble 3e85fba, jazzy 0a48300, kilted bb65bfc, master 0e0bca0: all headers
+    *(f"realtime_tools::{name}" for name in (
+        "RealtimePublisher", "RealtimeBuffer", "RealtimeBox", "RealtimeBoxBase", "RealtimeBoxBestEffort",
+        "RealtimeThreadSafeBox", "RealtimeServerGoalHandle", "RealtimeClock", "AsyncFunctionHandler",
+        "AsyncFunctionHandlerParams", "AsyncSchedulingPolicy", "LockFreeQueueBase", "LockFreeSPSCQueue",
+        "LockFreeMPMCQueue", "prio_inherit_mutex", "prio_inherit_recursive_mutex")),
+    # ros-perception/laser_geometry humble ba53212, rolling 7688a58; vision_opencv humble 066793a, rolling 8b42d66
+    "laser_geometry::LaserProjection", "image_geometry::PinholeCameraModel", "image_geometry::StereoCameraModel",
+    # ros2/message_filters humble fc93cd9, jazzy d3eecd6, rolling 361e42c: include/message_filters
+    *(f"message_filters::{name}" for name in (
+        "Connection", "TimeSynchronizer", "Synchronizer", "Cache", "Chain", "PassThrough", "SimpleFilter",
+        "InputAligner", "MessageEvent", "NullFilter", "sync_policies::ApproximateTime",
+        "sync_policies::ApproximateEpsilonTime",         "sync_policies::ExactTime", "sync_policies::LatestTime")),
+    *(f"diagnostic_updater::{name}" for name in (
+        "FrequencyStatus", "TimeStampStatus", "SlowTimeStampStatus", "Heartbeat", "HeaderlessTopicDiagnostic",
+        "TopicDiagnostic", "DiagnosedPublisher", "FrequencyStatusParam", "TimeStampStatusParam",
+        "DiagnosticStatusWrapper", "FunctionDiagnosticTask", "GenericFunctionDiagnosticTask", "CompositeDiagnosticTask",
+        "DiagnosticTask",         "DiagnosticTaskVector")),
+    "interactive_markers::MenuHandler", "nav2_util::NodeThread", "nav2::NodeThread", "nav2_util::ExecutionTimer",
+)  # fmt: skip
+"""Classes that were read and make no interface on the node that they may get."""
+ROWS.update(dict.fromkeys(NONE, ()))
 
 
 def texts_in(arguments: Sequence[Value], run: Machine) -> list[Value]:
@@ -131,13 +133,19 @@ def make(
         add(run, owner, each.kind, _named(each.name, texts), kind, call)
 
 
+_GIVEN = re.compile(r"\{(\d)(?:=([^}]*))?\}")
+
+
 def _named(name: str, texts: Sequence[Value]) -> Value:
-    head, separator, tail = name.partition("{0}")
-    if not separator:
+    given = _GIVEN.search(name)
+    if given is None:
         return literal(name)
-    return concatenated(
-        literal(head), texts[0] if texts else unknown("a name that is not given"), literal(tail)
-    )
+    position, default = int(given[1]), given[2]
+    if position < len(texts):
+        value = texts[position]
+    else:
+        value = unknown("a name that is not given") if default is None else literal(default)
+    return concatenated(literal(name[: given.start()]), value, literal(name[given.end() :]))
 
 
 def _row(name: str, row: tuple[Makes, ...]) -> None:
@@ -221,5 +229,5 @@ def _component_manager(
     return None
 
 
-for _cls in ("rclcpp_components::ComponentManager",):
+for _cls in ("rclcpp_components::ComponentManager", "rclcpp_components::ComponentManagerIsolated"):
     NODE_BASES[_cls] = LIBRARY_CLASSES[_cls] = _component_manager

@@ -1,0 +1,113 @@
+"""What known libraries make where their sources are not in reach, each as its own source says."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.test_in_a_launch import install, may, plan
+from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, package
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+CLOUDS = '#include "point_cloud_transport/point_cloud_transport.hpp"\n'
+BOND = {("publisher", "bond"), ("subscription", "bond")}
+
+
+def nav2(body: str) -> str:
+    head = HEAD + "#include <nav2_ros_common/lifecycle_node.hpp>\n"
+    return head + (
+        'class Demo : public nav2::LifecycleNode { public: Demo() : nav2::LifecycleNode("n") { auto self = '
+        f"shared_from_this(); {body} }} }};\nint main() {{ auto d = std::make_shared<Demo>(); }}\n"
+    )
+
+
+OF_NAV2 = {
+    "an action server by the node": (
+        'create_action_server<nav2_msgs::action::Wait>("wait", cb);', {("action_server", "wait")},
+    ),
+    "a factory": (
+        'nav2::interfaces::create_subscription<std_msgs::msg::String>(self, "in", cb);', {("subscription", "in")},
+    ),
+    "a twist publisher": ('nav2_util::TwistPublisher p(self, "cmd_vel", 1);', {("publisher", "cmd_vel")}),
+    "a twist subscriber": (
+        'nav2_util::TwistSubscriber s(self, "cmd_vel", 1, a, b);', {("subscription", "cmd_vel")},
+    ),
+    "an odometry smoother": (
+        'nav2_util::OdomSmoother o(self, 0.3, "wheels");', {("subscription", "wheels")},
+    ),
+    "an odometry smoother with its default": ("nav2_util::OdomSmoother o(self);", {("subscription", "odom")}),
+    "clients of a lifecycle": (
+        'nav2_util::LifecycleServiceClient c("amcl", self);',
+        {("service_client", "amcl/change_state"), ("service_client", "amcl/get_state")},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "expected"), OF_NAV2.values(), ids=OF_NAV2)
+def test_of_nav2(body: str, expected: set[tuple[str, str]], tmp_path: Path) -> None:
+    system = infer(tmp_path, nav2(body))
+    assert not gaps(system)
+    assert endpoints(system) == expected | BOND
+
+
+def test_an_odometry_subscriber_asks_a_parameter(tmp_path: Path) -> None:
+    system = infer(tmp_path, nav2("nav_2d_utils::OdomSubscriber o(self);"))
+    (name,) = [e.name for n in system.nodes for e in n.endpoints if "bond" not in str(e.name)]
+    assert (name.fill({}).text, name.fill({"odom_topic": "wheels"}).text) == ("odom", "wheels")
+
+
+def test_the_events_of_a_service_follow_its_parameter(tmp_path: Path) -> None:
+    system = infer(tmp_path, nav2('nav2::ServiceServer<std_srvs::srv::Empty> s("go", self, cb);'))
+    events = [e.name for n in system.nodes for e in n.endpoints if "_service_event" in str(e.name)]
+    assert [name.fill_each({}) for name in events] == [(), ()]
+    shown = [
+        each.text for name in events for each in name.fill_each({"service_introspection_mode": "contents"})
+    ]
+    assert shown == ["go/_service_event"]
+
+
+def test_a_class_of_nav2_that_nobody_read_is_a_gap(tmp_path: Path) -> None:
+    assert gaps(infer(tmp_path, nav2("nav2_util::Unheard u(self);")))
+
+
+def test_the_service_of_a_camera_is_that_of_either_distribution(tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class('camera_info_manager::CameraInfoManager m(this, "left");'))
+    assert {name for _, name in endpoints(system)} == {"set_camera_info", "~/set_camera_info"}
+
+
+def test_the_service_of_a_camera_with_a_namespace(tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class('camera_info_manager::CameraInfoManager m(this, "left", "", "ns");'))
+    assert {name for _, name in endpoints(system)} == {"ns/set_camera_info"}
+
+
+def test_a_point_cloud_is_published_by_each_transport(tmp_path: Path) -> None:
+    body = 'point_cloud_transport::PointCloudTransport t(shared_from_this()); p_ = t.advertise("out", 1);'
+    system = infer(tmp_path, in_class(body, "point_cloud_transport::Publisher p_;", before=CLOUDS))
+    assert {name for _, name in endpoints(system)} == {"out", "out/draco", "out/zlib", "out/zstd"}
+
+
+@pytest.mark.parametrize(
+    ("parameter", "topic", "other"),
+    [("", "/in", "/in/zstd"), ('<param name="point_cloud_transport" value="zstd"/>', "/in/zstd", "/in")],
+)
+def test_a_parameter_chooses_the_transport_of_a_point_cloud(
+    parameter: str, topic: str, other: str, tmp_path: Path
+) -> None:
+    body = 'point_cloud_transport::PointCloudTransport t(shared_from_this()); s_ = t.subscribe("in", 1, cb);'
+    package(
+        tmp_path / "src/demo",
+        {"src/main.cpp": in_class(body, before=CLOUDS)},
+        "add_executable(filter_node src/main.cpp)",
+    )
+    install(tmp_path)
+    node = f'<node pkg="demo" exec="filter_node" name="n">{parameter}</node>'
+    planned = plan(tmp_path, f"<launch>{node}</launch>")
+    assert may(planned, topic)
+    assert not may(planned, other)
+
+
+def test_a_transport_of_point_clouds_that_nobody_knows_is_a_gap(tmp_path: Path) -> None:
+    body = 'point_cloud_transport::create_subscription(shared_from_this(), "in", cb, chosen());'
+    assert any("transport" in why for why in gaps(infer(tmp_path, in_class(body, before=CLOUDS))))
