@@ -82,15 +82,15 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
     merged: list[Piece] = []
     last: Piece | None = None
     for piece in pieces:
-        if isinstance(piece, str):
+        if type(piece) is str:
             if not piece:
                 continue
             if len(piece) > MAX_LENGTH:
                 piece = Hole("a very long text")
-            elif isinstance(last, str):
+            elif type(last) is str:
                 last = merged[-1] = last + piece
                 continue
-        if not (isinstance(piece, Hole) and isinstance(last, Hole)):
+        if not (type(piece) is Hole and type(last) is Hole):
             merged.append(piece)
             last = piece
     if not merged:
@@ -103,17 +103,29 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
 
 
 def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
-    return (text,) if isinstance(text, str) else text.pieces
+    return text.pieces if isinstance(text, Text) else (text,)
 
 
 def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
-    if isinstance(left, str) and isinstance(right, str) and len(left) + len(right) <= MAX_LENGTH:
+    """``left + right``; only where they meet can pieces melt together."""
+    if type(left) is str and type(right) is str and len(left) + len(right) <= MAX_LENGTH:
         return left + right
-    return text_of((*pieces_of(left), *pieces_of(right)))
+    if not left or not right:
+        return left or right
+    head, tail = pieces_of(left), pieces_of(right)
+    if len(head) + len(tail) > MAX_PARTS or type(head[-1]) is type(tail[0]) or _is_long(left) or _is_long(right):
+        return text_of((*head, *tail))
+    return make_text((*head, *tail))
+
+
+def _is_long(text: TextAtom) -> bool:
+    return type(text) is str and len(text) > MAX_LENGTH
 
 
 def concatenations(operands: Sequence[Sequence[TextAtom]]) -> list[TextAtom]:
     """All texts made of one alternative of each operand; a pattern when there are too many."""
+    if all(len(alternatives) == 1 for alternatives in operands):
+        return [text_of(piece for texts in operands for piece in pieces_of(texts[0]))]
     results: list[TextAtom] = [""]
     for alternatives in operands:
         if len(results) * len(alternatives) > MAX_PRODUCT:
