@@ -53,7 +53,7 @@ def infer_executable(
         return _compiled(package, executable, None, sources, start_of, str(error))
     if not _is_python(path):
         return _compiled(package, executable, None, sources, start_of, f"{path} is a compiled program")
-    from nodl.infer.python_executable import infer_python  # the whole analysis of Python comes with it
+    from nodl.infer.python_executable import infer_python
 
     return InferredExecutable(*infer_python(path, package, executable, prefixes))
 

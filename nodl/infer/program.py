@@ -16,6 +16,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from enclave_launch.boundary.files import read_bytes
+from nodl.infer.cpp.cache.digests import digest, digest_of
+from nodl.infer.kept import installed_in
 from nodl.infer.mangling import mangle
 from nodl.infer.source_text import source_text
 
@@ -70,6 +72,9 @@ class Program:
     def __init__(self, roots: Iterable[str] = (), prefixes: Sequence[str] = ()):
         self.prefixes = tuple(prefixes)  # where packages are installed, with the data that programs ask for
         self.roots = list(dict.fromkeys(os.path.abspath(root) for root in roots))
+        self.asked: dict[
+            tuple[str, str], str
+        ] = {}  # what was asked of the disk, with a digest of what it said
         self._by_path: dict[str, SourceModule] = {}
         self._found: dict[tuple[str, str], str | None] = {}
         self._listings: dict[str, frozenset[str]] = {}
@@ -85,8 +90,25 @@ class Program:
         path = os.path.abspath(path)
         module = self._by_path.get(path)
         if module is None:
+            self.ask("file", path)
             module = self._by_path[path] = _parse(path, name or self.module_name(path))
         return module
+
+    def ask(self, kind: str, what: str) -> str:
+        """A digest of a ``file``'s content or a ``folder``'s names, or where a ``package`` is installed; remembered.
+
+        To be asked before a file is read: what changes in between is then found to have changed.
+        """
+        said = self.asked.get((kind, what))
+        if said is None:
+            if kind == "file":
+                said = digest_of(what)
+            elif kind == "folder":
+                said = digest(sorted(self._listing(what)))
+            else:
+                said = installed_in(what, self.prefixes)
+            self.asked[kind, what] = said
+        return said
 
     def module_name(self, path: str) -> str:
         """``/ws/src/p/p/sub/node.py`` -> ``p.sub.node`` if ``p`` and ``sub`` are Python packages."""
@@ -156,6 +178,7 @@ class Program:
             except OSError:
                 listing = frozenset()
             self._listings[folder] = listing
+            self.ask("folder", folder)
         return listing
 
 

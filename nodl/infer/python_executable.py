@@ -1,4 +1,4 @@
-"""The Python program behind ``lib/<package>/<executable>``, found and analysed.
+"""The Python program behind ``lib/<package>/<executable>``: found, and analysed where no earlier answer holds.
 
 Knows plain scripts, the wrappers that setuptools and pip generate for console scripts (which name an entry point
 directly or through ``entry_points.txt``), and the links that ``colcon build --symlink-install`` leaves.
@@ -12,17 +12,13 @@ import glob
 import os
 import re
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 from enclave_launch.boundary.files import read_text
-from nodl.infer.analysis import start, start_function
-from nodl.infer.coverage import unsettled_places
-from nodl.infer.interpreter.run import Run
+from nodl.infer.kept import KeptAnswer
 from nodl.infer.program import Program
-from nodl.infer.results import interfaces_of
 from nodl.infer.start import LaunchKey
-from nodl.infer.system import without_collector
-from nodl.node_interface import Gap, NodeInterface
-from nodl.source_ref import SourceRef
+from nodl.node_interface import NodeInterface
 
 _SITE_PATTERNS = (
     "lib/python3*/site-packages",
@@ -35,27 +31,34 @@ _LOADS_ENTRY_POINT = re.compile(
 _DEVELOPED = re.compile(r"^__file__ = ['\"](.+)['\"]$", re.MULTILINE)
 
 
+class Target(NamedTuple):
+    """Where a program starts: a script, or ``function`` of ``module``. ``missing``: why it is not its entry point."""
+
+    file: str
+    module: str | None = None
+    function: tuple[str, ...] = ()
+    missing: str = ""
+
+
 def infer_python(
     path: str, package: str, executable: str, prefixes: Sequence[str]
 ) -> tuple[tuple[NodeInterface, ...], str]:
-    """The nodes that the program at ``path`` creates, with its gaps; without any, why none was found."""
+    """The nodes that the program at ``path`` creates, with its gaps; without any, why none was found.
+
+    The answer of an earlier run is taken where nothing that it was made from has changed.
+    """
     finder = _Finder(prefixes)
-    with without_collector():
-        run = finder.run(path, package, executable)
-        interfaces = interfaces_of(run.findings, LaunchKey(package, executable))
-        for gap in unsettled_places(run):
-            run.findings.gap(gap.source, gap.why)
-    if interfaces:
-        return _with_gaps(interfaces, run), ""
-    reasons = "; ".join(f"{source}: {why}" for source, why in run.findings.gaps)
-    return (), f"no node was found in {path}" + (f" ({reasons})" if reasons else "")
+    target = finder.target(path, package, executable)
+    kept = KeptAnswer(finder.program, (path, package, executable, target))
+    known = kept.find()
+    if known is not None:
+        interfaces, why = known
+        return interfaces, why
+    from nodl.infer.python_program import infer_program  # the whole analysis of Python comes with it
 
-
-def _with_gaps(interfaces: list[NodeInterface], run: Run) -> tuple[NodeInterface, ...]:
-    """Gaps that belong to the whole program go to its first node, so that nobody overlooks them."""
-    gaps = tuple(Gap(source, why) for source, why in run.findings.gaps)
-    first = interfaces[0]
-    return (first._replace(gaps=(*first.gaps, *gaps)), *interfaces[1:])
+    answer = infer_program(finder.program, target, path, LaunchKey(package, executable))
+    kept.keep(answer)
+    return answer
 
 
 class _Finder:
@@ -64,35 +67,33 @@ class _Finder:
     def __init__(self, prefixes: Sequence[str]):
         self._sites = [site for prefix in prefixes for site in _sites_of(prefix)]
         folders = (folder for site in self._sites for folder in (site, *_linked_folders(site)))
-        self._program = Program(folders, prefixes)
+        self.program = Program(folders, prefixes)
 
-    def run(self, path: str, package: str, executable: str) -> Run:
+    def target(self, path: str, package: str, executable: str) -> Target:
         text = read_text(path, errors="replace")
         developed = _DEVELOPED.search(text)
         if developed and "exec(" in text and os.path.isfile(developed[1]):
-            return self.run(developed[1], package, executable)
+            return self.target(developed[1], package, executable)
         loaded = _LOADS_ENTRY_POINT.search(text)
         if loaded:
             distribution = re.split(r"[=<>!~ ]", loaded[1])[0]
             target = self._entry_point(distribution, loaded[2]) or self._entry_point(package, executable)
             if target:
-                return self._run_target(target, path)
-        return start(self._program, self._program.load(os.path.realpath(path)))
+                return self._function(target, path)
+        return Target(os.path.realpath(path))
 
-    def _run_target(self, target: str, path: str) -> Run:
+    def _function(self, target: str, path: str) -> Target:
         """``target``: ``package.module:function`` of an entry point."""
         module, _, function = target.partition(":")
-        file = self._program.find(module.strip(), os.path.dirname(path))
+        file = self.program.find(module.strip(), os.path.dirname(path))
         if file is None:
-            run = start(self._program, self._program.load(os.path.realpath(path)))
-            run.findings.gap(SourceRef(path), f"the module {module} of entry point {target} was not found")
-            return run
-        source = self._program.load(os.path.realpath(file), module.strip())
-        return start_function(self._program, source, (function.strip() or "main").split("."))
+            missing = f"the module {module} of entry point {target} was not found"
+            return Target(os.path.realpath(path), missing=missing)
+        return Target(os.path.realpath(file), module.strip(), tuple((function.strip() or "main").split(".")))
 
     def _entry_point(self, distribution: str, name: str) -> str | None:
         wanted = _normalised(distribution)
-        for site in self._program.roots:
+        for site in self.program.roots:
             for folder in glob.glob(os.path.join(glob.escape(site), "*-info")):
                 stem = os.path.basename(folder).rpartition(".")[0]
                 if _normalised(stem.partition("-")[0]) != wanted:

@@ -113,7 +113,12 @@ def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
     if not left or not right:
         return left or right
     head, tail = pieces_of(left), pieces_of(right)
-    if len(head) + len(tail) > MAX_PARTS or type(head[-1]) is type(tail[0]) or _is_long(left) or _is_long(right):
+    if (
+        len(head) + len(tail) > MAX_PARTS
+        or type(head[-1]) is type(tail[0])
+        or _is_long(left)
+        or _is_long(right)
+    ):
         return text_of((*head, *tail))
     return make_text((*head, *tail))
 

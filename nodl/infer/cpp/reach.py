@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_text
 from nodl.infer.cpp.answer import Answer
-from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages, read_source_package
 from nodl.infer.start import Start
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.answering import Answering
+    from nodl.infer.cpp.reading.project import SourcePackage, Workspace
 
 _HOME = re.compile(r"^CMAKE_HOME_DIRECTORY:\w+=(.+)$", re.MULTILINE)
 
@@ -48,6 +48,8 @@ class SourcesInReach:
 
     @cached_property
     def _workspace(self) -> Workspace:
+        from nodl.infer.cpp.reading.project import Workspace, find_packages  # nodes in Python do without
+
         packages = find_packages(self._folders)
         for space in self._workspaces:
             for name, package in find_packages([str(space / "src")]).items():
@@ -79,6 +81,8 @@ class SourcesInReach:
 
 def _built(folder: Path) -> Iterator[SourcePackage]:
     """The source folders that a build remembers."""
+    from nodl.infer.cpp.reading.project import read_source_package
+
     for cache in sorted(folder.glob("*/CMakeCache.txt")):
         try:
             match = _HOME.search(read_text(cache, errors="replace"))

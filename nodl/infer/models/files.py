@@ -28,6 +28,7 @@ def _directory(find: Callable[..., str], as_path: bool) -> Model:
         package = sole(call.args.at(0, "package_name"))
         if not isinstance(package, str):
             return unknown("the folder of a package whose name is not known")
+        run.program.ask("package", package)
         try:
             found = find(package, run.program.prefixes)
         except (PackageNotFoundError, ValueError):
@@ -102,6 +103,7 @@ def _known_place(run: Run, path: object) -> str | None:
 
 def _read(run: Run, place: str) -> bytes | None:
     """The file's text; ``None``: not there, too large, no regular file, or in another encoding than UTF-8."""
+    run.program.ask("file", os.path.abspath(place))
     try:
         data = read_bytes(place, MAX_FILE_BYTES)
         data.decode()

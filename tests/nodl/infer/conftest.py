@@ -13,6 +13,14 @@ from nodl.infer import InferredSystem, infer_paths
 Infer = Callable[..., InferredSystem]
 
 
+@pytest.fixture(autouse=True)
+def kept_answers(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The folder of kept answers, one for all tests; not that of whoever runs them."""
+    folder = tmp_path_factory.getbasetemp() / "kept-answers"
+    monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
+    return folder
+
+
 @pytest.fixture
 def infer(tmp_path: Path) -> Infer:
     """``infer(main, **{"helper.py": ...})``: writes the files into one folder and infers from it."""

@@ -119,6 +119,7 @@ def judge_launched(program: Program, prefix: Path) -> Verdict:
     file.write_text("#!/usr/bin/python3\n" + program.text, encoding="utf-8")
     file.chmod(0o755)
     inferred = infer_executable("demo", "program", prefixes=[str(prefix)])
+    assert infer_executable("demo", "program", prefixes=[str(prefix)]) == inferred, "kept from the first time"
     refused = () if inferred.interfaces else (Gap(SourceRef(str(file)), inferred.why),)
     return compare(program, file, InferredSystem(inferred.interfaces, refused, ()))
 

@@ -83,8 +83,9 @@ def _checksum(content: bytes) -> bytes:
 
 def _make_room(path: str) -> None:
     """The oldest half goes when there are too many."""
+    if len(os.listdir(path)) <= _MOST_ENTRIES:
+        return
     with os.scandir(path) as listed:
         entries = [(each.stat(follow_symlinks=False).st_mtime, each.path) for each in listed]
-    if len(entries) > _MOST_ENTRIES:
-        for _, old in sorted(entries)[: len(entries) // 2]:
-            os.unlink(old)
+    for _, old in sorted(entries)[: len(entries) // 2]:
+        os.unlink(old)

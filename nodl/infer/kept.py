@@ -1,0 +1,87 @@
+"""Answers about Python programs, kept by content between runs: an analysis is a function of what it asked of the disk.
+
+An answer holds while our own code, the interpreter and everything that the analysis asked are as they were: the
+content of each file, the names in each folder where it looked for modules, where packages are installed. Reads and
+writes files.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from nodl.ament_index import PackageNotFoundError, package_prefix
+from nodl.infer.cpp.cache.codec import decoded, encoded
+from nodl.infer.cpp.cache.digests import digest, digest_of
+from nodl.infer.cpp.cache.folder import CacheFolder
+
+if TYPE_CHECKING:
+    from nodl.infer.program import Program
+
+VARIANTS = 4
+"""Answers to one question, after different edits, of which the newest are kept."""
+
+
+def installed_in(package: str, prefixes: Sequence[str]) -> str:
+    """The prefix of a package; the empty string where it is not installed."""
+    try:
+        return package_prefix(package, prefixes)
+    except (PackageNotFoundError, ValueError):
+        return ""
+
+
+_OWN_SOURCES = (
+    "*.py", "dependence/*.py", "infer/*.py", "infer/interpreter/*.py", "infer/models/*.py", "infer/cpp/*.py",
+    "infer/cpp/cache/*.py",
+)  # fmt: skip
+
+
+def own_sources() -> list[Path]:
+    """Our own code that answers come from."""
+    root = Path(__file__).parents[1]
+    return sorted(path for pattern in _OWN_SOURCES for path in root.glob(pattern))
+
+
+@lru_cache(maxsize=1)
+def _analyser() -> str:
+    """Of our own code, and of the Python that parses and computes."""
+    return digest(sys.version, [(path.name, digest_of(str(path))) for path in own_sources()])
+
+
+class KeptAnswer:
+    """The answer to one ``question`` (whose ``repr`` says all of it) about ``program``."""
+
+    def __init__(self, program: Program, question: object) -> None:
+        self._program = program
+        self._folder = CacheFolder()
+        self._question = question
+
+    @cached_property
+    def _key(self) -> str:
+        return digest("python", _analyser(), self._program.prefixes, self._program.roots, self._question)
+
+    def find(self) -> Any:
+        """What was kept; ``None``: nothing, or the disk would answer otherwise now."""
+        for asked, answer in self._variants():
+            if all(self._program.ask(kind, what) == said for kind, what, said in asked):
+                return answer
+        return None
+
+    def keep(self, answer: object) -> None:
+        asked = [(kind, what, said) for (kind, what), said in self._program.asked.items()]
+        try:
+            content = encoded([(asked, answer), *self._variants()][:VARIANTS])
+            self._folder.write(self._key, json.dumps(content).encode())
+        except (TypeError, ValueError, RecursionError):
+            return  # what cannot be written is not kept
+
+    def _variants(self) -> list[Any]:
+        content = self._folder.read(self._key)
+        try:
+            return list(decoded(json.loads(content))) if content is not None else []
+        except (ValueError, RecursionError):
+            return []

@@ -1,0 +1,46 @@
+"""One Python program, analysed from where it starts."""
+
+from __future__ import annotations
+
+from nodl.infer.analysis import start, start_function
+from nodl.infer.coverage import unsettled_places
+from nodl.infer.interpreter.run import Run
+from nodl.infer.program import Program
+from nodl.infer.python_executable import Target
+from nodl.infer.results import interfaces_of
+from nodl.infer.start import LaunchKey
+from nodl.infer.system import without_collector
+from nodl.node_interface import Gap, NodeInterface
+from nodl.source_ref import SourceRef
+
+
+def infer_program(
+    program: Program, target: Target, path: str, origin: LaunchKey
+) -> tuple[tuple[NodeInterface, ...], str]:
+    """The nodes that the program behind ``path`` creates, with its gaps; without any, why none was found."""
+    with without_collector():
+        run = _run(program, target, path)
+        interfaces = interfaces_of(run.findings, origin)
+        for gap in unsettled_places(run):
+            run.findings.gap(gap.source, gap.why)
+    if interfaces:
+        return _with_gaps(interfaces, run), ""
+    reasons = "; ".join(f"{source}: {why}" for source, why in run.findings.gaps)
+    return (), f"no node was found in {path}" + (f" ({reasons})" if reasons else "")
+
+
+def _run(program: Program, target: Target, path: str) -> Run:
+    source = program.load(target.file, target.module)
+    if target.function:
+        return start_function(program, source, list(target.function))
+    run = start(program, source)
+    if target.missing:
+        run.findings.gap(SourceRef(path), target.missing)
+    return run
+
+
+def _with_gaps(interfaces: list[NodeInterface], run: Run) -> tuple[NodeInterface, ...]:
+    """Gaps that belong to the whole program go to its first node, so that nobody overlooks them."""
+    gaps = tuple(Gap(source, why) for source, why in run.findings.gaps)
+    first = interfaces[0]
+    return (first._replace(gaps=(*first.gaps, *gaps)), *interfaces[1:])

@@ -1,0 +1,155 @@
+"""Answers about Python programs are kept, and hold only while everything that they were made from is the same."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from nodl.infer import infer_executable, python_program
+from nodl.infer.kept import own_sources
+
+PROGRAM = """\
+#!/usr/bin/python3
+import json
+import rclpy
+from std_msgs.msg import String
+from ament_index_python.packages import get_package_share_directory
+import names
+rclpy.init()
+node = rclpy.create_node("n")
+with open(get_package_share_directory("data") + "/topics.json") as file:
+    for topic in json.load(file):
+        node.create_publisher(String, topic, 1)
+node.create_publisher(String, names.FIRST, 1)
+"""
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    """A program with a module beside it, which reads a file of another package."""
+    prefix = tmp_path / "install"
+    for package in ("demo", "data"):
+        _install(prefix, package)
+    (prefix / "lib/demo").mkdir(parents=True)
+    (prefix / "lib/demo/program").write_text(PROGRAM)
+    (prefix / "lib/demo/program").chmod(0o755)
+    (prefix / "lib/demo/names.py").write_text("FIRST = 'first'\n")
+    (prefix / "share/data/topics.json").write_text('["second"]')
+    return prefix
+
+
+def _install(prefix: Path, package: str) -> None:
+    index = prefix / "share/ament_index/resource_index/packages"
+    index.mkdir(parents=True, exist_ok=True)
+    (index / package).touch()
+    (prefix / "share" / package).mkdir(exist_ok=True)
+
+
+def _names(*prefixes: Path) -> list[str]:
+    found = infer_executable("demo", "program", prefixes=[str(prefix) for prefix in prefixes])
+    return sorted(str(endpoint.name) for node in found.interfaces for endpoint in node.endpoints)
+
+
+@pytest.fixture
+def analyses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The programs that were analysed, rather than taken from what was kept."""
+    seen: list[str] = []
+    really = python_program.infer_program
+
+    def infer_program(*given: object) -> object:
+        seen.append(str(given[2]))
+        return really(*given)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(python_program, "infer_program", infer_program)
+    return seen
+
+
+def test_the_second_launch_analyses_nothing(prefix: Path, analyses: list[str]) -> None:
+    assert _names(prefix) == ["first", "second"]
+    assert _names(prefix) == ["first", "second"]
+    assert len(analyses) == 1
+
+
+CHANGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
+    "the program": (
+        lambda prefix: (prefix / "lib/demo/program").write_text(
+            PROGRAM + "node.create_publisher(String, 'third', 1)\n"
+        ),
+        ["first", "second", "third"],
+    ),
+    "a module that it imports": (
+        lambda prefix: (prefix / "lib/demo/names.py").write_text("FIRST = 'other'\n"),
+        ["other", "second"],
+    ),
+    "a file that it reads": (
+        lambda prefix: (prefix / "share/data/topics.json").write_text('["fourth"]'),
+        ["first", "fourth"],
+    ),
+    "a library that was not there and now is": (
+        lambda prefix: (prefix / "lib/demo/json.py").write_text(
+            "def load(file):\n    return ['from the module']\n"
+        ),
+        ["first", "from the module"],
+    ),
+}
+
+
+@pytest.mark.parametrize("what", CHANGES)
+def test_a_change_is_seen(what: str, prefix: Path) -> None:
+    change, after = CHANGES[what]
+    assert _names(prefix) == ["first", "second"]
+    change(prefix)
+    assert _names(prefix) == after
+
+
+def test_a_package_in_a_prefix_that_comes_first_is_seen(prefix: Path, tmp_path: Path) -> None:
+    overlay = tmp_path / "overlay"
+    _install(overlay, "other")
+    assert _names(overlay, prefix) == ["first", "second"]
+    _install(overlay, "data")
+    (overlay / "share/data/topics.json").write_text('["overlaid"]')
+    assert _names(overlay, prefix) == ["first", "overlaid"]
+
+
+def test_what_was_changed_back_is_known_again(prefix: Path, analyses: list[str]) -> None:
+    topics = prefix / "share/data/topics.json"
+    for content in ('["second"]', '["fourth"]', '["second"]', '["fourth"]'):
+        topics.write_text(content)
+        _names(prefix)
+    assert len(analyses) == 2
+
+
+def test_an_answer_ends_with_any_change_of_our_own_code() -> None:
+    script = (
+        "import sys, nodl.infer.python_program, nodl.infer.models.named_tuples\n"
+        "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('nodl.')), sep='\\n')"
+    )
+    loaded = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    ).stdout.split()
+    ours = {str(path) for path in own_sources()}
+    assert len(loaded) > 60
+    assert [path for path in loaded if path not in ours] == []
+
+
+def test_a_damaged_entry_is_not_believed(prefix: Path, kept_answers: Path, analyses: list[str]) -> None:
+    _names(prefix)
+    (entry,) = (
+        each for each in kept_answers.rglob("*") if each.is_file() and b"topics.json" in each.read_bytes()
+        and str(prefix).encode() in each.read_bytes()
+    )  # fmt: skip
+    entry.write_bytes(entry.read_bytes().replace(b"second", b"stolen"))
+    assert _names(prefix) == ["first", "second"]
+    assert len(analyses) == 2
+
+
+def test_without_a_folder_every_launch_analyses(
+    prefix: Path, analyses: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    assert _names(prefix) == _names(prefix)
+    assert len(analyses) == 2
