@@ -31,7 +31,7 @@ _LOADS_ENTRY_POINT = re.compile(
 _DEVELOPED = re.compile(r"^__file__ = ['\"](.+)['\"]$", re.MULTILINE)
 
 
-class Target(NamedTuple):
+class ProgramTarget(NamedTuple):
     """Where a program starts: a script, or ``function`` of ``module``. ``missing``: why it is not its entry point."""
 
     file: str
@@ -69,7 +69,7 @@ class _Finder:
         folders = (folder for site in self._sites for folder in (site, *_linked_folders(site)))
         self.program = Program(folders, prefixes)
 
-    def target(self, path: str, package: str, executable: str) -> Target:
+    def target(self, path: str, package: str, executable: str) -> ProgramTarget:
         text = read_text(path, errors="replace")
         developed = _DEVELOPED.search(text)
         if developed and "exec(" in text and os.path.isfile(developed[1]):
@@ -80,16 +80,18 @@ class _Finder:
             target = self._entry_point(distribution, loaded[2]) or self._entry_point(package, executable)
             if target:
                 return self._function(target, path)
-        return Target(os.path.realpath(path))
+        return ProgramTarget(os.path.realpath(path))
 
-    def _function(self, target: str, path: str) -> Target:
+    def _function(self, target: str, path: str) -> ProgramTarget:
         """``target``: ``package.module:function`` of an entry point."""
         module, _, function = target.partition(":")
         file = self.program.find(module.strip(), os.path.dirname(path))
         if file is None:
             missing = f"the module {module} of entry point {target} was not found"
-            return Target(os.path.realpath(path), missing=missing)
-        return Target(os.path.realpath(file), module.strip(), tuple((function.strip() or "main").split(".")))
+            return ProgramTarget(os.path.realpath(path), missing=missing)
+        return ProgramTarget(
+            os.path.realpath(file), module.strip(), tuple((function.strip() or "main").split("."))
+        )
 
     def _entry_point(self, distribution: str, name: str) -> str | None:
         wanted = _normalised(distribution)

@@ -6,7 +6,7 @@ from nodl.infer.analysis import start, start_function
 from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.program import Program
-from nodl.infer.python_executable import Target
+from nodl.infer.python_executable import ProgramTarget
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import LaunchKey
 from nodl.infer.system import without_collector
@@ -15,7 +15,7 @@ from nodl.source_ref import SourceRef
 
 
 def infer_program(
-    program: Program, target: Target, path: str, origin: LaunchKey
+    program: Program, target: ProgramTarget, path: str, origin: LaunchKey
 ) -> tuple[tuple[NodeInterface, ...], str]:
     """The nodes that the program behind ``path`` creates, with its gaps; without any, why none was found."""
     with without_collector():
@@ -29,7 +29,7 @@ def infer_program(
     return (), f"no node was found in {path}" + (f" ({reasons})" if reasons else "")
 
 
-def _run(program: Program, target: Target, path: str) -> Run:
+def _run(program: Program, target: ProgramTarget, path: str) -> Run:
     source = program.load(target.file, target.module)
     if target.function:
         return start_function(program, source, list(target.function))
