@@ -2,7 +2,7 @@
 
     python -m bench.watch [STARTS [PROCESSES]]
 
-STARTS launches of 2 to 50 talkers, every other one secured, two at a time in domains of their own, each with
+STARTS launches of 2 to 50 talkers, every other one secured, three at a time in domains of their own, each with
 ``--watch`` and up for longer than the watch waits before it tells what is missing: every finding would be a false
 alarm. Then one launch of PROCESSES talkers, unsecured: processor time of the watch's observer and of the supervisor
 from start to steady, and for each minute of the steady state, with and without ``--watch``.
@@ -30,8 +30,9 @@ ROOT = Path(__file__).resolve().parent.parent
 DEMO_WS = ROOT / "fixtures" / "demo_ws"
 DOMAIN = "73"
 SIZES = (2, 5, 10, 20, 50)  # processes of a launch
-_AT_ONCE = 2
+_AT_ONCE = 3
 _LONGER = 15.0  # seconds
+_DOMAINS = 28  # up to 100: beyond, ports meet those that Linux gives out
 STEADY = 30.0  # seconds
 LONGEST = 240.0
 TICKS = os.sysconf("SC_CLK_TCK")
@@ -73,7 +74,7 @@ def clean_start(number: int, processes: int, folder: Path) -> CleanStart:
     secure = ["--secure", "--keystore", str(place / "ks")] if number % 2 else []
     words = ["--watch", "--watch-report", str(report), *secure, str(launch_file(place, processes))]
     began, load = time.monotonic(), os.getloadavg()[0]
-    with launched(words, shown, str(int(DOMAIN) + number % _AT_ONCE)) as launch:
+    with launched(words, shown, str(int(DOMAIN) + number % _DOMAINS)) as launch:
         up = wait_until_up(shown, processes)
         seconds = time.monotonic() - began
         time.sleep(SettlingTimes().absence + _LONGER)
