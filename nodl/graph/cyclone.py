@@ -88,8 +88,10 @@ class CycloneObserver:
     def look(self) -> int:
         """Gives how many changes there have been in all."""
         self._ports = UdpPorts()
-        for reader, read in self._readers:
-            for sample in reader.take(N=_MOST_AT_ONCE):
+        # Endpoints are fetched before participants, so that the participant of each is known when it is read.
+        fetched = [(reader.take(N=_MOST_AT_ONCE), read) for reader, read in reversed(self._readers)]
+        for samples, read in reversed(fetched):
+            for sample in samples:
                 self._take_in(sample, read)
         for message in self._lists.take(N=_MOST_AT_ONCE):
             listed = decode(getattr(message, "raw", b""))
