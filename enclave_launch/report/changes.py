@@ -43,6 +43,10 @@ def changes_document(changed: Changes) -> dict[str, object]:
         "moved": [move._asdict() for move in changed.moved],
         "flows_added": [list(flow) for flow in changed.flows_added],
         "flows_removed": [list(flow) for flow in changed.flows_removed],
+        "middlewares": [
+            {"enclave": move.node, "before": move.before, "after": move.after} for move in changed.middlewares
+        ],
+        "files": [each._asdict() for each in changed.files],
     }
 
 
@@ -52,10 +56,14 @@ def _lines(changed: Changes) -> Iterator[str]:
     yield from (
         f"! node {move.node} moves from enclave {move.before} to {move.after}" for move in changed.moved
     )
+    yield from (
+        f"! enclave {move.node} moves from {move.before} to {move.after}" for move in changed.middlewares
+    )
     for change in changed.enclaves:
         yield from _enclave(change)
     yield from (f"+ flow {source} -> {target}" for source, target in changed.flows_added)
     yield from (f"- flow {source} -> {target}" for source, target in changed.flows_removed)
+    yield from (f"{'+' if each.more else '-'} {each.file}: {each.text}" for each in changed.files)
 
 
 def _enclave(change: EnclaveChange) -> Iterator[str]:

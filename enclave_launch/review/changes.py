@@ -27,15 +27,24 @@ class EnclaveChange(NamedTuple):
 
 
 class Move(NamedTuple):
-    """A node that runs in another enclave than before."""
+    """A node that runs in another enclave than before, or an enclave on another middleware."""
 
     node: str
     before: str
     after: str
 
 
+class FileChange(NamedTuple):
+    """What a configuration of Zenoh has otherwise; ``more``: it lets somebody do more, or protects less."""
+
+    file: str
+    more: bool
+    text: str
+
+
 class Changes(NamedTuple):
-    """Everything sorted. ``flows_*``: pairs of enclaves of which the first can influence the second directly."""
+    """Everything sorted. ``flows_*``: pairs of enclaves of which the first can influence the second directly;
+    ``middlewares``: enclaves that moved from DDS to Zenoh or back; ``files``: of two keystores, for Zenoh."""
 
     enclaves: tuple[EnclaveChange, ...]
     nodes_added: tuple[str, ...]
@@ -43,11 +52,13 @@ class Changes(NamedTuple):
     moved: tuple[Move, ...]
     flows_added: tuple[tuple[str, str], ...]
     flows_removed: tuple[tuple[str, str], ...]
+    middlewares: tuple[Move, ...] = ()
+    files: tuple[FileChange, ...] = ()
 
     @property
     def rights_grew(self) -> bool:
         """Some enclave may do something that it could not do before; a new enclave is all new rights."""
-        return any(change.added for change in self.enclaves)
+        return any(change.added for change in self.enclaves) or any(change.more for change in self.files)
 
     @property
     def is_empty(self) -> bool:
@@ -70,6 +81,11 @@ def changes(before: PlanDocument, after: PlanDocument) -> Changes:
         ),
         tuple(sorted(edges_after - edges_before)),
         tuple(sorted(edges_before - edges_after)),
+        tuple(
+            Move(path, *(("Zenoh", "DDS") if path in before.on_zenoh else ("DDS", "Zenoh")))
+            for path in sorted(before.on_zenoh ^ after.on_zenoh)
+            if path in before.enclaves and path in after.enclaves
+        ),
     )
 
 

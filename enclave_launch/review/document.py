@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
+from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 
 Operation = Literal[
@@ -75,11 +76,13 @@ class Told(NamedTuple):
 
 
 class PlanDocument(NamedTuple):
-    """``enclaves``: path -> all that DDS lets it do, the union of its nodes."""
+    """``enclaves``: path -> all that its middleware lets it do, the union of its nodes; ``on_zenoh``: those of which a
+    process is on Zenoh."""
 
     enclaves: Mapping[str, frozenset[GrantedName]]
     nodes: tuple[NodeView, ...]
     told: tuple[Told, ...]
+    on_zenoh: frozenset[str] = frozenset()
 
     def nodes_of(self, enclave: str) -> tuple[NodeView, ...]:
         return tuple(node for node in self.nodes if node.enclave == enclave)
@@ -99,6 +102,11 @@ def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
         {path: grants_of(lists) for path, lists in document["enclaves"].items()},
         tuple(_nodes(document)),
         tuple(Told(**told) for told in document.get("diagnostics", ())),
+        frozenset(
+            process["enclave"]
+            for process in document.get("processes", ())
+            if process["enclave"] and process.get("middleware") == ZENOH
+        ),
     )
 
 

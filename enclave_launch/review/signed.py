@@ -43,6 +43,8 @@ def plan_as_signed(plan: PlanDocument) -> PlanDocument:
     return plan._replace(enclaves={path: as_signed(grants) for path, grants in plan.enclaves.items()})
 
 
-def keystore_as_plan(signed: Mapping[str, frozenset[GrantedName]], plan: PlanDocument) -> PlanDocument:
+def keystore_as_plan(
+    signed: Mapping[str, frozenset[GrantedName]], plan: PlanDocument, on_zenoh: frozenset[str]
+) -> PlanDocument:
     """The keystore's enclaves with the nodes that ``plan`` has in them: a keystore knows no nodes."""
-    return PlanDocument(signed, tuple(node for node in plan.nodes if node.enclave in signed), ())
+    return PlanDocument(signed, tuple(node for node in plan.nodes if node.enclave in signed), (), on_zenoh)

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import datetime
 from itertools import islice
+from pathlib import Path
 
 from keystore.disk import layout, safe_files
+from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.disk.zenoh_files import (
     has_router,
@@ -30,6 +32,13 @@ from keystore.verification.finding import Finding, Severity
 
 _TOLD = 40
 """Differences of one file, beyond which only their number is told."""
+
+
+def check_zenoh_files(keystore: Path | str, now: datetime) -> tuple[Finding, ...]:
+    """``check_zenoh`` by itself. Raises NotAKeystoreError where there is nothing to check."""
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    return tuple(check_zenoh(view, now))
 
 
 def check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, Told
 from enclave_launch.review.signed import as_signed
+from keystore.verification.finding import Finding
 
 _NAMED = 4
 _PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
@@ -27,25 +28,39 @@ def against_keystore(
     plan: PlanDocument, signed: Mapping[str, frozenset[GrantedName]], endings: Iterable[Ending]
 ) -> list[Told]:
     """``endings``: what is due, of the whole keystore; what belongs to enclaves of other plans is left out."""
-    found = [told for enclave in sorted(plan.enclaves) for told in _enclave(plan, enclave, signed)]
+    found = [
+        told for enclave in sorted(plan.enclaves) for told in _enclave(plan, enclave, signed, "keystore")
+    ]
     return [*found, *_expiring(plan, endings)]
 
 
+def against_router(
+    plan: PlanDocument, enforced: Mapping[str, frozenset[GrantedName]], findings: Iterable[Finding]
+) -> list[Told]:
+    """The same for enclaves on Zenoh and the configuration of the keystore's router; ``findings``: of the files for
+    Zenoh, which all that are on Zenoh share."""
+    found = [
+        told
+        for enclave in sorted(plan.on_zenoh & plan.enclaves.keys())
+        for told in _enclave(plan, enclave, enforced, "keystore's Zenoh router")
+    ]
+    for one in findings:
+        told = finding("keystore-zenoh", one.place, f"{one.place}: {one.message}", one.repair)
+        found.append(told._replace(severity="error") if one.severity.fails else told)
+    return found
+
+
 def _enclave(
-    plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[GrantedName]]
+    plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[GrantedName]], who: str
 ) -> Iterator[Told]:
     if enclave not in signed:
-        yield finding(
-            "keystore-enclave-missing",
-            enclave,
-            f"the keystore has no permissions for enclave {enclave}",
-            _PROVISION,
-        )
+        text = f"the {who} has no permissions for enclave {enclave}"
+        yield finding("keystore-enclave-missing", enclave, text, _PROVISION)
         return
     wanted = as_signed(plan.enclaves[enclave])
     for code, grants, words in (
-        ("keystore-grants-more", signed[enclave] - wanted, "beyond the plan the keystore lets"),
-        ("keystore-grants-less", wanted - signed[enclave], "the keystore does not let"),
+        ("keystore-grants-more", signed[enclave] - wanted, f"beyond the plan the {who} lets"),
+        ("keystore-grants-less", wanted - signed[enclave], f"the {who} does not let"),
     ):
         if grants:
             text = f"{words} enclave {enclave} {_some(sorted(grants))}"

@@ -27,6 +27,7 @@ RULES: Mapping[str, str] = {
     "keystore-enclave-missing": "The keystore lacks an enclave of the plan.",
     "keystore-grants-more": "The keystore permits an enclave more than the plan asks for.",
     "keystore-grants-less": "The keystore permits an enclave less than the plan asks for.",
+    "keystore-zenoh": "A file for Zenoh in the keystore is not what follows from what is signed.",
     "keystore-expires": "Something that this plan needs of the keystore ends soon, or has ended.",
 }
 

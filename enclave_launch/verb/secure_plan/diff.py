@@ -5,6 +5,7 @@
   secure-plan diff main: PACKAGE LAUNCH_FILE                 the same launch in a revision of its git repository
   secure-plan diff v1.0:launch/robot.launch.xml launch/robot.launch.xml
   secure-plan diff KEYSTORE PACKAGE LAUNCH_FILE              what a keystore has signed, and what the plan asks for
+  secure-plan diff KEYSTORE OTHER_KEYSTORE                   what two keystores let each enclave do
 
 Of another revision everything is taken that git has; packages that are installed elsewhere are taken as they are now.
 
@@ -22,7 +23,10 @@ from enclave_launch.boundary.terminal import json_text
 from enclave_launch.verb.secure_plan.plans import WORDS, add_resolving_options, read_plan
 
 if TYPE_CHECKING:
-    from enclave_launch.review.document import PlanDocument
+    from collections.abc import Iterator, Mapping
+
+    from enclave_launch.review.changes import FileChange
+    from enclave_launch.review.document import GrantedName, PlanDocument
 
 BEFORE = "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"
 
@@ -40,7 +44,7 @@ def run(options: argparse.Namespace) -> int:
     from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
     from enclave_launch.review.changes import changes
 
-    changed = changes(*_both(options))
+    changed = changes(*_both(options))._replace(files=_files(options))
     if options.format == "json":
         sys.stdout.write(json_text(changes_document(changed), indent=2) + "\n")
     else:
@@ -52,6 +56,8 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument]:
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.verb.secure_plan import revisions
 
+    if _two_keystores(options):
+        return _keystore(options.before), _keystore(options.words[0])
     after = plan_from_document(read_plan(options.words, options))
     if os.path.isdir(options.before):
         return _keystore_and(after, options.before)
@@ -63,7 +69,45 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument]:
 def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:
     """Enclaves of other launches in the keystore are none of this plan's business."""
     from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
-    from enclave_launch.verb.secure_plan.keystores import signed_grants
 
-    signed = {path: grants for path, grants in signed_grants(keystore).items() if path in plan.enclaves}
-    return keystore_as_plan(signed, plan), plan_as_signed(plan)
+    before, wanted = _keystore(keystore), plan_as_signed(plan)
+    signed = {path: grants for path, grants in before.enclaves.items() if path in plan.enclaves}
+    if plan.on_zenoh:
+        signed.update(_enforced(signed, wanted, keystore))
+    return keystore_as_plan(signed, plan, before.on_zenoh), wanted
+
+
+def _enforced(
+    signed: Mapping[str, frozenset[GrantedName]], wanted: PlanDocument, keystore: str
+) -> Iterator[tuple[str, frozenset[GrantedName]]]:
+    """Of enclaves on Zenoh: what is signed and what the router's file says have to be as planned, both."""
+    from enclave_launch.verb.secure_plan.keystores import enforced_grants
+
+    enforced = enforced_grants(keystore)
+    for path in wanted.on_zenoh & signed.keys():
+        one, other = signed[path], enforced.get(path, frozenset())
+        yield path, (one & other) | ((one | other) - wanted.enclaves[path])
+
+
+def _two_keystores(options: argparse.Namespace) -> bool:
+    return len(options.words) == 1 and os.path.isdir(options.before) and os.path.isdir(options.words[0])
+
+
+def _keystore(keystore: str) -> PlanDocument:
+    from enclave_launch.review.document import PlanDocument
+    from enclave_launch.verb.secure_plan.keystores import enforced_grants, signed_grants
+
+    return PlanDocument(signed_grants(keystore), (), (), frozenset(enforced_grants(keystore)))
+
+
+def _files(options: argparse.Namespace) -> tuple[FileChange, ...]:
+    """Of two keystores: the files for Zenoh, which hold more than names (types, domains, protections)."""
+    if not _two_keystores(options):
+        return ()
+    from enclave_launch.review.changes import FileChange
+    from enclave_launch.verb.secure_plan.keystores import keystore_errors
+    from keystore.steps.enforced import files_changed
+
+    with keystore_errors():
+        found = files_changed(options.before, options.words[0])
+    return tuple(FileChange(file, one.more, f"{one.who} {one.text}".strip()) for file, one in found)

@@ -7,7 +7,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN, endings, signed_grants
+from enclave_launch.verb.secure_plan.keystores import (
+    DEFAULT_MARGIN,
+    endings,
+    enforced_grants,
+    signed_grants,
+    zenoh_findings,
+)
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -43,12 +49,14 @@ def judged(
 def _of_keystore(
     document: Mapping[str, Any], keystore: Path | str, within: str, now: datetime | None
 ) -> list[Told]:
-    from enclave_launch.review.checks.keystore import against_keystore
+    from enclave_launch.review.checks.keystore import against_keystore, against_router
     from enclave_launch.review.document import plan_from_document
 
-    return against_keystore(
-        plan_from_document(document), signed_grants(keystore), endings(keystore, within, now)
-    )
+    plan = plan_from_document(document)
+    found = against_keystore(plan, signed_grants(keystore), endings(keystore, within, now))
+    if plan.on_zenoh:
+        found += against_router(plan, enforced_grants(keystore), zenoh_findings(keystore, now))
+    return found
 
 
 def expectations(file: Path | None) -> Expectations:

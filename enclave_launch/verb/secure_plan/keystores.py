@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
     from enclave_launch.review.checks.keystore import Ending
     from enclave_launch.review.document import GrantedName
+    from keystore.verification.finding import Finding
 
 DEFAULT_MARGIN = "30d"
 
@@ -35,6 +36,24 @@ def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
 
     with keystore_errors():
         return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}
+
+
+def enforced_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
+    """Enclave -> what the configuration of the keystore's Zenoh router allows; empty without one."""
+    from enclave_launch.review.signed import grants_of_rules
+    from keystore.steps.enforced import enforced
+
+    with keystore_errors():
+        return {enclave: grants_of_rules(rules) for enclave, rules in enforced(keystore).items()}
+
+
+def zenoh_findings(keystore: Path | str, now: datetime | None = None) -> tuple[Finding, ...]:
+    """What ``secure-keystore verify`` finds in the files for Zenoh."""
+    from keystore.formats.validity import utc_now
+    from keystore.verification.zenoh import check_zenoh_files
+
+    with keystore_errors():
+        return check_zenoh_files(keystore, now or utc_now())
 
 
 def endings(

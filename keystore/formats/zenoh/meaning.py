@@ -117,7 +117,8 @@ def _name_and_type(chunks: list[str]) -> tuple[str, str]:
 
 
 def _ros_name(expression: str) -> str:
-    return "/" + re.sub(r"(?:\*\*?|\$\*)(?:/(?:\*\*?|\$\*)(?=/|\Z))*", "*", expression)
+    whole = expression.replace("$*/**/$*", "*")
+    return "/" + re.sub(r"(?:\*\*?|\$\*)(?:/(?:\*\*?|\$\*)(?=/|\Z))*", "*", whole)
 
 
 def _is_service(ros_type: str) -> bool:

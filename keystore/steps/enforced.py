@@ -1,0 +1,79 @@
+"""What a keystore's Zenoh router is told to let each enclave do, in ROS terms: ``granted`` for the other middleware.
+
+As the router reads its file, whether or not that follows from what is signed (``verify`` compares the two). Reads only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from keystore.disk import layout, safe_files
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
+from keystore.disk.zenoh_files import session_file, zenoh_enclaves
+from keystore.formats.permissions_names import add_dds_topics, ros_rules
+from keystore.formats.policy import Operation, Rule
+from keystore.formats.zenoh.comparison import (
+    EVERYBODY,
+    MessagePermission,
+    ZenohConfiguration,
+    ZenohDifference,
+    differences,
+    read_configuration,
+)
+from keystore.formats.zenoh.meaning import meaning
+
+_DECIDES = {
+    "put": Operation.PUBLISH,
+    "declare_subscriber": Operation.SUBSCRIBE,
+    "query": Operation.REQUEST,
+    "declare_queryable": Operation.REPLY,
+}
+"""Of an enclave's own messages those without which it can do nothing."""
+
+
+def enforced(keystore: Path | str) -> dict[str, frozenset[Rule]]:
+    """Enclave -> what the router's file lets it do, each enclave that has rules; empty without such a file.
+
+    Raises NotAKeystoreError, and InvalidInputError for a file that cannot be read.
+    """
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    read = _router(view)
+    everybody = read.admitted.get(EVERYBODY, frozenset())
+    return {
+        read.enclaves[name]: _rules(permissions | everybody)
+        for name, permissions in read.admitted.items()
+        if name != EVERYBODY
+    }
+
+
+def files_changed(before: Path | str, after: Path | str) -> list[tuple[str, ZenohDifference]]:
+    """File -> difference, of the router and of the enclaves that are on Zenoh in both keystores."""
+    one, other = (KeystoreView(resolve_root(keystore)) for keystore in (before, after))
+    found = [(layout.ZENOH_ROUTER, each) for each in differences(_router(one), _router(other))]
+    for enclave in sorted({*zenoh_enclaves(one)} & {*zenoh_enclaves(other)}):
+        file = session_file(enclave)
+        found += [(file, each) for each in differences(_read(one, file), _read(other, file))]
+    return found
+
+
+def _router(view: KeystoreView) -> ZenohConfiguration:
+    return _read(view, layout.ZENOH_ROUTER)
+
+
+def _read(view: KeystoreView, file: str) -> ZenohConfiguration:
+    """Of any place: where a keystore lies is no difference."""
+    text = safe_files.read_if_there(view.root, file) or b"{}"
+    return read_configuration(text.replace(f'"{view.root}/'.encode(), b'"KEYSTORE/'), file)
+
+
+def _rules(permissions: Iterable[MessagePermission]) -> frozenset[Rule]:
+    publish: set[str] = set()
+    subscribe: set[str] = set()
+    for one in permissions:
+        about = meaning(one.flow, one.message, one.key)
+        if about and one.allowed and one.flow == "ingress" and one.message in _DECIDES and "@" not in one.key:
+            add_dds_topics(_DECIDES[one.message], about.name, publish, subscribe)
+    return frozenset(ros_rules(publish, subscribe)[0])
