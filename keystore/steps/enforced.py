@@ -40,7 +40,7 @@ def enforced(keystore: Path | str) -> dict[str, frozenset[Rule]]:
     """
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
-    read = _router(view)
+    read = _read(view, layout.ZENOH_ROUTER)
     everybody = read.admitted.get(EVERYBODY, frozenset())
     return {
         read.enclaves[name]: _rules(permissions | everybody)
@@ -52,21 +52,21 @@ def enforced(keystore: Path | str) -> dict[str, frozenset[Rule]]:
 def files_changed(before: Path | str, after: Path | str) -> list[tuple[str, ZenohDifference]]:
     """File -> difference, of the router and of the enclaves that are on Zenoh in both keystores."""
     one, other = (KeystoreView(resolve_root(keystore)) for keystore in (before, after))
-    found = [(layout.ZENOH_ROUTER, each) for each in differences(_router(one), _router(other))]
-    for enclave in sorted({*zenoh_enclaves(one)} & {*zenoh_enclaves(other)}):
-        file = session_file(enclave)
-        found += [(file, each) for each in differences(_read(one, file), _read(other, file))]
-    return found
+    roots = (one.root, other.root)
+    both = sorted({*zenoh_enclaves(one)} & {*zenoh_enclaves(other)})
+    return [
+        (file, each)
+        for file in (layout.ZENOH_ROUTER, *map(session_file, both))
+        for each in differences(_read(one, file, roots), _read(other, file, roots))
+    ]
 
 
-def _router(view: KeystoreView) -> ZenohConfiguration:
-    return _read(view, layout.ZENOH_ROUTER)
-
-
-def _read(view: KeystoreView, file: str) -> ZenohConfiguration:
-    """Of any place: where a keystore lies is no difference."""
+def _read(view: KeystoreView, file: str, roots: Iterable[Path] = ()) -> ZenohConfiguration:
+    """``roots``: of two keystores that are compared; where each lies is no difference, nor that one is a copy."""
     text = safe_files.read_if_there(view.root, file) or b"{}"
-    return read_configuration(text.replace(f'"{view.root}/'.encode(), b'"KEYSTORE/'), file)
+    for root in roots:
+        text = text.replace(f'"{root}/'.encode(), b'"KEYSTORE/')
+    return read_configuration(text, file)
 
 
 def _rules(permissions: Iterable[MessagePermission]) -> frozenset[Rule]:

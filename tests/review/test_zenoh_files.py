@@ -1,0 +1,154 @@
+"""A plan held against the files for Zenoh in a keystore, by ``check --keystore`` and ``diff``; two keystores."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from enclave_launch.verb.secure_plan import main
+from keystore.steps.enforced import enforced
+from keystore.steps.granted import granted
+from tests.review.test_against_a_keystore import found, make, words
+
+LAUNCH = "services_actions.launch.xml"
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+        return make(tmp_path_factory.mktemp("zenoh") / "ks", LAUNCH)
+
+
+@pytest.fixture
+def keystore(made: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One to edit, where it was written: the files name their places."""
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    shutil.copytree(made, tmp_path / "as it was")
+    return made
+
+
+@pytest.fixture(autouse=True)
+def put_back(made: Path) -> object:
+    files = {
+        path: path.read_bytes() for path in (*made.glob("zenoh/*"), *made.glob("enclaves/**/zenoh.json5"))
+    }
+    yield
+    for path, content in files.items():
+        path.write_bytes(content)
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def test_the_router_lets_each_enclave_do_what_is_signed_for_it(keystore: Path) -> None:
+    """Services and actions come back from the rules as what they were."""
+    signed = {enclave: frozenset(one.allowed) for enclave, one in granted(keystore).items()}
+    assert enforced(keystore) == signed and signed
+
+
+def test_files_as_planned_are_no_finding_and_no_difference(
+    keystore: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    codes = {code for code, _ in found(capsys, *words(LAUNCH), "--keystore", str(keystore))}
+    assert not {code for code in codes if code.startswith("keystore")}
+    for arguments in ([str(keystore), *words(LAUNCH)], [str(keystore), str(tmp_path / "as it was")]):
+        assert main(["diff", *arguments]) == 0, capsys.readouterr()
+        assert capsys.readouterr().out == "no enclave, node, permission or flow differs\n"
+
+
+def test_a_rule_of_the_router_that_was_widened_is_found_and_told_in_ros_words(
+    keystore: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edit(keystore / "zenoh/router.json5", '"0/rosout/rcl_interfaces::msg::dds_::Log_/*"', '"0/**"')
+    codes = {code for code, _ in found(capsys, *words(LAUNCH), "--keystore", str(keystore))}
+    assert {"keystore-grants-more", "keystore-grants-less", "keystore-zenoh"} <= codes
+    assert main(["diff", str(keystore), *words(LAUNCH)]) == 1  # /rosout is granted anew
+    assert "-   publish /*\n" in capsys.readouterr().out
+    assert main(["diff", str(tmp_path / "as it was"), str(keystore)]) == 1
+    out = capsys.readouterr().out
+    assert "publish /* (any type)" in out and "- zenoh/router.json5: enclave /operator publish /rosout" in out
+
+
+def test_a_rule_that_was_taken_away_is_less_and_no_growth_of_rights(
+    keystore: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    edit(keystore / "zenoh/router.json5", ', "0/rosout/rcl_interfaces::msg::dds_::Log_/*"', "")
+    edit(keystore / "zenoh/router.json5", ', "0/rosout/rcl_interfaces::msg::dds_::Log_/*/@adv/pub/**"', "")
+    assert main(["diff", str(tmp_path / "as it was"), str(keystore), "--format", "json"]) == 0
+    changed = json.loads(capsys.readouterr().out)
+    assert changed["files"] and not changed["rights_grew"]
+    assert all("publish /rosout" in one["text"] and not one["more"] for one in changed["files"])
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "said"),
+    [
+        (
+            "zenoh/router.json5",
+            '"gossip": {"enabled": false}',
+            '"gossip": {"enabled": true}',
+            "ways past the router",
+        ),
+        (
+            "zenoh/router.json5",
+            '"default_permission": "deny"',
+            '"default_permission": "allow"',
+            "would be allowed",
+        ),
+        ("enclaves/operator/zenoh.json5", '"mode": "client"', '"mode": "peer"', "past the router"),
+        (
+            "enclaves/operator/zenoh.json5",
+            '"verify_name_on_connect": true',
+            '"verify_name_on_connect": false',
+            "play the router",
+        ),
+    ],
+)
+def test_a_protection_that_is_gone_is_an_error_and_grown_rights(
+    keystore: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    file: str,
+    old: str,
+    new: str,
+    said: str,
+) -> None:
+    edit(keystore / file, old, new)
+    assert main(["check", *words(LAUNCH), "--keystore", str(keystore)]) == 1
+    assert said in capsys.readouterr().out
+    assert main(["diff", str(tmp_path / "as it was"), str(keystore)]) == 1
+    assert f"+ {file}: " in capsys.readouterr().out
+
+
+def test_an_enclave_that_is_not_on_zenoh_yet_and_a_plan_that_left_dds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    keystore, saved = make(tmp_path / "ks", LAUNCH), tmp_path / "before.json"
+    main(["show", *words(LAUNCH), "--format", "json"])
+    saved.write_text(capsys.readouterr().out)
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    assert ("keystore-enclave-missing", "/operator") in found(
+        capsys, *words(LAUNCH), "--keystore", str(keystore)
+    )
+    main(["diff", str(keystore), *words(LAUNCH)])
+    assert "! enclave /operator moves from DDS to Zenoh\n" in capsys.readouterr().out
+    assert main(["diff", str(saved), *words(LAUNCH)]) == 0
+    out = capsys.readouterr().out.splitlines()
+    assert out and all(
+        line.startswith("! enclave /") and line.endswith(" moves from DDS to Zenoh") for line in out
+    )
+
+
+def test_a_router_file_that_is_none_is_an_error_and_no_traceback(
+    keystore: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (keystore / "zenoh/router.json5").write_text("// by hand\n{mode: 'router'}")
+    assert main(["diff", str(keystore), *words(LAUNCH)]) != 0
+    assert "zenoh/router.json5 is not a configuration of Zenoh in JSON" in capsys.readouterr().err
