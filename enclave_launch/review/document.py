@@ -105,7 +105,7 @@ def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
         frozenset(
             process["enclave"]
             for process in document.get("processes", ())
-            if process["enclave"] and process.get("middleware") == ZENOH
+            if process.get("enclave") and process.get("middleware") == ZENOH
         ),
     )
 
