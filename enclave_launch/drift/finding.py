@@ -69,7 +69,7 @@ class DriftFinding(NamedTuple):
 
 _CERTAINTY = {
     Kind.UNPLANNED_PROCESS: FindingCertainty.WHEN_SETTLED,
-    Kind.NOT_AUTHENTICATED: FindingCertainty.WHEN_SETTLED,
+    Kind.NOT_AUTHENTICATED: FindingCertainty.ABSENCE,
     Kind.REPEATED_NODE: FindingCertainty.WHEN_SETTLED,
     Kind.MISSING_NODE: FindingCertainty.ABSENCE,
     Kind.MISSING_ENDPOINT: FindingCertainty.ABSENCE,

@@ -1,7 +1,8 @@
 """Findings over time → those that stand, each told once. Pure: moments are handed in.
 
 What was announced is a fact at once. What discovery could still take back has to stand for ``settle`` seconds. What is
-missing may still come: it is told after ``absence`` seconds.
+missing may still come: it is told after ``absence`` seconds. As long as findings of one kind go by themselves the
+system is still starting, and those that are left get their time anew.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ Key = tuple[str, str, str, str]
 
 
 class SettlingTimes(NamedTuple):
-    """Seconds. Where 50 processes started at once on two busy cores, some nodes had no names 5 s after their
-    participants were there."""
+    """Seconds; ``longest``: told then, whatever others of its kind do. 50 secured processes that started at once on two
+    cores with a load of 140 took more than two minutes to authenticate each other, one after another."""
 
     settle: float = 30.0
     absence: float = 120.0
+    longest: float = 600.0
 
     def of(self, certainty: FindingCertainty) -> float:
         return {
@@ -46,6 +48,8 @@ class Steady:
         self._patience = patience or SettlingTimes()
         self._since: dict[Key, float] = {}
         self._told: dict[Key, DriftFinding] = {}
+        self._went: dict[str, float] = {}
+        """Kind → when one of it was last over."""
 
     @property
     def standing(self) -> tuple[DriftFinding, ...]:
@@ -55,12 +59,14 @@ class Steady:
     def at(self, now: float, findings: Iterable[DriftFinding]) -> Change:
         """What is to be told at ``now``."""
         found = {each.key: each for each in findings}
+        self._went.update({key[0]: now for key in self._since if key not in found})
         self._since = {key: self._since.get(key, now) for key in found}
-        new = {
-            key: each
-            for key, each in found.items()
-            if key not in self._told and now - self._since[key] >= self._patience.of(each.certainty)
-        }
+        new = {key: each for key, each in found.items() if key not in self._told and self._stands(now, each)}
         over = [self._told.pop(key) for key in list(self._told) if key not in found]
         self._told.update(new)
         return Change(tuple(new.values()), tuple(over))
+
+    def _stands(self, now: float, finding: DriftFinding) -> bool:
+        wait, since = self._patience.of(finding.certainty), self._since[finding.key]
+        begins = max(since, self._went.get(finding.kind.value, since))
+        return now - begins >= wait or now - since >= max(wait, self._patience.longest)
