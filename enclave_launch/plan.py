@@ -30,7 +30,7 @@ from enclave_launch.process import (
 )
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
-from nodl.node_interface import NodeInterface
+from nodl.node_interface import Endpoint, NodeInterface
 
 if TYPE_CHECKING:
     from enclave_launch.planner import Planner
@@ -51,11 +51,13 @@ class InterfaceOrigin(str, Enum):
 
 
 class Found(NamedTuple):
-    """The nodes of one executable or component. ``doubt``: what they were described for is another version."""
+    """The nodes of one executable or component. ``doubt``: what they were described for is another version; ``lacks``:
+    what their manifest leaves out of that which their source makes."""
 
     interfaces: tuple[NodeInterface, ...]
     origin: InterfaceOrigin = InterfaceOrigin.PACKAGE
     doubt: str = ""
+    lacks: tuple[Endpoint, ...] = ()
 
 
 class Missing(NamedTuple):
@@ -75,7 +77,8 @@ InterfaceLookup = Callable[
 class PlannedProcess(NamedTuple):
     """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes.
 
-    ``origin``: where their interfaces come from; ``doubt``: why they may not be those of the installed version.
+    ``origin``: where their interfaces come from; ``doubt``: why they may not be those of the installed version;
+    ``lacks``: what their manifest leaves out of that which their source makes.
     """
 
     process: ResolvedProcess
@@ -84,6 +87,7 @@ class PlannedProcess(NamedTuple):
     missing: Missing | None = None
     origin: InterfaceOrigin | None = None
     doubt: str = ""
+    lacks: tuple[Endpoint, ...] = ()
     refusals: tuple[Diagnostic, ...] = ()
     domain: int = 0
     middleware: str = DEFAULT_MIDDLEWARE
@@ -133,6 +137,7 @@ class PlannedComponent(NamedTuple):
     missing: Missing | None = None
     origin: InterfaceOrigin | None = None
     doubt: str = ""
+    lacks: tuple[Endpoint, ...] = ()
 
     @property
     def package(self) -> str:

@@ -22,6 +22,7 @@ from enclave_launch.diagnostics.enclaves import (
 from enclave_launch.diagnostics.evaluation import parameters_unknown
 from enclave_launch.diagnostics.permissions import (
     library_version,
+    manifest_lacks,
     no_manifest,
     node_name_unknown,
     recording_incomplete,
@@ -77,6 +78,7 @@ def notes(
             target, place = component.component.container, component.component.location
             yield container_elsewhere(component.fqn, target, _alike(target, processes), place)
     yield from _library_versions(processes, components)
+    yield from _lacking_manifests(processes, components)
     yield from _incomplete(nodes_of(processes, components, None))
     for item in processes:
         process, attribute = item.process, item.process.enclave.attribute
@@ -99,6 +101,26 @@ def _library_versions(
         if component.doubt:
             program = f"{component.component.package}/{component.component.plugin}"
             yield library_version(program, component.doubt, component.component.location)
+
+
+def _lacking_manifests(
+    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
+) -> Iterator[Diagnostic]:
+    """Each program once, where it is started first."""
+    started: list[tuple[str, SourceLocation, PlannedProcess | PlannedComponent]] = [
+        (f"{item.process.package}/{item.process.executable}", item.process.location, item)
+        for item in processes
+    ]
+    started += [(f"{c.component.package}/{c.component.plugin}", c.component.location, c) for c in components]
+    told: set[str] = set()
+    for program, place, item in started:
+        if item.lacks and program not in told:
+            told.add(program)
+            manifest = str(item.nodes[0].interface.source) if item.nodes else "of its package"
+            lacks = [
+                f"{each.kind.value.replace('_', ' ')} {each.name} ({each.source})" for each in item.lacks
+            ]
+            yield manifest_lacks(program, manifest, lacks, place)
 
 
 def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:

@@ -113,7 +113,7 @@ def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: Encl
     except UnknownNodeName as error:
         missing = Missing(process.process_name, error.message, unnamed=True)
         return PlannedProcess(process, enclave, (), missing)
-    return PlannedProcess(process, enclave, nodes, origin=found.origin, doubt=found.doubt)
+    return PlannedProcess(process, enclave, nodes, origin=found.origin, doubt=found.doubt, lacks=found.lacks)
 
 
 def _role(process: ResolvedProcess) -> Role:
@@ -130,7 +130,9 @@ def _plan_component(
     if isinstance(found, Missing):
         return PlannedComponent(component, container, (), found)
     if container is None or container.enclave is None:
-        return PlannedComponent(component, container, (), origin=found.origin, doubt=found.doubt)
+        return PlannedComponent(
+            component, container, (), origin=found.origin, doubt=found.doubt, lacks=found.lacks
+        )
     try:
         nodes = tuple(
             node_of_component(component, container.process, interface, container.enclave.path)
@@ -140,7 +142,9 @@ def _plan_component(
         return PlannedComponent(
             component, container, (), Missing(component.plugin, error.message, unnamed=True)
         )
-    return PlannedComponent(component, container, nodes, origin=found.origin, doubt=found.doubt)
+    return PlannedComponent(
+        component, container, nodes, origin=found.origin, doubt=found.doubt, lacks=found.lacks
+    )
 
 
 def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess]:

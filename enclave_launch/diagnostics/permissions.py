@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 
+_INTERFACES = 6  # named in a message
 _OTHER_NAME = "it could not start: give it another name or namespace"
 
 
@@ -18,6 +21,19 @@ def library_version(program: str, doubt: str, location: SourceLocation) -> Diagn
     """``doubt`` names the document, its version and the one that is installed."""
     remedy = "compare them (secure-nodl library show), and keep a corrected copy in a folder for --library"
     return Diagnostic(Code.LIBRARY_VERSION, program, f"library document {doubt}", location, remedy)
+
+
+def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
+    """``lacks``: each interface with the place in the source that makes it."""
+    listed = "; ".join(lacks[:_INTERFACES]) + (
+        "" if len(lacks) <= _INTERFACES else f" and {len(lacks) - _INTERFACES} more"
+    )
+    text = (
+        f"the manifest of {program} ({manifest}) lacks {len(lacks)} interface{'s' * (len(lacks) != 1)} that its source "
+        f"makes, so {'they are' if len(lacks) != 1 else 'it is'} not permitted: {listed}"
+    )
+    remedy = "add what it needs to the manifest (secure-nodl infer --compare shows all)"
+    return Diagnostic(Code.MANIFEST_LACKS, program, text, place, remedy)
 
 
 def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocation) -> Diagnostic:

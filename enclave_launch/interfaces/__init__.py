@@ -21,7 +21,7 @@ from nodl.dependence import Launched
 from nodl.errors import NoDLError
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.name_template import UnknownPart
-from nodl.node_interface import ClientLibrary, NodeInterface
+from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -98,12 +98,26 @@ class InterfaceFinder:
                 subject.package or "", executable=subject.executable, plugin=subject.plugin
             )
             if manifest:
-                return Found(manifest.found, _origin(manifest)), False
+                lacks, of_this_start = self._lacks(subject, manifest, started)
+                return Found(manifest.found, _origin(manifest), lacks=lacks), of_this_start
             if subject.package == CONTAINER_PACKAGE and subject.executable:
                 return Found((_container(subject),)), False
             return self._without_manifest(subject, manifest, started)
         except NoDLError as error:
             raise ManifestError(str(error)) from error
+
+    def _lacks(
+        self, subject: _Subject, manifest: Lookup, started: StartedProgram
+    ) -> tuple[tuple[Endpoint, ...], bool]:
+        """What an installed manifest leaves out, where the sources of the compiled program are in reach."""
+        if not self._options.infer or manifest.named or not self._sources.hold(subject.package):
+            return (), False
+        from nodl.infer.report.comparison import lacking
+
+        analysed = self._inferred(subject, started, compiled_only=True)
+        if not analysed:
+            return (), False
+        return lacking(manifest.found, analysed.interfaces).endpoints, analysed.of_this_start
 
     def _without_manifest(
         self, subject: _Subject, manifest: Lookup, started: StartedProgram
@@ -133,7 +147,9 @@ class InterfaceFinder:
             searched.append("the library has no document of it")
         return Missing(str(subject), "; ".join(searched)), of_this_start
 
-    def _inferred(self, subject: _Subject, started: StartedProgram) -> InferredExecutable | None:
+    def _inferred(
+        self, subject: _Subject, started: StartedProgram, *, compiled_only: bool = False
+    ) -> InferredExecutable | None:
         if not self._options.infer or subject.package is None:
             return None
         from nodl.infer.executable import infer_executable
@@ -147,6 +163,7 @@ class InterfaceFinder:
             prefixes=self._prefixes,
             sources=self._sources,
             start_of=started,
+            compiled_only=compiled_only,
         )
 
     @cached_property

@@ -40,10 +40,12 @@ def infer_executable(
     prefixes: Sequence[str],
     sources: SourcesInReach | None = None,
     start_of: Start | None = None,
+    compiled_only: bool = False,
 ) -> InferredExecutable:
     """The nodes that ``executable`` of an installed package creates; gaps are attached to them.
 
-    Compiled programs and components are read from ``sources``, in the light of what launch gives them (``start_of``).
+    Compiled programs and components are read from ``sources``, in the light of what launch gives them (``start_of``);
+    ``compiled_only``: those of Python, which are read anew each time, are left alone.
     """
     if executable is None:
         return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
@@ -53,6 +55,8 @@ def infer_executable(
         return _compiled(package, executable, None, sources, start_of, str(error))
     if not _is_python(path):
         return _compiled(package, executable, None, sources, start_of, f"{path} is a compiled program")
+    if compiled_only:
+        return InferredExecutable((), f"{path} is a Python program")
     from nodl.infer.python_executable import infer_python
 
     return InferredExecutable(*infer_python(path, package, executable, prefixes))

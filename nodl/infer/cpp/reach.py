@@ -31,6 +31,10 @@ class SourcesInReach:
         self._prefixes = tuple(os.path.abspath(prefix) for prefix in prefixes)
         self._folders = tuple(os.path.abspath(folder) for folder in folders)
 
+    def hold(self, package: str | None) -> bool:
+        """Whether the sources of ``package`` are among them."""
+        return bool(self._folders or self._workspaces) and package in self._workspace.packages
+
     def infer(
         self, package: str, executable: str | None, plugin: str | None, start: Start | None = None
     ) -> Answer:

@@ -6,7 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch.diagnostics import Code
+from enclave_launch.plan import LaunchPlan
 from nodl.verb import main
+from tests.nodl.infer.cpp.test_in_a_launch import install, may, plan
 from tests.nodl.infer.cpp.workspace import in_class, package, write
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
@@ -60,3 +63,57 @@ def test_what_the_source_leaves_open_is_said(tmp_path: Path, capsys: pytest.Capt
 def test_without_a_manifest_that_is_said(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert compared(tmp_path, None) == 1
     assert "demo/node: no manifest" in capsys.readouterr().out
+
+
+LAUNCH = '<launch><node pkg="demo" exec="filter_node" name="n">{}</node></launch>'
+
+
+def planned(tmp_path: Path, more: str, launch: str = LAUNCH.format(""), **options: object) -> LaunchPlan:
+    """Of a launch in a workspace whose ``install`` has the manifest and whose ``src`` has the program."""
+    package(tmp_path / "src/demo", {"src/main.cpp": SOURCE}, "add_executable(filter_node src/main.cpp)")
+    install(tmp_path)
+    manifest = MANIFEST.replace('executable="node"', 'executable="filter_node"').format(more=more)
+    write(tmp_path / "install/share/demo/demo.nodl.xml", manifest)
+    return plan(tmp_path, launch, **options)
+
+
+def lacks(of: LaunchPlan) -> list[str]:
+    return [str(each) for each in of.warnings if each.code is Code.MANIFEST_LACKS]
+
+
+def test_a_launch_tells_what_an_installed_manifest_lacks(tmp_path: Path) -> None:
+    of = planned(tmp_path, "")
+    (told,) = lacks(of)
+    assert "publisher ~/out" in told
+    assert "src/main.cpp:" in told
+    assert [(e.kind.value, str(e.name)) for e in of.processes[0].lacks] == [("publisher", "~/out")]
+    assert not may(of, "/n/out")  # the manifest decides
+    assert not of.problems
+
+
+def test_a_launch_is_silent_about_a_manifest_that_has_all(tmp_path: Path) -> None:
+    assert not lacks(planned(tmp_path, OUT))
+
+
+def test_a_manifest_that_the_user_names_is_taken_as_it_is(tmp_path: Path) -> None:
+    named = tmp_path / "own.nodl.xml"
+    write(named, MANIFEST.replace('executable="node"', 'executable="filter_node"').format(more=""))
+    of = planned(tmp_path, OUT, launch=LAUNCH.format(""), manifests=(named,))
+    assert not lacks(of)
+
+
+def test_without_inference_nothing_is_compared(tmp_path: Path) -> None:
+    assert not lacks(planned(tmp_path, "", infer=False))
+
+
+def test_without_sources_in_reach_nothing_is_compared(tmp_path: Path) -> None:
+    of = planned(tmp_path, "")
+    assert lacks(of)
+    (tmp_path / "src").rename(tmp_path / "elsewhere")
+    assert not lacks(plan(tmp_path, LAUNCH.format("")))
+    assert lacks(plan(tmp_path, LAUNCH.format(""), source_folders=(tmp_path / "elsewhere",)))
+
+
+def test_a_program_that_starts_twice_is_told_once(tmp_path: Path) -> None:
+    node = '<node pkg="demo" exec="filter_node" name="{}"/>'
+    assert len(lacks(planned(tmp_path, "", f"<launch>{node.format('a')}{node.format('b')}</launch>"))) == 1
