@@ -27,6 +27,21 @@ class EndpointKind(str, Enum):
     ACTION_SERVER = "action_server"
     ACTION_CLIENT = "action_client"
 
+    @property
+    def family(self) -> str:
+        """``topic``, ``service`` or ``action``: the elements of NoDL v1."""
+        return "topic" if self in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION) else self.value[:-7]
+
+    @property
+    def role(self) -> str:
+        """``publisher``, ``subscription``, ``server`` or ``client``: the roles of NoDL v1."""
+        return self.value.rpartition("_")[2]
+
+    @property
+    def category(self) -> str:
+        """``publishers``, ``service_servers`` ...: the lists of NoDL v2."""
+        return f"{self.value}s"
+
 
 class Certainty(str, Enum):
     """How far a name can be trusted."""

@@ -16,7 +16,7 @@ from nodl.document import V1_SUFFIX
 from nodl.document.manifest_node import ManifestNode
 from nodl.document.v1 import parse_v1
 from nodl.errors import DuplicateNodeError, ExecutableNotFoundError, InvalidNoDLError, NoNoDLFilesError
-from nodl.node_interface import Endpoint, EndpointKind
+from nodl.node_interface import Endpoint
 from nodl.source_ref import SourceRef
 from nodl.types import Action, Node, Parameter, PubSubRole, ServerClientRole, Service, Topic
 
@@ -53,12 +53,12 @@ def node_of(manifest: ManifestNode) -> Node:
     interface = manifest.interface
     kinds: dict[str, list[Endpoint]] = {"topic": [], "service": [], "action": []}
     for endpoint in interface.endpoints:
-        kinds[_FAMILY[endpoint.kind][0]].append(endpoint)
+        kinds[endpoint.kind.family].append(endpoint)
     return Node(
         name=_v1_name(manifest),
         executable=interface.executable or interface.plugin or "",
         topics=[
-            Topic(name=_name(e), message_type=e.type, role=PubSubRole(e.kind.value)) for e in kinds["topic"]
+            Topic(name=_name(e), message_type=e.type, role=PubSubRole(e.kind.role)) for e in kinds["topic"]
         ],
         services=[Service(name=_name(e), service_type=e.type, role=_role(e)) for e in kinds["service"]],
         actions=[Action(name=_name(e), action_type=e.type, role=_role(e)) for e in kinds["action"]],
@@ -66,22 +66,12 @@ def node_of(manifest: ManifestNode) -> Node:
     )
 
 
-_FAMILY: dict[EndpointKind, tuple[str, str]] = {
-    EndpointKind.PUBLISHER: ("topic", "publisher"),
-    EndpointKind.SUBSCRIPTION: ("topic", "subscription"),
-    EndpointKind.SERVICE_SERVER: ("service", "server"),
-    EndpointKind.SERVICE_CLIENT: ("service", "client"),
-    EndpointKind.ACTION_SERVER: ("action", "server"),
-    EndpointKind.ACTION_CLIENT: ("action", "client"),
-}
-
-
 def _name(endpoint: Endpoint) -> str:
     return endpoint.written or endpoint.name.text
 
 
 def _role(endpoint: Endpoint) -> ServerClientRole:
-    return ServerClientRole(_FAMILY[endpoint.kind][1])
+    return ServerClientRole(endpoint.kind.role)
 
 
 def _v1_name(manifest: ManifestNode) -> str:

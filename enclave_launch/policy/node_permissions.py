@@ -32,7 +32,7 @@ from nodl.remap import ACTION_SERVICES, NodeNames, ParsedRule, Resolved
 
 Origin = Literal["declared", "built-in", "policy file"]
 
-_OPERATIONS: dict[EndpointKind, Operation] = {
+OPERATIONS: dict[EndpointKind, Operation] = {
     EndpointKind.PUBLISHER: Operation.PUBLISH,
     EndpointKind.SUBSCRIPTION: Operation.SUBSCRIBE,
     EndpointKind.SERVICE_SERVER: Operation.REPLY,
@@ -161,7 +161,7 @@ class _Collector:
                 self._pattern(endpoint, filled)
 
     def _name(self, endpoint: Endpoint, template: NameTemplate, note: str) -> None:
-        operation, place = _OPERATIONS[endpoint.kind], str(endpoint.source)
+        operation, place = OPERATIONS[endpoint.kind], str(endpoint.source)
         written = endpoint.written or str(endpoint.name)
         if "__" in template.text:
             where = SourceLocation.read(place)
@@ -264,7 +264,7 @@ class _Collector:
 
     def _pattern(self, endpoint: Endpoint, template: NameTemplate) -> None:
         """Only a part of the name is known: unresolved, unless patterns are accepted and it has text."""
-        operation, place = _OPERATIONS[endpoint.kind], str(endpoint.source)
+        operation, place = OPERATIONS[endpoint.kind], str(endpoint.source)
         text = template.text
         why = "; ".join(p.why for p in template.parts if isinstance(p, UnknownPart) and p.why)
         if not self._accept_patterns or not text.replace("*", "").strip("/~"):
@@ -305,7 +305,7 @@ def _built_in_rows(
 ) -> tuple[tuple[Operation, str, str], ...]:
     """Operation, name as the client library writes it, and the row for a reader."""
     rows = built_in_interfaces(distro, library, conditions)
-    return tuple((_OPERATIONS[row.kind], row.name, str(row)) for row in rows)
+    return tuple((OPERATIONS[row.kind], row.name, str(row)) for row in rows)
 
 
 def _parameter_note(template: NameTemplate, node: RunningNode) -> str:

@@ -8,22 +8,14 @@ from typing import NamedTuple
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, Missing, PlannedComponent, PlannedProcess
 from enclave_launch.policy import RunningNode
 from enclave_launch.policy.derivation import LIST_NAMES
+from enclave_launch.policy.node_permissions import OPERATIONS
 from keystore.formats.permissions import DdsRules, dds_rules
 from keystore.formats.permissions_names import dds_topics
 from keystore.formats.permissions_patterns import covers
 from keystore.formats.policy import Operation, Qualifier, Rule
-from nodl.node_interface import EndpointKind
 from nodl.record.asked import Asked
 from nodl.record.assembly import RecordedNode, RecordedProcess
 
-OPERATIONS = {
-    EndpointKind.PUBLISHER: Operation.PUBLISH,
-    EndpointKind.SUBSCRIPTION: Operation.SUBSCRIBE,
-    EndpointKind.SERVICE_SERVER: Operation.REPLY,
-    EndpointKind.SERVICE_CLIENT: Operation.REQUEST,
-    EndpointKind.ACTION_SERVER: Operation.EXECUTE,
-    EndpointKind.ACTION_CLIENT: Operation.CALL,
-}
 WORDS = {
     Operation.PUBLISH: "publish topic",
     Operation.SUBSCRIBE: "subscribe to topic",

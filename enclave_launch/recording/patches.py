@@ -11,24 +11,14 @@ import re
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
-from enclave_launch.recording.grants import OPERATIONS
+from enclave_launch.policy.node_permissions import OPERATIONS
 from keystore.formats.policy import Operation
 from nodl.document.v2_schema import NAME_PATTERN, TYPE_PATTERN
-from nodl.document.v2_section import CATEGORIES
 from nodl.names import split_fqn
 from nodl.node_interface import EndpointKind
 from nodl.record.asked import Asked
 
-_LISTS = {kind: category for category, kind in CATEGORIES.items()}
 _HISTORY = {1: "KEEP_LAST", 2: "KEEP_ALL"}
-_V1 = {
-    EndpointKind.PUBLISHER: ("topic", "publisher"),
-    EndpointKind.SUBSCRIPTION: ("topic", "subscription"),
-    EndpointKind.SERVICE_SERVER: ("service", "server"),
-    EndpointKind.SERVICE_CLIENT: ("service", "client"),
-    EndpointKind.ACTION_SERVER: ("action", "server"),
-    EndpointKind.ACTION_CLIENT: ("action", "client"),
-}
 _POLICY_ELEMENTS = {
     Operation.PUBLISH: ("topics", "topic"),
     Operation.SUBSCRIBE: ("topics", "topic"),
@@ -98,7 +88,7 @@ def _diff(file: str, before: str, after: str) -> str:
 
 
 def _into_v2(text: str, asked: Asked) -> str | None:
-    category = _LISTS[asked.kind]
+    category = asked.kind.category
     head = re.search(rf"^{category}:[ \t]*(#.*)?$", text, re.MULTILINE)
     empty = re.search(rf"^{category}:[ \t]*\[[ \t]*\][ \t]*$", text, re.MULTILINE)
     if empty is not None:
@@ -135,8 +125,8 @@ def _into_v1(text: str, line: int, asked: Asked) -> str | None:
     lines = text.splitlines(keepends=True)
     for number in range(max(line - 1, 0), len(lines)):
         if "</node>" in lines[number]:
-            element, role = _V1[asked.kind]
-            entry = f'<{element} name="{asked.name}" type="{asked.type}" role="{role}"/>'
+            kind = asked.kind
+            entry = f'<{kind.family} name="{asked.name}" type="{asked.type}" role="{kind.role}"/>'
             before, end, after = lines[number].partition("</node>")
             blank = before if not before.strip() else ""
             rest = "" if not before.strip() else before

@@ -27,14 +27,7 @@ from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
 IDENTITY_KEY = "enclave_launch"
 
-CATEGORIES: dict[str, EndpointKind] = {
-    "publishers": EndpointKind.PUBLISHER,
-    "subscriptions": EndpointKind.SUBSCRIPTION,
-    "service_servers": EndpointKind.SERVICE_SERVER,
-    "service_clients": EndpointKind.SERVICE_CLIENT,
-    "action_servers": EndpointKind.ACTION_SERVER,
-    "action_clients": EndpointKind.ACTION_CLIENT,
-}
+CATEGORIES = {kind.category: kind for kind in EndpointKind}
 _SIDES = ("publishers", "subscriptions")
 
 

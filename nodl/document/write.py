@@ -36,13 +36,6 @@ _PARAMETER_TYPES = {
     **dict.fromkeys(("boolean_array",), "bool_array"),
 }
 
-# kinds of one v1 element: (role of the first, role of the second)
-_V1_ELEMENTS: dict[str, tuple[tuple[EndpointKind, str], tuple[EndpointKind, str]]] = {
-    "topic": ((EndpointKind.PUBLISHER, "publisher"), (EndpointKind.SUBSCRIPTION, "subscription")),
-    "service": ((EndpointKind.SERVICE_SERVER, "server"), (EndpointKind.SERVICE_CLIENT, "client")),
-    "action": ((EndpointKind.ACTION_SERVER, "server"), (EndpointKind.ACTION_CLIENT, "client")),
-}
-
 
 @dataclass(frozen=True, slots=True)
 class Written:
@@ -165,13 +158,12 @@ def _v1_node(node: ManifestNode) -> list[str]:
 
 def _v1_interfaces(endpoints: Iterable[Endpoint]) -> Iterable[str]:
     listed = list(endpoints)
-    for element, kinds in _V1_ELEMENTS.items():
+    for element in ("topic", "service", "action"):
         roles: dict[tuple[str, str], list[str]] = {}
         for endpoint in listed:
-            for kind, role in kinds:
-                if endpoint.kind is kind:
-                    key = (endpoint.written or endpoint.name.text, endpoint.type)
-                    roles.setdefault(key, []).append(role)
+            if endpoint.kind.family == element:
+                key = (endpoint.written or endpoint.name.text, endpoint.type)
+                roles.setdefault(key, []).append(endpoint.kind.role)
         for (name, type_name), given in roles.items():
             role = "both" if len(given) > 1 else given[0]
             yield f'    <{element} name="{escape(name)}" type="{escape(type_name)}" role="{role}"/>'

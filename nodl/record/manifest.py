@@ -17,7 +17,6 @@ from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.learning import LearntEndpoint, LearntNode
 
 _HEAD = "# Learnt by secure-launch --learn from what the node asked of librcl; see docs/recording.md.\n"
-_LISTS = {kind: category for category, kind in CATEGORIES.items()}
 _TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 _HISTORY = {0: "SYSTEM_DEFAULT", 1: "KEEP_LAST", 2: "KEEP_ALL"}
 _RELIABILITY = {0: "SYSTEM_DEFAULT", 1: "RELIABLE", 2: "BEST_EFFORT", 4: "BEST_AVAILABLE"}
@@ -60,7 +59,7 @@ def _line(text: str) -> str:
 
 def _document(node: LearntNode) -> dict[str, Any]:
     document: dict[str, Any] = {"nodl_version": 2, "codegen": {IDENTITY_KEY: _section(node)}}
-    for kind, category in _LISTS.items():
+    for category, kind in CATEGORIES.items():
         entries = [entry for entry in node.entries if entry.kind is kind]
         listed = [_entry(entry) for entry in entries]
         if listed:
@@ -119,7 +118,7 @@ def _quality(qos: tuple[int, ...]) -> dict[str, Any]:
 def _about(entry: LearntEndpoint) -> dict[str, Any]:
     """What the standard entry cannot say."""
     name, origin = _plain_name(entry), entry.origin
-    fields: dict[str, Any] = {"in": _LISTS[entry.kind], "name": name}
+    fields: dict[str, Any] = {"in": entry.kind.category, "name": name}
     if name != entry.name:
         fields["written"] = entry.name
     if origin.source:

@@ -11,15 +11,6 @@ from xml.sax.saxutils import quoteattr
 from nodl.infer.system import InferredSystem
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 
-_V1 = {
-    EndpointKind.PUBLISHER: ("topic", "publisher"),
-    EndpointKind.SUBSCRIPTION: ("topic", "subscription"),
-    EndpointKind.SERVICE_SERVER: ("service", "server"),
-    EndpointKind.SERVICE_CLIENT: ("service", "client"),
-    EndpointKind.ACTION_SERVER: ("action", "server"),
-    EndpointKind.ACTION_CLIENT: ("action", "client"),
-}
-
 
 def to_v1(system: InferredSystem) -> dict[str, str]:
     """File name -> text: one document per package (``nodes.nodl.xml`` for nodes of none)."""
@@ -47,8 +38,7 @@ def _v1_document(nodes: list[NodeInterface]) -> str:
 def _v1_elements(said: dict[tuple[EndpointKind, str], str]) -> list[str]:
     elements: dict[tuple[str, str, str], list[str]] = {}
     for (kind, name), type_name in said.items():
-        tag, role = _V1[kind]
-        elements.setdefault((tag, name, type_name), []).append(role)
+        elements.setdefault((kind.family, name, type_name), []).append(kind.role)
     lines = []
     for (tag, name, type_name), roles in sorted(elements.items()):
         role = roles[0] if len(roles) == 1 else "both"

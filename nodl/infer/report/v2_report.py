@@ -18,7 +18,6 @@ from nodl.name_template import NameTemplate, ParameterPart
 from nodl.node_interface import RANDOM_ENDING, ClientLibrary, Endpoint, EndpointKind, NodeInterface
 
 _PARAMETER = re.compile(r"[A-Za-z_][\w.\-/]*\Z")
-_CATEGORY = {kind: name for name, kind in CATEGORIES.items()}
 _QOS = ", qos: {history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
 
 
@@ -91,7 +90,7 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
             f"  {name}: {{type: string, default_value: {_quoted(str(default))}}}"
             for name, default in sorted(node.depends.defaults.items())
         ]
-    for kind, category in _CATEGORY.items():
+    for category, kind in CATEGORIES.items():
         listed = {(entry.name, entry.type): None for entry in entries if entry.kind is kind}
         if listed:
             lines.append(f"{category}:")
@@ -120,7 +119,7 @@ def _section(node: NodeInterface, entries: Iterable[_Entry], listener: bool) -> 
 def _names(entries: Iterable[_Entry]) -> list[str]:
     lines: list[str] = []
     varying = [entry for entry in entries if entry.template]
-    for kind, category in _CATEGORY.items():
+    for category, kind in CATEGORIES.items():
         listed = {entry.name: entry for entry in varying if entry.kind is kind}
         if listed:
             lines.append(f"  {category}:")
