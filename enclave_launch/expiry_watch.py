@@ -12,6 +12,7 @@ from contextlib import contextmanager
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
 
+from enclave_launch.boundary.words import counted, some_of
 from enclave_launch.runtime.deadline import Deadline
 from keystore.errors import KeystoreError
 from keystore.formats.validity import utc_now
@@ -56,7 +57,7 @@ def notices(ends: Iterable[Expiry], keystore: str, after: datetime) -> list[Noti
 
 
 def _text(subjects: list[str], end: datetime, margin: timedelta, keystore: str) -> str:
-    what = ", ".join(subjects[:3]) + (f" and {len(subjects) - 3} more" if len(subjects) > 3 else "")
+    what = some_of(subjects, 3)
     if not margin:
         return (
             f"{what} ended now: Cyclone DDS peers receive nothing more from these processes, and no process can start "
@@ -73,7 +74,7 @@ def _span(span: timedelta, *, short: bool = False) -> str:
     for name, unit in (("day", 86400), ("hour", 3600), ("minute", 60)):
         count, rest = divmod(int(span.total_seconds()), unit)
         if count and (not rest or short):
-            return f"{count}{name[0]}" if short else f"{count} {name}{'s' if count != 1 else ''}"
+            return f"{count}{name[0]}" if short else counted(count, name)
     return f"{int(span.total_seconds())} s"
 
 

@@ -79,6 +79,11 @@ class ResolvedProcess(NamedTuple):
     machine: str | None = None  # of the launch file: the host it is meant for
     respawn: Respawn | None = None
 
+    @property
+    def program(self) -> str:
+        """``package/executable``, or the executable alone."""
+        return f"{self.package}/{self.executable}" if self.package else self.executable
+
 
 class ResolvedComponent(NamedTuple):
     """One composable node, loaded into ``container`` (text as launch uses it)."""

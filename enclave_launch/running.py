@@ -7,12 +7,11 @@ The file is visited by a host that starts processes; what the user's code gave f
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from typing import TYPE_CHECKING, Union
 
-from enclave_launch.boundary.terminal import message
+from enclave_launch.boundary.terminal import warn
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
@@ -78,7 +77,7 @@ def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
         return nullcontext()
     from enclave_launch.expiry_watch import watched
 
-    return watched(launch, _say)
+    return watched(launch, warn)
 
 
 def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
@@ -87,11 +86,7 @@ def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
         return nullcontext()
     from enclave_launch.secured import zenoh_router
 
-    return zenoh_router(launch, _say)
-
-
-def _say(text: str) -> None:
-    print(f"secure-launch: warning: {message(text)}", file=sys.stderr)
+    return zenoh_router(launch, warn)
 
 
 def _check_programs(launch: Launch) -> None:
@@ -128,7 +123,7 @@ def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
         evaluation.components,
         PlanProvider(launch),
         allow_late=settings.allow_late,
-        say_late=_say,
+        say_late=warn,
     )
 
 

@@ -79,5 +79,5 @@ def zenoh_environment(enclave: str, settings: SecuritySettings) -> Mapping[str, 
 
 
 def launcher_environment(settings: SecuritySettings) -> Mapping[str, str]:
-    """The security variables for the launcher's own node."""
+    """The security variables of the launcher's own node, and of every process whatever its enclave."""
     return {ENABLE: "true", KEYSTORE: settings.keystore, STRATEGY: settings.strategy}

@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.files import text_or_nothing
 
 OURS = (
     "ROS_SECURITY_ENABLE",
@@ -63,17 +63,9 @@ def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
     """Configurations of a DDS with security properties of their own; reads the files that they are in."""
     for name in _CONFIGURATIONS:
         for part in _documents(environment.get(name, "")):
-            text = part if part.lstrip().startswith("<") else _content(part.removeprefix("file://"))
+            text = part if part.lstrip().startswith("<") else text_or_nothing(part.removeprefix("file://"))
             if _SECURITY.search(text):
                 yield Setting(name, part)
-
-
-def _content(path: str) -> str:
-    """Empty for a file that cannot be read: the DDS says so itself."""
-    try:
-        return read_text(path, errors="replace")
-    except OSError:
-        return ""
 
 
 def _documents(value: str) -> Iterator[str]:

@@ -47,6 +47,14 @@ def read_text(
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 
 
+def text_or_nothing(path: str | bytes | os.PathLike[str]) -> str:
+    """The text of a file; empty for one that cannot be read."""
+    try:
+        return read_text(path, errors="replace")
+    except OSError:
+        return ""
+
+
 def check_regular(path: str | bytes | os.PathLike[str]) -> os.stat_result:
     """The state of a file that is safe to open and read. Raises ``OSError`` for anything but a regular file."""
     status = os.stat(path)

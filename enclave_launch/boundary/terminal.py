@@ -35,6 +35,12 @@ def message(text: object) -> str:
     return printable_lines(str(text)).replace("\n", "\n    ")
 
 
+def warn(*texts: object) -> None:
+    """Each on stderr, as ``secure-launch`` says what it goes on with."""
+    for text in texts:
+        print(f"secure-launch: warning: {message(text)}", file=sys.stderr)
+
+
 def quoted(text: str | PathLike[str]) -> str:
     """``text`` in quotes, as it is or as a Python literal where it holds a quote or is not printable."""
     plain = str(text)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from enclave_launch.boundary.words import some_of
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 
@@ -142,11 +143,10 @@ def zenoh_cannot_grant(enclave: str, gap: str) -> Diagnostic:
 
 def zenoh_router_trusted(processes: Sequence[str]) -> Diagnostic:
     """What enforcement by a router means for who must be trusted, told once per plan."""
-    shown = ", ".join(processes[:3]) + (f" and {len(processes) - 3} more" if len(processes) > 3 else "")
     text = (
-        f"{shown} on Zenoh: encryption ends at the router, which reads every message and alone enforces (on DDS every "
-        "participant does, end to end); who of several publishers of a topic sent a message is not proved; "
-        "ROS_SECURITY_STRATEGY has no effect. In return types are enforced, and what is taken away ends at once, "
-        "without a restart of processes"
+        f"{some_of(processes, 3)} on Zenoh: encryption ends at the router, which reads every message and alone "
+        "enforces (on DDS every participant does, end to end); who of several publishers of a topic sent a message is "
+        "not proved; ROS_SECURITY_STRATEGY has no effect. In return types are enforced, and what is taken away ends "
+        "at once, without a restart of processes"
     )
     return Diagnostic(Code.ZENOH_ROUTER_TRUSTED, "rmw_zenoh_cpp", text)

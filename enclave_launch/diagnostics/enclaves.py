@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from enclave_launch.boundary.words import some_of
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 
@@ -32,8 +33,7 @@ def enclave_attribute_unused(process: str, enclave: str, attribute: str, place: 
 
 def enclave_of_several_launches(enclave: str, others: Sequence[str], added: Sequence[str]) -> Diagnostic:
     """``others``: the launches; ``added``: what their share lets the processes of this one do."""
-    some = f"{', '.join(added[:4])}{f' and {len(added) - 4} more' if len(added) > 4 else ''}"
-    cost = f"; its processes may then also {some}" if added else ""
+    cost = f"; its processes may then also {some_of(added, 4)}" if added else ""
     text = f"enclave {enclave} is shared with {', '.join(others)}{cost}"
     remedy = (
         "--enclave-scope gives enclaves of their own, secure-keystore shares drops what is not used any more"

@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from enclave_launch.review.document import GrantedName
+from keystore.formats.permissions_patterns import has_wildcard
 
 _UNSPECIFIED = "<node_name_unspecified>"
 _NO_NAMESPACE = "<node_namespace_unspecified>"
@@ -120,7 +121,7 @@ def _described(
 
 
 def _interface(fields: Mapping[str, Any], stated: bool) -> ExpectedInterface:
-    wildcard = any(character in fields["name"] for character in "*?[")
+    wildcard = has_wildcard(fields["name"])
     certain = stated and not fields["built_in"] and not fields["note"] and not wildcard
     grant = GrantedName(fields["operation"], fields["name"])
     return ExpectedInterface(grant, fields["type"], certain, fields.get("qos", {}))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from enclave_launch.boundary.words import counted
 from enclave_launch.drift.finding import DriftFinding, Level
 from nodl.graph.model import Graph
 
@@ -24,7 +25,7 @@ def drift_text(findings: Sequence[DriftFinding], graph: Graph) -> str:
     ordered = sorted(findings, key=lambda each: (each.level is Level.NOTE, each.kind.value, each.subject))
     seen = f"{len(graph.processes)} participants, {sum(1 for _ in graph.nodes)} nodes"
     alarms = sum(each.level is Level.ALARM for each in findings)
-    summary = f"{alarms} alarm{'s' * (alarms != 1)}" if alarms else "as planned"
+    summary = counted(alarms, "alarm") if alarms else "as planned"
     return "\n".join([*map(finding_text, ordered), f"{summary}; seen: {seen}"]) + "\n"
 
 

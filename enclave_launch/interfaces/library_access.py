@@ -86,9 +86,11 @@ class LibraryAccess:
         depth: int = 0,
     ) -> Iterator[NodeInterface]:
         from nodl.dependence.apply import applied
+        from nodl.library import LibraryDocuments
 
         named = self._named(interface, started)
-        done = applied(named, self._situation(named, started, container), self)
+        documents = LibraryDocuments(self._library, self._distro)
+        done = applied(named, self._situation(named, started, container), documents)
         yield done.interface
         for further in done.further if depth < _FURTHER else ():
             yield from self._complete(further, started, container, depth + 1)
@@ -119,14 +121,3 @@ class LibraryAccess:
         else:
             situation = situation_of_component(started, container, interface, self._distro, installed)
         return situation._replace(launched=self._others) if self._others else situation
-
-    def of_class(self, plugin_class: str) -> NodeInterface | None:
-        hit = self._library.of_class(plugin_class, distro=self._distro)
-        return hit.document.interface if hit else None
-
-    def named(self, name: str) -> NodeInterface | None:
-        hit = self._library.named(name, distro=self._distro)
-        return hit.document.interface if hit else None
-
-    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
-        return self._library.transports()

@@ -15,6 +15,7 @@ from enclave_launch.recording.grants import WORDS, Need, PlannedGrants
 from enclave_launch.recording.recording import Recording, Unrecorded
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import RunEvent
+from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import Operation, Rule
 from nodl.record.asked import EndpointRole, asked_endpoint, role_of
 from nodl.record.lines import EndpointMade, Line
@@ -123,7 +124,7 @@ def _by(who: str, line: EndpointMade) -> str:
 
 
 def _used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bool:
-    if any(character in rule.expression for character in "*?["):
+    if has_wildcard(rule.expression):
         from keystore.formats.permissions_patterns import covers
 
         return any(

@@ -11,7 +11,7 @@ from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.node_permissions import OPERATIONS
 from keystore.formats.permissions import DdsRules, dds_rules
 from keystore.formats.permissions_names import dds_topics
-from keystore.formats.permissions_patterns import covers
+from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Qualifier, Rule
 from nodl.record.asked import Asked
 from nodl.record.assembly import RecordedNode, RecordedProcess
@@ -129,8 +129,4 @@ def _allowed(rules: DdsRules, topic: str, direction: str) -> bool:
     if any(covers(pattern, topic) for pattern in getattr(rules.deny, direction)):
         return False
     allowed = getattr(rules.allow, direction)
-    return topic in allowed or any(covers(pattern, topic) for pattern in allowed if _has_wildcard(pattern))
-
-
-def _has_wildcard(pattern: str) -> bool:
-    return any(character in pattern for character in "*?[")
+    return topic in allowed or any(covers(pattern, topic) for pattern in allowed if has_wildcard(pattern))

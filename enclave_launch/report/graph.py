@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 from enclave_launch.review.document import KIND_OF, OPERATIONS, Kind, Operation
+from keystore.formats.permissions_patterns import has_wildcard
 
 OUTWARD: frozenset[str] = frozenset({"publish", "call_services", "call_actions"})
 """Drawn from the node to the name; the other operations from the name to the node."""
@@ -57,7 +58,7 @@ class Channel(NamedTuple):
 
     @property
     def is_pattern(self) -> bool:
-        return any(character in self.name for character in "*?[")
+        return has_wildcard(self.name)
 
 
 class ChannelUse(NamedTuple):

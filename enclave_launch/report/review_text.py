@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from enclave_launch.boundary.words import counted
 from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument, Told
 from enclave_launch.review.similarity import Merge, Split
 
@@ -42,7 +43,7 @@ def findings_text(judged: Judged) -> str:
     open_ones = [told for told, accepted in judged if accepted is None]
     errors = sum(told.severity == "error" for told in open_ones)
     accepted_ones = f", {len(judged) - len(open_ones)} accepted" if len(judged) > len(open_ones) else ""
-    lines.append(f"{_count(errors, 'error')}, {_count(len(open_ones) - errors, 'warning')}{accepted_ones}")
+    lines.append(f"{counted(errors, 'error')}, {counted(len(open_ones) - errors, 'warning')}{accepted_ones}")
     return "\n".join(lines) + "\n"
 
 
@@ -67,19 +68,15 @@ def suggestions_text(merges: Sequence[Merge], splits: Sequence[Split]) -> str:
 def _merge(merge: Merge) -> Iterator[str]:
     yield (
         f"merge {merge.one} and {merge.two}: {merge.similarity:.0%} alike, "
-        f"costs {_count(merge.cost, 'permission')} in excess"
+        f"costs {counted(merge.cost, 'permission')} in excess"
     )
     yield from (f"  {enclave} would gain: {_names(gained)}" for enclave, gained in merge.excess)
 
 
 def _split(split: Split) -> Iterator[str]:
-    yield f"split {split.enclave}: saves {_count(split.gain, 'permission')}"
+    yield f"split {split.enclave}: saves {counted(split.gain, 'permission')}"
     yield from (f"  {node} would lose: {_names(saved)}" for node, saved in split.saved)
 
 
 def _names(grants: Sequence[GrantedName]) -> str:
     return ", ".join(map(str, grants))
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

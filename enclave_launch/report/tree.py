@@ -7,6 +7,7 @@ import shlex
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
+from enclave_launch.boundary.words import counted
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
@@ -57,7 +58,7 @@ def _enclave(plan: LaunchPlan, enclave: EnclavePolicy, gains: Sequence[Gain]) ->
 
 def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     process = item.process
-    what = f"{process.package}/{process.executable}" if process.package else process.executable
+    what = process.program
     names = shown_fqn(item)
     event = f", {process.on_event}" if process.on_event else ""
     why = f", {item.enclave.reason.value}" if item.enclave else ""
@@ -100,7 +101,7 @@ def origin_text(item: PlannedProcess | PlannedComponent) -> str:
         return "inferred from its source"
     if item.origin is InterfaceOrigin.RECORDED and item.nodes:
         runs = max(node.interface.runs for node in item.nodes)
-        return f"recorded in {runs} run{'s' * (runs != 1)}" if runs else str(item.origin)
+        return f"recorded in {counted(runs, 'run')}" if runs else str(item.origin)
     return str(item.origin)
 
 

@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import NamedTuple
 
 from enclave_launch.review.document import GrantedName, Operation, PlanDocument
-from keystore.formats.permissions_patterns import can_meet
+from keystore.formats.permissions_patterns import can_meet, has_wildcard
 from nodl.remap import ACTION_SERVICES, ACTION_TOPICS
 
 # Of two enclaves, the first does this and the second that: what flows from the first to the second. The answers of a
@@ -149,20 +149,16 @@ class _Takers:
         for holder, own in grants.items():
             for grant in own:
                 self._holders.setdefault(grant, set()).add(holder)
-        self._patterns = [grant for grant in self._holders if _is_pattern(grant.name)]
+        self._patterns = [grant for grant in self._holders if has_wildcard(grant.name)]
 
     def of(self, wanted: GrantedName) -> set[str]:
-        candidates = self._holders if _is_pattern(wanted.name) else self._patterns
+        candidates = self._holders if has_wildcard(wanted.name) else self._patterns
         met = [
             grant
             for grant in candidates
             if grant.operation == wanted.operation and can_meet(grant.name, wanted.name)
         ]
         return self._holders.get(wanted, set()).union(*(self._holders[grant] for grant in met))
-
-
-def _is_pattern(name: str) -> bool:
-    return any(character in name for character in "*?[")
 
 
 def _distances(graph: FlowGraph, source: str) -> dict[str, int]:

@@ -13,7 +13,7 @@ from __future__ import annotations
 import atexit
 import os
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from typing import Any
 
 from launch import LaunchDescription
@@ -30,7 +30,10 @@ from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the 
 from enclave_launch.ros2.session import EnclaveSession
 from enclave_launch.ros_rules.distro import choose_release
 from enclave_launch.secured import ProvisionedLaunch, zenoh_router
-from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY, SecuritySettings
+from enclave_launch.security_environment import (
+    OVERRIDE,
+    launcher_environment,
+)
 from nodl.ament_index import search_prefixes
 
 EXTENSION = "enclave_launch.ros2.node_action"
@@ -70,7 +73,7 @@ def _enclosed(
         router.__enter__()
         atexit.register(router.__exit__)  # after the last process
     actions: list[Any] = [
-        SetEnvironmentVariable(name, value) for name, value in security_variables(launch.settings).items()
+        SetEnvironmentVariable(name, value) for name, value in launcher_environment(launch.settings).items()
     ]
     # rcl lets this variable of the user's shell win over --enclave.
     actions.append(UnsetEnvironmentVariable(OVERRIDE))
@@ -85,11 +88,6 @@ def _read_secrets(launch: ProvisionedLaunch) -> Iterable[str]:
         if secret is not None and secret.variable and secret.variable in os.environ:
             secret.value()
             yield secret.variable
-
-
-def security_variables(settings: SecuritySettings) -> Mapping[str, str]:
-    """The environment that every process of a secured launch gets, whatever its enclave."""
-    return {ENABLE: "true", KEYSTORE: settings.keystore, STRATEGY: settings.strategy}
 
 
 def check_installed() -> None:

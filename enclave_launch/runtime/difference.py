@@ -68,7 +68,7 @@ def _shown(value: object) -> str:
 
 def _process_facts(process: ResolvedProcess) -> _Facts:
     return {
-        "program": f"{process.package}/{process.executable}" if process.package else process.executable,
+        "program": process.program,
         "node": process.fqn,
         "remap rules": parse_ros_arguments(process.cmd).remaps,
         "enclave": process.enclave.attribute,

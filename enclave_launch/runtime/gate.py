@@ -152,7 +152,7 @@ class PlannedGate:
 
 
 def _named(process: ResolvedProcess) -> str:
-    what = f"{process.package}/{process.executable}" if process.package else process.executable
+    what = process.program
     return f"{what} ({process.fqn})" if process.fqn else what
 
 

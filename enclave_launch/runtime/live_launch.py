@@ -338,17 +338,12 @@ class LiveLaunch:
         return self._new_services() if self._options.needs_ros_services else None
 
     def _new_services(self) -> RosServices:
-        self._services = RosServices(
-            self._gate.launcher() if self._gate is not None else None, self._late_say
-        )
+        self._services = RosServices(self._gate.launcher() if self._gate is not None else None, self.say)
         return self._services
 
     def _close_services(self) -> None:
         if self._services is not None:
             self._services.close()
-
-    def _late_say(self, level: Level, message: str) -> None:
-        self._say(level, message)
 
     def _open_log(self, tree: ProcessTree) -> LaunchLog:
         directory = make_log_directory(

@@ -6,7 +6,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.terminal import message
+from enclave_launch.boundary.terminal import warn
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.recording.audit import Audit, audit_json, audit_text
 from enclave_launch.recording.learning import new_run
@@ -25,8 +25,7 @@ def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSet
 
     from enclave_launch.flow import run
 
-    for problem in plan.problems:
-        print(f"secure-launch: warning: {message(problem)}", file=sys.stderr)
+    warn(*plan.problems)
     audit = Audit(plan)
     recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])
     status = run(plan, options=replace(settings, companion=recording))

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.words import counted
 from enclave_launch.errors import UsageError
 from enclave_launch.recording.isolation import DEVICES_STAY_REAL, Isolation, isolate
 from enclave_launch.recording.learning import (
@@ -90,7 +91,7 @@ def _record(
 
 def _report(learnt: LearntFolder, folder: Path) -> None:
     for path, node in learnt.files.items():
-        runs = f"{len(node.runs)} run{'s' * (len(node.runs) != 1)}"
+        runs = counted(len(node.runs), "run")
         print(f"{path}: node {node.key.node} of {node.program}, {len(node.entries)} endpoints, {runs}")
     for note in learnt.notes:
         _say(f"warning: {note}")

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from enclave_launch.boundary.command_line import complete, guarded
 from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import (
-    message,
     printable,
     safe_output,
     stdout_is_for_the_plan,
+    warn,
     write_coloured,
 )
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
@@ -106,7 +106,7 @@ def start(
             from enclave_launch.verb.watch import watch_plain_launch
 
             plan = _resolve(target, options)
-            _warn((*plan.problems, *plan.warnings))
+            warn(*plan.problems, *plan.warnings)
             print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
             return watch_plain_launch(plan, options, lambda watch: _run_settings(options, watch=watch))
         return _launch_plainly(target, options, companion)
@@ -222,9 +222,9 @@ def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | Non
     text = _plan_text(plan, options, keystore)
     told = (*plan.problems, *plan.warnings)
     if options.explain and told:
-        _warn((f"problems: {len(plan.problems)}, warnings: {len(plan.warnings)}; --dry-run shows them",))
+        warn(f"problems: {len(plan.problems)}, warnings: {len(plan.warnings)}; --dry-run shows them")
     elif options.format == "policy" or options.dump_params:  # the JSON holds them
-        _warn(told)
+        warn(*told)
     sys.stdout.write(short_paths(text, os.getcwd()) if options.explain else text)
     gc.freeze()  # the process ends now: no last search for garbage among all that was read
     return 0
@@ -307,7 +307,7 @@ def _launch(
     from enclave_launch.flow import provision, run
     from enclave_launch.verb.security import created_notices, expiry_notices, repair_notices, security_options
 
-    _warn(() if options.quiet else plan.warnings)
+    warn(*(() if options.quiet else plan.warnings))
     _check_before_keys_are_made(plan, keystore)
     if options.strategy == "Permissive":
         from enclave_launch.verb.usage import PERMISSIVE_NOTICE
@@ -319,7 +319,7 @@ def _launch(
             print(f"secure-launch: {printable(text)}", file=sys.stderr)
     repaired = (*repair_notices(launch), *launch.report.warnings, *launch.handshakes)
     gaps = launch.zenoh.gaps if launch.zenoh is not None else ()
-    _warn((*repaired, *gaps, *expiry_notices(launch, options.warn_expiry)))
+    warn(*repaired, *gaps, *expiry_notices(launch, options.warn_expiry))
     deadline = _deadline(launch) if options.restart_expiring else None
     watch = None
     if options.watch:
@@ -380,8 +380,3 @@ def _run_settings(
         log_limit=options.log_limit,
         deadline=deadline,
     )
-
-
-def _warn(texts: Iterable[object]) -> None:
-    for text in texts:
-        print(f"secure-launch: warning: {message(text)}", file=sys.stderr)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from datetime import timedelta
 
 from enclave_launch.boundary.progress import ProgressBar, wanted
+from enclave_launch.boundary.words import counted, some_of
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.options import SecurityOptions
 from enclave_launch.secured import ProvisionedLaunch
@@ -73,8 +74,7 @@ def created_notices(launch: ProvisionedLaunch) -> Iterator[str]:
         yield f"keystore {report.keystore} created"
     new = [enclave.enclave for enclave in report.enclaves if "created" in enclave.actions]
     if new:
-        listed = " ".join(new[:_LISTED]) + (f" and {len(new) - _LISTED} more" if len(new) > _LISTED else "")
-        yield f"{len(new)} enclave{'s' * (len(new) != 1)} created: {listed}"
+        yield f"{counted(len(new), 'enclave')} created: {some_of(new, _LISTED, ' ')}"
 
 
 def repair_notices(launch: ProvisionedLaunch) -> Iterator[str]:

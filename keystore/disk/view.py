@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import shlex
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from keystore.disk import layout, safe_files
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidEnclaveNameError,
+    InvalidInputError,
     NotAKeystoreError,
     SigningUnavailableError,
     StorageError,
@@ -136,6 +138,18 @@ class KeystoreView:
         relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
         pem = safe_files.read_if_there(self.root, relative)
         return read_certificate(pem, printable(relative)).common_name if pem else None
+
+    def require_enclaves(self, names: Iterable[str]) -> None:
+        """Raises InvalidInputError where one of them is not here."""
+        unknown = sorted(set(names) - set(self.enclaves()))
+        if unknown:
+            raise InvalidInputError(
+                f"no enclave {', '.join(unknown)} in {printable(self.root)}; secure-keystore list shows all"
+            )
+
+    def enclave_file(self, enclave: str, name: str) -> bytes | None:
+        """A public file of an enclave, ``None`` where it has none."""
+        return safe_files.read_if_there(self.root, f"{layout.enclave_directory(enclave)}/{name}")
 
     def enclaves(self) -> list[str]:
         """Names of all enclaves (directories with a key or a certificate), sorted; links are not followed."""

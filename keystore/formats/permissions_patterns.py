@@ -14,6 +14,11 @@ _ANY_TEXT = None  # stands for "*" among the elements of a pattern
 Element = frozenset[str] | None
 
 
+def has_wildcard(name: str) -> bool:
+    """Whether it stands for more than one name."""
+    return any(character in name for character in "*?[")
+
+
 def can_meet(a: str, b: str) -> bool:
     """Whether some name matches both expressions."""
     return _meet(_elements(a), _elements(b))
@@ -27,10 +32,10 @@ def covers(wide: str, narrow: str) -> bool:
     """
     if wide == narrow:
         return True
-    if not any(c in "*?[" for c in narrow):
+    if not has_wildcard(narrow):
         return can_meet(wide, narrow)
     prefix = wide[:-1]
-    return wide.endswith("*") and not any(c in "*?[" for c in prefix) and narrow.startswith(prefix)
+    return wide.endswith("*") and not has_wildcard(prefix) and narrow.startswith(prefix)
 
 
 def _meet(a: tuple[Element, ...], b: tuple[Element, ...]) -> bool:

@@ -11,6 +11,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from keystore.errors import InvalidInputError
+from keystore.formats.permissions_patterns import has_wildcard
 
 
 class PolicyError(InvalidInputError):
@@ -96,5 +97,5 @@ class Policy(NamedTuple):
 def _wildcards(enclave: EnclavePolicy) -> Iterator[str]:
     for profile in enclave.profiles:
         for rule in profile.rules:
-            if rule.qualifier is Qualifier.ALLOW and any(character in rule.expression for character in "*?["):
+            if rule.qualifier is Qualifier.ALLOW and has_wildcard(rule.expression):
                 yield rule.expression

@@ -8,6 +8,7 @@ from functools import cached_property
 from itertools import count
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.words import some_of
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
@@ -151,7 +152,7 @@ class EnclaveWriter:
     def _end_rights(self, state: EnclaveState, lost: tuple[str, ...]) -> EnclaveState:
         """Documents cannot be revoked: the old one would fit until it ends. What ends it is another subject, and the
         old certificate on the CRL."""
-        what = f"{', '.join(lost[:3])}{f' and {len(lost) - 3} more' if len(lost) > 3 else ''}"
+        what = some_of(lost, 3)
         if self._scheme is SubjectScheme.COMPATIBLE:
             self.warnings.append(
                 f"{state.enclave} may no longer {what}, but with compatible subjects its old permissions fit it until "

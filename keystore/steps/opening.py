@@ -112,7 +112,7 @@ def _replaced(view: KeystoreView, now: datetime) -> Iterator[IssuedCertificate]:
 
 def _issued(view: KeystoreView) -> Iterator[IssuedCertificate]:
     for enclave in view.enclaves():
-        pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(enclave)}/{layout.CERT}")
+        pem = view.enclave_file(enclave, layout.CERT)
         try:
             facts = certificate.read_pem(pem or b"")
             issuer = next((ca for ca in view.ca_bundle(Role.IDENTITY) if issued_by(facts, ca)), None)

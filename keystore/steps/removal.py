@@ -21,7 +21,6 @@ from keystore.disk import layout, lock
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
@@ -77,11 +76,7 @@ def remove(
     with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
         view = KeystoreView(root)
         lost = {one.enclave for one in revocable(view, opened.register, wanted)}
-        unknown = sorted(set(wanted) - set(view.enclaves()) - lost)
-        if unknown:
-            raise InvalidInputError(
-                f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
-            )
+        view.require_enclaves(set(wanted) - lost)
         warnings = _strike(opened, wanted, chosen, now)
         for name in wanted:
             opened.remove(layout.shares(name))

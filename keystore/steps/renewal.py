@@ -24,7 +24,6 @@ from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.disk.zenoh_files import has_router, zenoh_enclaves
-from keystore.errors import InvalidInputError, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
@@ -76,7 +75,7 @@ def renew(
     provisioning = chosen.provisioning._replace(create=False)
     now = provisioning.now or utc_now()
     named = None if enclaves is None else sorted({validate_enclave_name(name) for name in enclaves})
-    _refuse_unknown(root, named)
+    KeystoreView(root).require_enclaves(named or ())
     with _opened(root, provisioning, now) as opened:
         install_incoming(opened)
         repaired = [*opened.notes, *_repair_keystore(opened, chosen, now)]
@@ -120,14 +119,6 @@ def _opened(root: Path, options: ProvisionOptions, now: datetime) -> AbstractCon
     return opened_for_change(root, now, timeout=options.lock_timeout, durable=options.durable)
 
 
-def _refuse_unknown(root: Path, named: list[str] | None) -> None:
-    unknown = sorted(set(named or ()) - set(KeystoreView(root).enclaves()))
-    if unknown:
-        raise InvalidInputError(
-            f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
-        )
-
-
 def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: RenewOptions) -> WantedEnclave:
     """Enclaves not named are only completed, as any change of a CA demands it of all."""
     asked = name in named if named is not None else options.everything or _is_exposed(view, name, options)
@@ -149,7 +140,7 @@ def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
 
 
 def _facts(view: KeystoreView, name: str) -> CertificateFacts | None:
-    pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(name)}/{layout.CERT}")
+    pem = view.enclave_file(name, layout.CERT)
     try:
         return certificate.read_pem(pem) if pem else None
     except DerError:

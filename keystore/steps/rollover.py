@@ -224,14 +224,15 @@ def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
 
 def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) -> bool:
     """What cannot be read belongs to no CA; renew or verify tells of it."""
-    directory = layout.enclave_directory(enclave)
-    pem = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
-    signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
+    pem = view.enclave_file(enclave, layout.CERT)
+    signed = view.enclave_file(enclave, layout.PERMISSIONS)
     with suppress(DerError, DamagedKeystoreError):
         if Role.IDENTITY in roles and pem and not read_pem(pem).names_issuer(view.ca(Role.IDENTITY)):
             return True
         if Role.PERMISSIONS in roles and signed:
-            return not smime.read(signed, directory).embeds(view.ca(Role.PERMISSIONS).der)
+            return not smime.read(signed, layout.enclave_directory(enclave)).embeds(
+                view.ca(Role.PERMISSIONS).der
+            )
     return False
 
 

@@ -82,11 +82,7 @@ def write_zenoh(
     view = KeystoreView(root)
     view.require_complete()
     asked = set(enclaves)
-    unknown = sorted(asked - set(view.enclaves()))
-    if unknown:
-        raise InvalidInputError(
-            f"no enclave {', '.join(unknown)} in {printable(root)}; secure-keystore list shows all"
-        )
+    view.require_enclaves(asked)
     names = sorted({*asked, *zenoh_enclaves(view)})
     address = _address(view, chosen)
     if (found := _as_wanted(view, names, address, chosen)) is not None:

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.progress import ProgressBar, wanted
 from enclave_launch.boundary.terminal import json_text
+from enclave_launch.boundary.words import counted
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import parse_duration, parse_end, utc_now
 
@@ -205,7 +206,7 @@ def print_report(report: ProvisionReport, arguments: argparse.Namespace) -> None
     if arguments.verbose:
         print_lines(f"{path}: unchanged" for path in unchanged)
     elif unchanged:
-        print(f"{len(unchanged)} enclave{'s' if len(unchanged) != 1 else ''} unchanged")
+        print(f"{counted(len(unchanged), 'enclave')} unchanged")
 
 
 def warn(warnings: Iterable[str], arguments: argparse.Namespace) -> None:

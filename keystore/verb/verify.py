@@ -10,6 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.words import counted
 from keystore.verb import common
 
 if TYPE_CHECKING:
@@ -29,11 +30,6 @@ def describe(parser: argparse.ArgumentParser) -> None:
         "--require-ca", metavar="SHA256", action="append", default=[],
         help="fingerprint of a CA certificate that may be trusted, no other may; repeatable",
     )  # fmt: skip
-
-
-def counted(number: int, what: str) -> str:
-    """``1 enclave``, ``2 enclaves``."""
-    return f"{number} {what}{'s' if number != 1 else ''}"
 
 
 def run(arguments: argparse.Namespace) -> int:

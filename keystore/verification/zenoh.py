@@ -85,7 +85,7 @@ def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
             )  # fmt: skip
             yield from _told(view, file, wanted, found or b"")
     for enclave in view.enclaves():
-        pem = safe_files.read_if_there(view.root, f"{layout.enclave_directory(enclave)}/{layout.CERT}")
+        pem = view.enclave_file(enclave, layout.CERT)
         if pem is not None and read_certificate(pem, enclave).names_hosts:
             yield Finding(
                 Severity.EXPOSURE, "zenoh-impostor", f"{layout.enclave_directory(enclave)}/{layout.CERT}",

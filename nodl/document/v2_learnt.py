@@ -18,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
+from enclave_launch.boundary.words import counted
 from nodl.document.v2_section import IDENTITY_KEY
 from nodl.errors import InvalidElementError
 from nodl.name_template import NameTemplate, ParameterPart
@@ -66,7 +67,7 @@ def _note(row: YamlMap) -> str:
     """``recorded in 2 runs``, and how sure its source is."""
     runs, undecided = _texts(row.items.get("runs")), _texts(row.items.get("undecided"))
     proof = row.items.get("proof")
-    texts = [f"recorded in {len(runs)} run{'s' * (len(runs) != 1)}"] if runs else []
+    texts = [f"recorded in {counted(len(runs), 'run')}"] if runs else []
     if undecided:
         texts.append(
             f"undecided whether it is fixed or comes from {' or '.join(undecided)}: only this name is granted"

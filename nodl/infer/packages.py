@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.files import text_or_nothing
 
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
@@ -51,22 +51,15 @@ def find_package(file: str) -> Package | None:
 @lru_cache(maxsize=512)
 def read_package(folder: str) -> Package:
     base = Path(folder)
-    match = _NAME.search(_text(base / "package.xml"))
+    match = _NAME.search(text_or_nothing(base / "package.xml"))
     name = match[1] if match else base.name
     entries = (*_python_entries(base / "setup.py"), *_text_entries(base / "setup.cfg"))
     return Package(name, folder, entries, _cmake_programs(base / "CMakeLists.txt"))
 
 
-def _text(path: Path) -> str:
-    try:
-        return read_text(path, errors="replace")
-    except OSError:
-        return ""
-
-
 def _python_entries(path: Path) -> list[EntryPoint]:
     try:
-        tree = ast.parse(_text(path))
+        tree = ast.parse(text_or_nothing(path))
     except (SyntaxError, ValueError):
         return []
     entries = []
@@ -79,12 +72,12 @@ def _python_entries(path: Path) -> list[EntryPoint]:
 
 
 def _text_entries(path: Path) -> list[EntryPoint]:
-    matches = (_ENTRY.match(line) for line in _text(path).splitlines())
+    matches = (_ENTRY.match(line) for line in text_or_nothing(path).splitlines())
     return [EntryPoint(match[1], match[2], match[3]) for match in matches if match]
 
 
 def _cmake_programs(path: Path) -> frozenset[str]:
     names: set[str] = set()
-    for block in _PROGRAMS.findall(_text(path)):
+    for block in _PROGRAMS.findall(text_or_nothing(path)):
         names.update(word.rpartition("/")[2] for word in block.split())
     return frozenset(names)

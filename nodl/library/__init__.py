@@ -111,6 +111,27 @@ class Library:
         return Hit(document, "" if fitting else _doubt(document, distro, version))
 
 
+class LibraryDocuments(NamedTuple):
+    """What documents refer to in a library, as ``nodl.dependence.apply`` asks for it."""
+
+    library: Library
+    distro: str = ""
+
+    def of_class(self, plugin_class: str) -> NodeInterface | None:
+        """The description of a plugin by its class."""
+        hit = self.library.of_class(plugin_class, distro=self.distro)
+        return hit.document.interface if hit else None
+
+    def named(self, name: str) -> NodeInterface | None:
+        """The description ``package/stem``."""
+        hit = self.library.named(name, distro=self.distro)
+        return hit.document.interface if hit else None
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
+        """As ``Library.transports``."""
+        return self.library.transports()
+
+
 def fits(versions: dict[str, str], distro: str, version: str | None) -> bool:
     """Whether a document that was read from ``versions`` (a series by distribution) holds here.
 

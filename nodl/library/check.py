@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from nodl.ament_index import package_file_version
 from nodl.infer.packages import read_package
-from nodl.library import Library, fits
+from nodl.library import Library, LibraryDocuments, fits
 from nodl.library.document import LibraryDocument
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 
@@ -134,28 +134,10 @@ def _brought(interface: NodeInterface, library: Library) -> set[_Name]:
     waiting = [interface]
     while waiting and len(names) < _MOST:
         current = waiting.pop()
-        done = applied(current, situation._replace(node=current.name or "node"), _Documents(library))
+        done = applied(current, situation._replace(node=current.name or "node"), LibraryDocuments(library))
         names |= {(e.kind, _key(e.name.text)) for e in done.interface.endpoints}
         waiting.extend(done.further)
     return names
-
-
-class _Documents:
-    """A library as ``apply`` asks it."""
-
-    def __init__(self, library: Library):
-        self._library = library
-
-    def of_class(self, plugin_class: str) -> NodeInterface | None:
-        hit = self._library.of_class(plugin_class)
-        return hit.document.interface if hit else None
-
-    def named(self, name: str) -> NodeInterface | None:
-        hit = self._library.named(name)
-        return hit.document.interface if hit else None
-
-    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
-        return self._library.transports()
 
 
 def _shown(names: Iterable[_Name]) -> tuple[str, ...]:

@@ -15,7 +15,6 @@ from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reach import SourcesInReach
-    from nodl.library import Library
     from nodl.lookup import ManifestLookup
     from nodl.node_interface import NodeInterface
     from nodl.record.asked import AskedNode
@@ -185,11 +184,11 @@ def _at_this_start(node: AskedNode, interfaces: Iterable[NodeInterface]) -> list
     nodes that they bring."""
     from nodl.dependence import Situation
     from nodl.dependence.apply import applied, own_name
-    from nodl.library import Library
+    from nodl.library import Library, LibraryDocuments
 
     namespace, name = split_fqn(node.fqn)
     situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)
-    documents = _Documents(Library(), node.distro)
+    documents = LibraryDocuments(Library(), node.distro)
     found: list[NodeInterface] = []
     waiting = list(interfaces)
     while waiting and len(found) < _MOST_NODES:
@@ -198,24 +197,6 @@ def _at_this_start(node: AskedNode, interfaces: Iterable[NodeInterface]) -> list
         found.append(done.interface)
         waiting += done.further
     return found
-
-
-class _Documents(NamedTuple):
-    """What documents of the library refer to (``nodl.dependence.apply.Documents``)."""
-
-    library: Library
-    distro: str
-
-    def of_class(self, plugin_class: str) -> NodeInterface | None:
-        hit = self.library.of_class(plugin_class, distro=self.distro)
-        return hit.document.interface if hit else None
-
-    def named(self, name: str) -> NodeInterface | None:
-        hit = self.library.named(name, distro=self.distro)
-        return hit.document.interface if hit else None
-
-    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
-        return self.library.transports()
 
 
 _SAYS = {"manifest": _described, "inference": _inferred, "library": _of_library}

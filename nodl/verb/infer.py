@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import printable
+from enclave_launch.boundary.words import counted
 from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
@@ -73,7 +74,7 @@ def run(args: argparse.Namespace) -> int:
     if not system.nodes:
         count = len(system.files)
         print(
-            f"secure-nodl infer: error: no node was found in {count} source file{'s' * (count != 1)}",
+            f"secure-nodl infer: error: no node was found in {counted(count, 'source file')}",
             file=sys.stderr,
         )
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):

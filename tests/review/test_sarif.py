@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from pathlib import Path
 from typing import Any
 
@@ -41,8 +42,8 @@ told = st.builds(
     code=st.sampled_from(sorted(RULES)),
     subject=text,
     file=st.none()
-    | st.text(st.characters(exclude_characters="\0"), min_size=1, max_size=20).map(
-        lambda name: f"{ROOT}/{name}"
+    | st.binary(min_size=1, max_size=20).map(  # names as a file may have them, also those that are not UTF-8
+        lambda name: f"{ROOT}/{os.fsdecode(name.replace(bytes(1), b'0'))}"
     ),
     line=st.integers(0, 10**6),
     text=text,

@@ -11,15 +11,8 @@ from enclave_launch.description.markup.entity import Entity
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import SomeEntitiesType
-    from enclave_launch.description.events.process import ProcessExited
-    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
     from enclave_launch.ros_rules.distro import Release
-
-
-if TYPE_CHECKING:
-    OnExit = SomeEntitiesType | Callable[[ProcessExited, LaunchContext], SomeEntitiesType | None]
 
 
 def _text(entity: Entity, parser: Parser, name: str) -> Any:

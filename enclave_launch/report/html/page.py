@@ -10,6 +10,7 @@ import re
 from pathlib import Path
 
 from enclave_launch import __version__
+from enclave_launch.boundary.words import counted
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.html import tables
 from enclave_launch.report.html.data import graph_data
@@ -96,7 +97,7 @@ def _summary(contents: ReportContents) -> str:
         (open_ones.count("warning"), "warning"),
         (len(contents.judged) - len(open_ones), "accepted finding"),
     )
-    return ", ".join(f"{number} {what}{'' if number == 1 else 's'}" for number, what in figures)
+    return ", ".join(counted(number, what) for number, what in figures)
 
 
 _FILTER = (

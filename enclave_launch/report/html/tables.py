@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from enclave_launch.boundary.words import counted
 from enclave_launch.report.contents import Influence, ReportContents
 from enclave_launch.report.flows import step_text
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph
@@ -26,7 +27,7 @@ def permissions(contents: ReportContents) -> str:
         opened = " open" if number == 0 else ""
         parts.append(
             f'<details class="enclave" data-enclave="{number}"{opened}><summary><code>{text(enclave)}</code> '
-            f"{_count(members, 'node')}, {_count(len(own), 'permission')} asked for, "
+            f"{counted(members, 'node')}, {counted(len(own), 'permission')} asked for, "
             f"{len(uses) - len(own)} that every node has</summary>\n"
             + table(
                 f"What enclave {text(enclave)} may do, and why",
@@ -102,7 +103,7 @@ def flows(contents: ReportContents) -> str:
 
 def _influence(one: Influence) -> str:
     ways = "<br>".join(text(step_text(step)) for step in one.steps)
-    return row((f"<code>{text(one.enclave)}</code>", ways or "nobody", _count(one.reached, "enclave")))
+    return row((f"<code>{text(one.enclave)}</code>", ways or "nobody", counted(one.reached, "enclave")))
 
 
 def statistics(contents: ReportContents) -> str:
@@ -130,7 +131,3 @@ def _endings(endings: Iterable[Ending]) -> Iterator[str]:
         left = "ended" if one.days_left < 0 else str(one.days_left)
         mark = f'<strong class="error">{left}</strong>' if one.days_left < SOON else left
         yield row((text(one.ends), mark, text(one.subject)))
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

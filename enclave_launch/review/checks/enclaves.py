@@ -6,9 +6,11 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from enclave_launch.boundary.words import some_of
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, Told
 from enclave_launch.review.similarity import splits
+from keystore.formats.permissions_patterns import has_wildcard
 
 _NAMED = 3  # permissions that a node gains, by name; the rest is counted
 
@@ -26,7 +28,7 @@ def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]
     told = " ".join(each.text for each in plan.told if each.code == "pattern-accepted")
     for enclave, grants in sorted(plan.enclaves.items()):
         for grant in sorted(grants):
-            if any(character in grant.name for character in "*?[") and f" {grant.name}:" not in told:
+            if has_wildcard(grant.name) and f" {grant.name}:" not in told:
                 yield finding(
                     "wildcard",
                     grant.name,
@@ -38,18 +40,13 @@ def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]
 def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
     """Enclaves in which nodes gain permissions of others."""
     for split in splits(plan):
-        gains = "; ".join(f"{node} gains {_some(grants)}" for node, grants in split.saved)
+        gains = "; ".join(f"{node} gains {some_of(grants, _NAMED)}" for node, grants in split.saved)
         yield finding(
             "enclave-shared",
             split.enclave,
             f"{len(plan.units_of(split.enclave))} nodes share enclave {split.enclave}: {gains}",
             "give them enclaves of their own (enclave=, --enclave-scope node); secure-plan suggest shows all",
         )
-
-
-def _some(grants: tuple[GrantedName, ...]) -> str:
-    named = ", ".join(map(str, grants[:_NAMED]))
-    return f"{named} and {len(grants) - _NAMED} more" if len(grants) > _NAMED else named
 
 
 def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:

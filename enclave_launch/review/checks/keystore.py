@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+from enclave_launch.boundary.words import some_of
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, Told
 from enclave_launch.review.signed import as_signed
@@ -63,7 +64,7 @@ def _enclave(
         ("keystore-grants-less", wanted - signed[enclave], f"the {who} does not let"),
     ):
         if grants:
-            text = f"{words} enclave {enclave} {_some(sorted(grants))}"
+            text = f"{words} enclave {enclave} {some_of(sorted(grants), _NAMED)}"
             yield finding(code, enclave, text, f"{_PROVISION}; secure-plan diff KEYSTORE ... shows all")
 
 
@@ -82,8 +83,3 @@ def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[Told]:
                 "secure-keystore renew",
             )
             yield told._replace(severity="error") if one.days_left < 0 else told
-
-
-def _some(grants: list[GrantedName]) -> str:
-    named = ", ".join(map(str, grants[:_NAMED]))
-    return f"{named} and {len(grants) - _NAMED} more" if len(grants) > _NAMED else named

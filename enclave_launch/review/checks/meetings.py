@@ -6,9 +6,10 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations, product
 from typing import Any, NamedTuple
 
+from enclave_launch.boundary.words import some_of
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import KIND_OF, GrantedName, Operation, PlanDocument, Told
-from keystore.formats.permissions_patterns import can_meet
+from keystore.formats.permissions_patterns import can_meet, has_wildcard
 from nodl.graph.quality import INFINITE, Quality, unmet
 
 Document = Mapping[str, Any]
@@ -49,14 +50,10 @@ def missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
     yield finding(
         "ends-not-judged",
         names[0],
-        f"{_some(names)} have one end only among what is known, but not all is known of {_some(gaps)}",
+        f"{some_of(names, _NAMED)} have one end only among what is known, "
+        f"but not all is known of {some_of(gaps, _NAMED)}",
         "close the gaps, and check again",
     )
-
-
-def _some(names: list[str]) -> str:
-    shown = ", ".join(names[:_NAMED])
-    return f"{shown} and {len(names) - _NAMED} more" if len(names) > _NAMED else shown
 
 
 _NAMED = 5
@@ -74,9 +71,9 @@ def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
         everywhere.setdefault(grant.operation, set()).add(grant.name)
     for here, there, code, verb in _ENDS:
         others = everywhere.get(there, set())
-        patterns = {name for name in others if any(character in name for character in "*?[")}
+        patterns = {name for name in others if has_wildcard(name)}
         for name in sorted(asked.get(here, ())):
-            candidates = others if any(character in name for character in "*?[") else patterns
+            candidates = others if has_wildcard(name) else patterns
             if name not in others and not any(can_meet(name, other) for other in candidates):
                 who = sorted({user.node for user in users.get((here, name), ())})
                 yield finding(

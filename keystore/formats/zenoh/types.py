@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
+from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation
 from keystore.formats.shares import Share
 from keystore.formats.zenoh.grants import Types, Use, grants_of_policy
@@ -50,7 +51,7 @@ def united_types(known: Iterable[tuple[Use, str, str | None]]) -> Types:
     return {
         key: tuple(sorted(one for one in chunks if one is not None))
         for key, chunks in sorted(found.items())
-        if None not in chunks and not any(character in key[1] for character in "*?[")
+        if None not in chunks and not has_wildcard(key[1])
     }
 
 

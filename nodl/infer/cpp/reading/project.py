@@ -11,7 +11,7 @@ from functools import cached_property
 from html import unescape
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.files import read_text, text_or_nothing
 from enclave_launch.boundary.shell_words import split_words
 from nodl.infer.cpp.reading.cmake import Build, Target, read_build
 
@@ -46,7 +46,7 @@ class SourcePackage:
     @cached_property
     def plugins(self) -> list[PluginClass]:
         files = list(self.build.plugin_files)
-        manifest = _read(os.path.join(self.folder, "package.xml"))
+        manifest = text_or_nothing(os.path.join(self.folder, "package.xml"))
         files += [p.replace("${prefix}", self.folder) for _, p in _EXPORT.findall(manifest)]
         return [each for file in dict.fromkeys(files) for each in plugin_classes(file)]
 
@@ -165,7 +165,7 @@ def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
 
 
 def read_source_package(folder: str) -> SourcePackage:
-    manifest = re.sub(r"<!--(?:.|\n)*?-->", "", _read(os.path.join(folder, "package.xml")))
+    manifest = re.sub(r"<!--(?:.|\n)*?-->", "", text_or_nothing(os.path.join(folder, "package.xml")))
     match = _NAME.search(manifest)
     return SourcePackage(
         match[1] if match else os.path.basename(folder), folder, frozenset(_TAG.findall(manifest))
@@ -175,7 +175,7 @@ def read_source_package(folder: str) -> SourcePackage:
 def plugin_classes(file: str) -> list[PluginClass]:
     """The classes of a plugin description file; none when it cannot be read."""
     found = []
-    for match in _CLASS.finditer(re.sub(r"<!--(?:.|\n)*?-->", "", _read(file))):
+    for match in _CLASS.finditer(re.sub(r"<!--(?:.|\n)*?-->", "", text_or_nothing(file))):
         values = {m[1]: unescape(m[2] if m[2] is not None else m[3]) for m in _ATTRIBUTE.finditer(match[1])}
         if "type" in values:
             name = values.get("name") or values["type"]
@@ -199,10 +199,3 @@ def sources_of(target: Target, build: Build) -> list[str]:
                 order.append(linked.name)
                 waiting.append(linked)
     return list(dict.fromkeys(file for name in order for file in build.targets[name].sources))
-
-
-def _read(path: str) -> str:
-    try:
-        return read_text(path, errors="replace")
-    except OSError:
-        return ""
