@@ -52,6 +52,10 @@ class Certainty(str, Enum):
     UNKNOWN = "unknown"
 
 
+QosPolicies = tuple[tuple[str, "str | int"], ...]
+"""Policies of quality of service by NoDL v2's names, sorted; what is not known is left out."""
+
+
 class Endpoint(NamedTuple):
     """One publisher, subscription, server or client, under the name the node's code uses.
 
@@ -67,9 +71,7 @@ class Endpoint(NamedTuple):
     written: str = ""  # the text in the source where a reader took it for another name, else empty
     introspected: bool = False  # a service whose calls are published below its name (service introspection)
     note: str = ""  # what else a reader should know: the parameter or plugin that the name comes from
-    qos: tuple[
-        tuple[str, str | int], ...
-    ] = ()  # policies that the description fixes, by NoDL v2's names; sorted
+    qos: QosPolicies = ()  # what the description fixes
 
 
 class Gap(NamedTuple):

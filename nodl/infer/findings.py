@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from nodl.infer.values import BOTTOM, FieldCells, Value, join
-from nodl.node_interface import EndpointKind
+from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef
 
 
@@ -21,6 +21,7 @@ class FoundEndpoint:
     name: object
     type: str
     source: SourceRef
+    qos: QosPolicies = ()
 
 
 @dataclass(eq=False)

@@ -119,6 +119,7 @@ def _identity(record: NodeRecord, endpoint: FoundEndpoint) -> object:
         str(name),
         endpoint.type,
         endpoint.source,
+        endpoint.qos,
     )
 
 

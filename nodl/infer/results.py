@@ -118,7 +118,9 @@ def _plain_texts(value: Value) -> list[str]:
 
 def _endpoints(found: FoundEndpoint, note: str) -> list[Endpoint]:
     return [
-        Endpoint(found.kind, template, found.type, found.source, certainty_of(template), note=note)
+        Endpoint(
+            found.kind, template, found.type, found.source, certainty_of(template), note=note, qos=found.qos
+        )
         for template in templates(found.name)
     ]
 

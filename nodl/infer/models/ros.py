@@ -12,6 +12,7 @@ from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros_parameters
 from nodl.infer.models.endpoints import endpoint_object
+from nodl.infer.models.quality import known_quality
 from nodl.infer.models.ros_nodes import (
     LIFECYCLE_CLASS,
     NODE_CLASS,
@@ -59,11 +60,12 @@ def argument(call: Call, where: Argument) -> Value | None:
 def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call: Call) -> None:
     names = argument(call, made.name) or unknown("a name that is not given")
     types = argument(call, made.type) or ANY
+    qos = known_quality(call, made.qos) if made.qos else ()
     run.understood.add(call.node)
     for record in records:
         for name in names_of(names):
             for interface_type in types_of(types):
-                endpoint = FoundEndpoint(made.kind, name, interface_type, call.source)
+                endpoint = FoundEndpoint(made.kind, name, interface_type, call.source, qos)
                 record.add_endpoint(endpoint)
     for callback in made.callbacks:
         value = argument(call, callback.argument)

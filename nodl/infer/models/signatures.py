@@ -36,13 +36,15 @@ class CallbackArgument:
 
 @dataclass(frozen=True, slots=True)
 class EndpointCall:
-    """A call that makes one endpoint; ``node`` is ``None`` for methods of the node itself."""
+    """A call that makes one endpoint; ``node`` is ``None`` for methods of the node itself; ``qos``: position of
+    ``qos_profile``, 0 where there is none."""
 
     kind: EndpointKind
     type: Argument
     name: Argument
     node: Argument | None = None
     callbacks: tuple[CallbackArgument, ...] = ()
+    qos: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,13 +68,16 @@ class Helper:
 _CALLBACK = Argument(2, "callback")
 
 NODE_ENDPOINTS: dict[str, EndpointCall] = {
-    "create_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic")),
-    "create_lifecycle_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic")),
+    "create_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic"), qos=2),
+    "create_lifecycle_publisher": EndpointCall(
+        PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic"), qos=2
+    ),
     "create_subscription": EndpointCall(
         SUBSCRIPTION,
         Argument(0, "msg_type"),
         Argument(1, "topic"),
         callbacks=(CallbackArgument(_CALLBACK, 1),),
+        qos=3,
     ),
     "create_service": EndpointCall(
         SERVER, Argument(0, "srv_type"), Argument(1, "srv_name"), callbacks=(CallbackArgument(_CALLBACK, 2),)

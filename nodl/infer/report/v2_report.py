@@ -15,10 +15,17 @@ from nodl.dependence import Dependence
 from nodl.document.v2_schema import NAME_PATTERN, TYPE_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.name_template import NameTemplate, ParameterPart
-from nodl.node_interface import RANDOM_ENDING, ClientLibrary, Endpoint, EndpointKind, NodeInterface
+from nodl.node_interface import (
+    RANDOM_ENDING,
+    ClientLibrary,
+    Endpoint,
+    EndpointKind,
+    NodeInterface,
+    QosPolicies,
+)
 
 _PARAMETER = re.compile(r"[A-Za-z_][\w.\-/]*\Z")
-_QOS = ", qos: {history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
+_UNKNOWN_QOS = (("history", "SYSTEM_DEFAULT"), ("reliability", "SYSTEM_DEFAULT"))
 
 
 class _Entry(NamedTuple):
@@ -31,6 +38,7 @@ class _Entry(NamedTuple):
     template: str = ""
     each: str = ""
     when: tuple[str, str] = ("", "")
+    qos: QosPolicies = ()
 
 
 def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
@@ -78,7 +86,10 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
         dict.fromkeys(entry for e in node.endpoints if (entry := _entry(e, node.depends)) is not None)
     )
     lines = [f"# Node {node.name or '(name not known)'}, inferred from {node.source}."]
-    lines += ["# Quality of service is not inferred; put in what the code asks for.", "nodl_version: 2"]
+    lines += [
+        "# SYSTEM_DEFAULT: quality of service that is not inferred; put in what the code asks for.",
+        "nodl_version: 2",
+    ]
     lines += [
         "codegen:",
         f"  {IDENTITY_KEY}:",
@@ -91,14 +102,23 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
             for name, default in sorted(node.depends.defaults.items())
         ]
     for category, kind in CATEGORIES.items():
-        listed = {(entry.name, entry.type): None for entry in entries if entry.kind is kind}
+        listed: dict[tuple[str, str], set[QosPolicies]] = {}
+        for entry in entries:
+            if entry.kind is kind:
+                listed.setdefault((entry.name, entry.type), set()).add(entry.qos)
         if listed:
             lines.append(f"{category}:")
-        qos = _QOS if kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION) else ""
+        topics = kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
         lines += [
-            f"  - {{name: {_quoted(name)}, type: {_quoted(type_)}{qos}}}" for name, type_ in sorted(listed)
+            f"  - {{name: {_quoted(name)}, type: {_quoted(type_)}{_qos(found) if topics else ''}}}"
+            for (name, type_), found in sorted(listed.items())
         ]
     return "\n".join([*lines, ""])
+
+
+def _qos(found: set[QosPolicies]) -> str:
+    known = next(iter(found)) if len(found) == 1 else ()
+    return f", qos: {{{', '.join(f'{name}: {value}' for name, value in known or _UNKNOWN_QOS)}}}"
 
 
 def _section(node: NodeInterface, entries: Iterable[_Entry], listener: bool) -> list[str]:
@@ -146,11 +166,11 @@ def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | No
     if variation is not None:
         tests = [test for group in variation.when.any_of for test in group]
         when = (tests[0].parameter, tests[0].values[0]) if tests else ("", "")
-        return _Entry(endpoint.kind, name, endpoint.type, variation.name, "", when)
+        return _Entry(endpoint.kind, name, endpoint.type, variation.name, "", when, endpoint.qos)
     if template.is_literal:
-        return _Entry(endpoint.kind, name, endpoint.type)
+        return _Entry(endpoint.kind, name, endpoint.type, qos=endpoint.qos)
     written = _written(template)
-    return None if written is None else _Entry(endpoint.kind, name, endpoint.type, *written)
+    return None if written is None else _Entry(endpoint.kind, name, endpoint.type, *written, qos=endpoint.qos)
 
 
 def _written(template: NameTemplate) -> tuple[str, str] | None:

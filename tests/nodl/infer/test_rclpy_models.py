@@ -76,6 +76,52 @@ def test_calls_that_make_endpoints(call: str, infer: Infer) -> None:
     assert not system.nodes[0].gaps
 
 
+DEFAULT = {"history": "KEEP_LAST", "reliability": "RELIABLE", "durability": "VOLATILE"}
+SENSOR_DATA = {**DEFAULT, "depth": 5, "reliability": "BEST_EFFORT"}
+QUALITIES: dict[str, dict[str, str | int]] = {
+    "node.create_publisher(String, 't', 7)": {**DEFAULT, "depth": 7},
+    "d = 3\nnode.create_subscription(String, 't', print, d)": {**DEFAULT, "depth": 3},
+    "node.create_publisher(String, 't', qos_profile=qos_profile_sensor_data)": SENSOR_DATA,
+    "node.create_subscription(String, 't', print, rclpy.qos.QoSPresetProfiles.SENSOR_DATA.value)": SENSOR_DATA,
+    # The neighbours, of which nothing is certain:
+    "node.create_publisher(String, 't', qos_profile_system_default)": {},
+    "node.create_publisher(String, 't', QoSProfile(depth=7))": {},
+    "node.create_publisher(String, 't', int(input()))": {},
+    "node.create_publisher(String, 't', 7 if input() else 8)": {},
+    "node.create_publisher(String, 't', 7 if input() else qos_profile_sensor_data)": {},
+    "node.create_publisher(String, 't', 7, qos_overriding_options=QoSOverridingOptions.with_default_policies())": {},
+    "node.create_publisher(String, 't', *([7] if input() else [8]))": {},
+    "node.create_publisher(String, 't', True)": {},
+    "node.create_publisher(String, 't', 0)": {},
+    "node.create_service(Empty, 't', print)": {},
+}
+
+
+@pytest.mark.parametrize("call", QUALITIES)
+def test_quality_of_service_is_known_where_it_is_certain(call: str, infer: Infer) -> None:
+    imports = (
+        "from rclpy.qos import QoSProfile, qos_profile_sensor_data, qos_profile_system_default\n"
+        "from rclpy.qos_overriding_options import QoSOverridingOptions\n"
+    )
+    (endpoint,) = infer(HEAD + imports + call + "\n").nodes[0].endpoints
+    assert dict(endpoint.qos) == QUALITIES[call]
+
+
+def test_of_two_outcomes_with_their_own_quality_both_are_told(infer: Infer) -> None:
+    """So that whoever compares takes either."""
+    system = infer(
+        HEAD
+        + """
+node.declare_parameter('fast', False)
+if node.get_parameter('fast').value:
+    node.create_publisher(String, 't', 1)
+else:
+    node.create_publisher(String, 't', 50)
+"""
+    )
+    assert {dict(e.qos)["depth"] for e in system.nodes[0].endpoints} == {1, 50}
+
+
 def test_each_node_has_its_own(infer: Infer) -> None:
     """Two objects of one class, told apart by where they are made."""
     system = infer(
