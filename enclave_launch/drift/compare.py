@@ -120,7 +120,13 @@ class _Comparison:
                 f"it claims the subject of enclave {enclave}, and shows nothing to this observer: its certificate is "
                 "of another CA or revoked, its governance differs, or two DDS implementations fail to shake hands"
             )
-            yield self._about(Kind.NOT_AUTHENTICATED, process, text, enclave=enclave)
+            yield self._about(
+                Kind.NOT_AUTHENTICATED,
+                process,
+                text,
+                enclave=enclave,
+                remedy="look once more with secure-plan drift, which shakes hands anew; else stop it",
+            )
 
     def _enclave(self, process: GraphProcess) -> str:
         """By proof; empty where nothing proves one."""

@@ -76,8 +76,8 @@ def test_calls_that_make_endpoints(call: str, infer: Infer) -> None:
     assert not system.nodes[0].gaps
 
 
-DEFAULT = {"history": "KEEP_LAST", "reliability": "RELIABLE", "durability": "VOLATILE"}
-SENSOR_DATA = {**DEFAULT, "depth": 5, "reliability": "BEST_EFFORT"}
+DEFAULT: dict[str, str | int] = {"history": "KEEP_LAST", "reliability": "RELIABLE", "durability": "VOLATILE"}
+SENSOR_DATA: dict[str, str | int] = {**DEFAULT, "depth": 5, "reliability": "BEST_EFFORT"}
 QUALITIES: dict[str, dict[str, str | int]] = {
     "node.create_publisher(String, 't', 7)": {**DEFAULT, "depth": 7},
     "d = 3\nnode.create_subscription(String, 't', print, d)": {**DEFAULT, "depth": 3},
