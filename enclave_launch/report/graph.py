@@ -10,6 +10,7 @@ import os
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 from enclave_launch.review.document import KIND_OF, OPERATIONS, Kind, Operation
 from keystore.formats.permissions_patterns import has_wildcard
@@ -78,12 +79,19 @@ class ChannelUse(NamedTuple):
 
 
 class EnclaveGraph(NamedTuple):
-    """Everything sorted by name; ``uses`` by enclave, member, operation and name."""
+    """Everything sorted by name; ``uses`` by enclave, member, operation and name; ``middlewares``: what enforces the
+    permissions of an enclave, ``DDS``, ``Zenoh`` or both."""
 
     enclaves: tuple[str, ...]
     members: tuple[NodeMember, ...]
     channels: tuple[Channel, ...]
     uses: tuple[ChannelUse, ...]
+    middlewares: Mapping[str, str]
+
+    def enforcement(self, enclave: str) -> str:
+        """To add to a sentence: nothing for DDS, which is what a reader expects."""
+        middleware = self.middlewares[enclave]
+        return "" if middleware == "DDS" else f", enforced by {middleware}"
 
 
 _Key = tuple[str, "int | None", Operation, str]
@@ -103,7 +111,16 @@ def plan_graph(document: Mapping[str, Any], root: str = "") -> EnclaveGraph:
         ChannelUse(member, enclave, number_of[KIND_OF[operation], name], operation, tuple(why))
         for (enclave, member, operation, name), why in sorted(reasons.items(), key=_order)
     )
-    return EnclaveGraph(tuple(sorted(document["enclaves"])), members, channels, uses)
+    enclaves = tuple(sorted(document["enclaves"]))
+    return EnclaveGraph(
+        enclaves, members, channels, uses, {path: _middlewares(document, path) for path in enclaves}
+    )
+
+
+def _middlewares(document: Mapping[str, Any], enclave: str) -> str:
+    own = (process for process in document["processes"] if process.get("enclave") == enclave)
+    found = {"Zenoh" if process.get("middleware") == ZENOH else "DDS" for process in own}
+    return " and ".join(sorted(found)) or "DDS"
 
 
 def _order(item: tuple[_Key, list[UseReason]]) -> tuple[str, int, int, str]:

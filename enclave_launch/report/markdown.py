@@ -88,7 +88,7 @@ def _enclave(graph: EnclaveGraph, enclave: str, uses: list[ChannelUse]) -> Itera
         )
         yield from _table(("operation", "name", "asked for by", "evidence"), rows)
         yield ""
-    yield f"{len(uses) - len(own)} more that every node has."
+    yield f"{len(uses) - len(own)} more that every node has{graph.enforcement(enclave)}."
 
 
 def _flows(contents: ReportContents) -> Iterator[str]:

@@ -152,3 +152,27 @@ def test_a_router_file_that_is_none_is_an_error_and_no_traceback(
     (keystore / "zenoh/router.json5").write_text("// by hand\n{mode: 'router'}")
     assert main(["diff", str(keystore), *words(LAUNCH)]) != 0
     assert "zenoh/router.json5 is not a configuration of Zenoh in JSON" in capsys.readouterr().err
+
+
+def test_reports_and_evidence_say_what_enforces_and_what_is_wrong_with_it(
+    keystore: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert main(["report", *words(LAUNCH), "-o", str(tmp_path / "zenoh.html")]) == 0
+    assert ", enforced by Zenoh</summary>" in (tmp_path / "zenoh.html").read_text()
+    edit(keystore / "zenoh/router.json5", '"gossip": {"enabled": false}', '"gossip": {"enabled": true}')
+    arguments = [*words(LAUNCH), "--keystore", str(keystore), "--expect", str(_no_rules(tmp_path))]
+    assert main(["evidence", *arguments, "-o", str(tmp_path / "evidence")]) == 1
+    rows = json.loads((tmp_path / "evidence/access-control.json").read_text())["permissions"]
+    assert {row["enforced_by"] for row in rows} == {"Zenoh"}
+    findings = json.loads((tmp_path / "evidence/findings.json").read_text())["findings"]
+    assert any(one["code"] == "keystore-zenoh" and "gossip" in one["text"] for one in findings)
+    assert "zenoh-setting" in (tmp_path / "evidence/secure-defaults.json").read_text()
+    monkeypatch.delenv("RMW_IMPLEMENTATION")
+    assert main(["report", *words(LAUNCH), "-o", str(tmp_path / "dds.html")]) == 0
+    assert "enforced by" not in (tmp_path / "dds.html").read_text()
+
+
+def _no_rules(folder: Path) -> Path:
+    file = folder / "none.yaml"
+    file.write_text("{}")
+    return file

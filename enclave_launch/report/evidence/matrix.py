@@ -13,7 +13,8 @@ from enclave_launch.report.reasons import evidence_text
 
 
 class Row(NamedTuple):
-    """``node`` is empty where only a policy file says so. ``built_in``: every node has it."""
+    """``node`` is empty where only a policy file says so. ``built_in``: every node has it. ``enforced_by``: ``DDS`` by
+    each participant, ``Zenoh`` by the router."""
 
     enclave: str
     node: str
@@ -22,6 +23,7 @@ class Row(NamedTuple):
     types: str
     built_in: bool
     evidence: str
+    enforced_by: str
 
 
 def rows(graph: EnclaveGraph) -> Iterator[Row]:
@@ -36,6 +38,7 @@ def rows(graph: EnclaveGraph) -> Iterator[Row]:
             " ".join(channel.types),
             use.built_in,
             " | ".join(dict.fromkeys(evidence_text(reason) for reason in use.reasons)) or "a policy file",
+            graph.middlewares[use.enclave],
         )
 
 

@@ -28,7 +28,7 @@ def permissions(contents: ReportContents) -> str:
         parts.append(
             f'<details class="enclave" data-enclave="{number}"{opened}><summary><code>{text(enclave)}</code> '
             f"{counted(members, 'node')}, {counted(len(own), 'permission')} asked for, "
-            f"{len(uses) - len(own)} that every node has</summary>\n"
+            f"{len(uses) - len(own)} that every node has{contents.graph.enforcement(enclave)}</summary>\n"
             + table(
                 f"What enclave {text(enclave)} may do, and why",
                 ("operation", "name", "type", "asked for by", "evidence"),
