@@ -74,6 +74,8 @@ def _main(options: argparse.Namespace) -> int:
     from nodl.ament_index import search_prefixes
 
     _check_prefixes(options.prefix)
+    if options.show_all_subprocesses_output:
+        os.environ["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] = "both"  # as ros2 launch says it to launch
     target = find_target(options.words, search_prefixes(options.prefix))
     if options.show_args or options.print_description:
         with ament_prefixes(options.prefix):
@@ -366,8 +368,6 @@ def _run_settings(
 ) -> RunSettings:
     from enclave_launch.options import RunSettings
 
-    if options.show_all_subprocesses_output:
-        os.environ["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] = "both"
     secrets = frozenset({options.ca_passphrase_env}) if options.ca_passphrase_env else frozenset()
     return RunSettings(
         noninteractive=options.noninteractive,

@@ -116,7 +116,7 @@ def generate_launch_description():
 
 @pytest.mark.parametrize("with_security", [False, True], ids=["plain", "secured"])
 def test_each_class_of_code_is_called_once(tmp_path: Path, with_security: bool) -> None:
-    _, counts = launch(tmp_path, EVERY_CLASS, *(secured(tmp_path) if with_security else ()))
+    _, counts = launch(tmp_path, EVERY_CLASS, "-a", *(secured(tmp_path) if with_security else ()))
     kinds = "function with entities", "function without entities", "substitution", "action", "command"
     events = {f"{event} {kind}" for event in ("timer", "exit", "start") for kind in kinds}
     others = {"completed callback", "shutdown callback", "shutdown function without entities"}
@@ -229,3 +229,23 @@ def generate_launch_description():
 """
     said, _ = launch(tmp_path, text, *secured(tmp_path))
     assert "[echo-1] made" in said
+
+
+AGAIN = """
+def function(context):
+    note("function")
+    return [echo("ended")]
+
+
+def generate_launch_description():
+    process = ExecuteProcess(cmd=["true"], respawn=True, respawn_max_retries=2)
+    return LaunchDescription([
+        process, RegisterEventHandler(OnProcessExit(target_action=process, on_exit=[OpaqueFunction(function=function)]))
+    ])
+"""
+
+
+def test_what_was_given_is_taken_for_the_first_event_only(tmp_path: Path) -> None:
+    """Each of the three exits starts a process of its own, as launch has it."""
+    said, counts = launch(tmp_path, AGAIN, *secured(tmp_path))
+    assert said.count("] ended") == counts["function"] == 3
