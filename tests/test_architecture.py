@@ -162,6 +162,13 @@ def test_deciding_stages_do_not_import_what_acts(folder: str) -> None:
     assert wrong == []
 
 
+def test_only_the_disk_room_of_the_keystore_makes_files_that_may_hold_a_key() -> None:
+    makers = {
+        path.relative_to(ROOT).parts[1] for path in sources("keystore") if "O_CREAT" in path.read_text()
+    }
+    assert makers == {"disk"}
+
+
 def modules_loaded_by(arguments: list[str]) -> set[str]:
     """What a whole run of ``secure-launch`` imports."""
     code = (

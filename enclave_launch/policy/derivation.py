@@ -16,13 +16,11 @@ from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import permissions_large, policy_answers
 from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
+from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 
 if TYPE_CHECKING:
     from keystore.formats.policy_xml import PolicyDocument
-
-# Distributions whose rcl remaps the name of an action as a whole (ros2/rcl pull request 1170).
-_REMAPS_ACTION_NAMES = frozenset({"kilted", "lyrical", "rolling"})
 
 # How the operations are called where names are listed for people and programs.
 LIST_NAMES: dict[Operation, str] = {
@@ -96,7 +94,7 @@ def derive_policy(
             node_permissions(
                 node,
                 distro=distro,
-                actions_as_a_whole=distro in _REMAPS_ACTION_NAMES if whole is None else whole,
+                actions_as_a_whole=distro in REMAPS_WHOLE_ACTIONS if whole is None else whole,
                 accept_patterns=chosen.accept_patterns,
                 also=chosen.also,
             ),

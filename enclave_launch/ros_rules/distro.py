@@ -62,7 +62,6 @@ class Feature(Enum):
     EVAL_MODULES = Since("eval takes modules, and knows math itself")
     EXIT_AND_TTY_ATTRIBUTES = Since("XML process attributes on_exit, emulate_tty", humble=(1, 0, 9))
     TIMEOUT_ATTRIBUTES = Since("XML process attributes respawn_max_retries, sigterm_timeout, sigkill_timeout")
-    RESPAWN_MAX_RETRIES = Since("ExecuteLocal(respawn_max_retries=)")
     SET_ROS_LOG_DIR = Since("action set_ros_log_dir, class SetROSLogDir", "launch_ros")
     LIFECYCLE_TRANSITION = Since("class LifecycleTransition", "launch_ros", humble=(0, 19, 10))
     CAPITAL_ROS_NAMES = Since("classes PushROSNamespace, ROSTimer", "launch_ros")
@@ -120,10 +119,6 @@ class Feature(Enum):
         "set_use_sim_time evaluates its value in XML and YAML", "launch_ros",
         humble=(0, 19, 10), jazzy=(0, 26, 7), kilted=(0, 28, 1), rolling=(0, 29), source=_LAUNCH_ROS_LOG,
     )  # fmt: skip
-    FIND_PACKAGE_PATHS = Since(
-        "operator / on FindPackageShare and its siblings", "launch_ros",
-        humble=(0, 19, 13), jazzy=(0, 26, 10), kilted=(0, 28, 1), source=_LAUNCH_ROS_LOG,
-    )  # fmt: skip
     LIFECYCLE_AUTOSTART = Since(
         "autostart of lifecycle nodes", "launch_ros",
         jazzy=(0, 26, 7), kilted=(0, 28, 1), source=_LAUNCH_ROS_LOG,
@@ -132,19 +127,14 @@ class Feature(Enum):
         "text parameters are always quoted in parameter files", "launch_ros",
         jazzy=None, kilted=(0, 28, 1), rolling=(0, 29), source=_LAUNCH_ROS_LOG,
     )  # fmt: skip
-    COMPONENT_NAME_SLASH = Since(
-        "leading slash of component names in parameter files", "launch_ros",
-        jazzy=None, kilted=(0, 28, 1), rolling=(0, 29), source=_LAUNCH_ROS_LOG,
-    )  # fmt: skip
     LIFECYCLE_TAGS = Since(
         "tags lifecycle_node and composable_lifecycle_node", "launch_ros",
         jazzy=None, kilted=None, source=_LAUNCH_ROS_LOG,
     )  # fmt: skip
-    ACTION_NAME_REMAPPING = Since(
-        "the name of an action is remapped as a whole", jazzy=None, kilted=ALWAYS, rolling=(3, 9),
-        source="rcl change 1170",
-    )  # fmt: skip
 
+
+REMAPS_WHOLE_ACTIONS = frozenset({Distro.KILTED, Distro.LYRICAL, Distro.ROLLING})
+"""Where rcl remaps the name of an action as a whole (ros2/rcl pull request 1170); elsewhere its five names apart."""
 
 _VERSIONS: dict[Distro, tuple[Version, Version]] = {
     Distro.HUMBLE: ((1, 0, 7), (0, 19, 8)),

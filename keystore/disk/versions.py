@@ -105,12 +105,15 @@ class Versions:
                 os.unlink(path)
 
 
-def write_new(path: Path, data: bytes, mode: int) -> None:
-    """A file that was not there, private from its first byte, with exactly this mode; not yet durable."""
+def write_new(path: Path, data: bytes, mode: int, *, durable: bool = False) -> None:
+    """A file that was not there, private from its first byte, with exactly this mode; on the disk when ``durable``."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
     with os.fdopen(descriptor, "wb") as stream:
         os.fchmod(descriptor, mode)
         stream.write(data)
+        if durable:
+            stream.flush()
+            os.fsync(descriptor)
 
 
 def _make_directories(root: Path, relative: str) -> None:

@@ -18,6 +18,7 @@ from pathlib import Path
 from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import ExportedFile, archive_bytes, parents
 from keystore.disk.safe_files import resolve_root
+from keystore.disk.versions import write_new
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
 from keystore.formats.validity import utc_now
@@ -158,7 +159,7 @@ def _write(target: Path, files: list[ExportedFile]) -> None:
     try:
         if target.name.endswith((".tar", ".tar.gz")):
             content = archive_bytes(files, compressed=target.name.endswith(".gz"))
-            _create(aside, content, store.PRIVATE_MODE)  # it holds keys
+            write_new(aside, content, store.PRIVATE_MODE, durable=True)  # it holds keys
         else:
             _write_directory(aside, files)
         os.rename(aside, target)
@@ -178,7 +179,7 @@ def _write_directory(aside: Path, files: list[ExportedFile]) -> None:
         if file.link is not None:
             os.symlink(file.link, path)
         else:
-            _create(path, file.data, file.mode)
+            write_new(path, file.data, file.mode, durable=True)
 
 
 def _make_directories(aside: Path, relative: str) -> None:
@@ -189,12 +190,3 @@ def _make_directories(aside: Path, relative: str) -> None:
             os.chmod(aside / parent, 0o755)
         except FileExistsError:
             continue
-
-
-def _create(path: Path, data: bytes, mode: int) -> None:
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, mode)
-    with os.fdopen(descriptor, "wb") as stream:
-        os.fchmod(descriptor, mode)
-        stream.write(data)
-        stream.flush()
-        os.fsync(descriptor)
