@@ -54,7 +54,7 @@ _HARMLESS_CLASSES = re.compile(
     r"|rcl\w*_\w+|rcutils_\w+|rmw_\w+|rcpputils::.*|class_loader::.*|builtin_interfaces::.*"
     r"|\w+::(?:msg|srv|action)::.*|Q[A-Z]\w*|Ui::.*"
     r"|(?:unsigned |signed |long |short )*(?:bool|int|float|double|char|void|long|short|unsigned|size_t|auto)?"
-    r"|u?int(?:8|16|32|64)_t|uint|byte|FILE|pthread_\w+|timespec|timeval|sigset_t|[A-Z]"
+    r"|u?int(?:8|16|32|64)_t|uint|byte|va_list|FILE|pthread_\w+|timespec|timeval|sigset_t|[A-Z]"
 )
 _HARMLESS_FUNCTIONS = re.compile(
     r"(?:std|Eigen|cv|boost|tf2|fmt|angles|YAML|nlohmann|pcl|rcpputils|rcutils|ament_index_cpp|KDL|cv_bridge|__builtin)::.*"

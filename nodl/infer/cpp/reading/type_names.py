@@ -6,7 +6,9 @@ import re
 from functools import lru_cache
 from typing import NamedTuple
 
-_NOISE = re.compile(r"\b(?:const|volatile|typename|struct|class|static|constexpr|inline|mutable|enum)\b")
+_NOISE = re.compile(
+    r"\b(?:const|volatile|typename|struct|union|class|static|constexpr|inline|mutable|enum)\b"
+)
 POINTER_MEMBERS = frozenset({
     "SharedPtr", "UniquePtr", "WeakPtr", "ConstSharedPtr", "ConstUniquePtr", "ConstWeakPtr", "Ptr", "ConstPtr",
     "SharedPtrConst",

@@ -60,11 +60,21 @@ def construct(
     return (made_object,)
 
 
+_NUMBERS_ONLY = re.compile(
+    r"\{(?:\s*(?:const |unsigned )*(?:double|float|int|bool|char|long|short|size_t|u?int\d+_t)\b[^;{}()]*;)*\s*\}"
+)
+"""A structure without a name whose members are numbers."""
+
+
 def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: bool) -> None:
     """A class that is neither in reach nor in the table may be a node or make one.
 
     ``deliberate``: it is made with arguments or with new, as structures of C are not.
     """
+    if kind.name.startswith("{"):
+        if not _NUMBERS_ONLY.fullmatch(kind.name):
+            run.gap(node, frame, "a structure without a name is made: its members may make interfaces")
+        return
     first = kind.name.partition("::")[0]
     if first in KNOWN_HEADERS and not (deliberate and first in ROS_LIBRARIES):
         return

@@ -264,3 +264,14 @@ def test_classes_of_one_name_in_two_files_stay_two(tmp_path: Path) -> None:
         ("first", "n", "one"),
         ("second", "m", "two"),
     }
+
+
+@pytest.mark.parametrize("made", ["union two { int a; }; union two t;", "span s = {0.0, 1.0};"])
+def test_structures_of_numbers_are_no_gap(made: str, tmp_path: Path) -> None:
+    source = in_class(made, before="#include <acme/acme.hpp>\ntypedef struct { double a; double b; } span;\n")
+    assert not gaps(infer(tmp_path, source))
+
+
+def test_a_structure_that_holds_something_else_is_one(tmp_path: Path) -> None:
+    source = in_class("span s;", before="#include <acme/acme.hpp>\ntypedef struct { acme::Thing a; } span;\n")
+    assert gaps(infer(tmp_path, source))
