@@ -285,13 +285,19 @@ def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Functio
     return found[0] if found else None
 
 
+MAX_OVERLOADS = 3
+
+
 def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Sequence[Function]:
-    """The overloads that fit best: more than one where their looks do not decide."""
+    """The overloads that fit best: more than one where a text may be meant in several ways. Of arguments that are not
+    known the first decides; the ledger asks about the others."""
     fitting = [each for each in functions if _takes(each, len(arguments))]
     if len(fitting) <= 1:
         return fitting or (functions if len(functions) == 1 else ())
     scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
-    return [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
+    best = [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
+    is_text = any(isinstance(atom, Text) for value in arguments for atom in value)
+    return best if is_text and len(best) <= MAX_OVERLOADS else best[:1]
 
 
 def _takes(function: Function, count: int) -> bool:
