@@ -70,6 +70,12 @@ PLAYER = node(
     "resume", "seek", "set_rate", "stop", "toggle_paused",
     publishes=("rt/events/read_split", *EVENTS), subscribes=EVENTS,
 )  # fmt: skip
+LISTENER = servers("/transform_listener_impl_55b9c9ae84e0/get_type_description")
+RVIZ = node(
+    "rviz", *PARAMETER_SERVICES, "reset_time",
+    publishes=(*EVENTS, *LISTENER[0]), subscribes=(*EVENTS, *LISTENER[1], "rt/tf", "rt/tf_static"),
+)  # fmt: skip
+RVIZ_TOOLS = ("rt/goal_pose", "rt/initialpose", "rt/clicked_point")
 FOLD = "/fold/_action"
 FOLDING = Has(
     tuple(f"rq{FOLD}/{each}Request" for each in ("send_goal", "cancel_goal", "get_result")),
@@ -107,6 +113,8 @@ CASES: dict[str, tuple[tuple[str, ...], Has, Has, Has]] = {
     "record": (
         ("/chatter",), RECORDER, Has((), ("rt/chatter",)), Has(("rt/chatter", *EVENTS), ("rt/other",)),
     ),
+    "rviz": (("/scan",), RVIZ, Has((), ("rt/scan",)), Has((*RVIZ_TOOLS, "rt/scan", "rt/tf"), ("rt/map",))),
+    "rviz-control": (("/scan",), RVIZ, Has(RVIZ_TOOLS, ("rt/scan",)), Has(("rt/cmd_vel",), ("rt/map",))),
     "play": (("/chatter",), PLAYER, Has(("rt/chatter",), ()), Has(("rt/other", "rt/clock"), ("rt/chatter",))),
 }  # fmt: skip
 
