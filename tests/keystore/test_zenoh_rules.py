@@ -23,6 +23,7 @@ from keystore.formats.zenoh.key_expressions import (
     name_expressions,
     type_chunk,
 )
+from keystore.formats.zenoh.meaning import meaning
 from keystore.formats.zenoh.router import Subject, router_configuration
 from keystore.formats.zenoh.rules import AccessRule, access_rules
 from keystore.formats.zenoh.session import TlsFiles, session_configuration
@@ -221,3 +222,15 @@ def test_a_process_is_a_client_that_checks_who_the_router_is() -> None:
     assert tls["verify_name_on_connect"] is True and tls["connect_private_key"] == "/ks/x/key.pem"
     assert found["scouting"]["gossip"] == {"enabled": False} == found["scouting"]["multicast"]
     assert found["timestamping"]["enabled"]["client"] is True  # without it transient local keeps nothing
+
+
+@pytest.mark.parametrize(
+    "name", ["/chatter", "/a/b/c", "/fleet/*", "/cam*", "/ca*ra", "/a/*/b", "/*", "/a*b*"]
+)
+@pytest.mark.parametrize("types", [(), ("std_msgs::msg::dds_::String_",)])
+def test_keys_read_back_are_the_names_that_they_were_made_from(name: str, types: tuple[str, ...]) -> None:
+    for key in data_keys(("3",), name, types):
+        found = meaning("ingress", "put", key)
+        assert found is not None and (found.use, found.name, found.domain) == (Use.PUBLISH, name, "3")
+        assert found.type in ("", *(["std_msgs/msg/String"] if types else []))
+        assert meaning("egress", "query", f"{key}/@adv/**") == found

@@ -192,6 +192,24 @@ def test_the_verb_reads_files_and_tells_by_its_exit_status(
     assert main(["denials", str(keystore), str(tmp_path / "missing.log")]) == 2
 
 
+HANDSHAKES = {
+    "certificate expired: verification time 1795327740 (UNIX), but certificate is not valid after 17953": "has ended",
+    "UnknownIssuer": "another CA",
+    "certificate does not allow extended key usage for client authentication, allows server auth": "for no client",
+    "BadSignature": "does not accept its certificate",
+}
+
+
+@pytest.mark.parametrize("said", HANDSHAKES)
+def test_why_a_certificate_was_not_accepted_is_told(tmp_path: Path, said: str) -> None:
+    """Lines of rmw_zenohd 0.2.10; its hint about open files has nothing to do with it."""
+    keystore = filled(tmp_path / "ks", ("/a",))
+    line = f"2026-11-22T06:12:01Z  WARN acc-0 ThreadId(05) zenoh_link_tls::unicast: invalid peer certificate: {said}"
+    (one,) = told(keystore, f"{line}. Hint: increase the system open file limit.")
+    assert HANDSHAKES[said] in one.why and "Hint" not in one.who
+    assert told(keystore, line.replace(f"invalid peer certificate: {said}", "tls handshake eof")) == []
+
+
 def test_a_key_that_looks_like_a_line_of_the_log_is_only_a_key(tmp_path: Path) -> None:
     keystore = filled(tmp_path / "ks", ("/a", "/b"))
     main(["zenoh", str(keystore)])
