@@ -83,7 +83,10 @@ def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution]) 
 
 
 def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Path) -> list[Substitution]:
-    """Text becomes a ``TextSubstitution``, one substitution a list. Raises ``TypeError`` for anything else."""
+    """Text becomes a ``TextSubstitution``, one substitution a list, an iterable item by item.
+
+    Raises ``TypeError`` for anything else.
+    """
     if isinstance(subs, str):
         return [TextSubstitution(text=subs)]
     if type(subs) is list:

@@ -62,7 +62,7 @@ def files_changed(before: Path | str, after: Path | str) -> list[tuple[str, Zeno
 
 
 def _read(view: KeystoreView, file: str, roots: Iterable[Path] = ()) -> ZenohConfiguration:
-    """``roots``: of two keystores that are compared; where each lies is no difference, nor that one is a copy."""
+    """``roots``: of two keystores that are compared; where each lies does not count, nor that one is a copy."""
     text = safe_files.read_if_there(view.root, file) or b"{}"
     for root in roots:
         text = text.replace(f'"{root}/'.encode(), b'"KEYSTORE/')

@@ -14,7 +14,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Print the names of all enclaves. Returns 0."""
     from keystore.steps.enclaves import list_enclaves
 
     names = list_enclaves(arguments.keystore)

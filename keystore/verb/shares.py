@@ -21,7 +21,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Print which launch shares which enclave, or drop a launch. Returns 0."""
     from keystore.errors import printable
     from keystore.steps.enclaves import drop_shares
     from keystore.steps.options import ProvisionOptions

@@ -66,7 +66,7 @@ def _unmet(offered: Quality, requested: Quality) -> Iterator[str]:
 
 
 def differences(planned: Mapping[str, str | int], seen: Quality) -> tuple[str, ...]:
-    """How ``seen`` is another than ``planned``, by NoDL v2's names; what either does not say is no difference."""
+    """How ``seen`` is another than ``planned``, by NoDL v2's names; what either does not say does not count."""
     return tuple(
         f"{what} is {has}, planned is {wanted}"
         for what, has, wanted in _compared(planned, seen)

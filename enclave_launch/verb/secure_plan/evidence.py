@@ -110,7 +110,7 @@ def _moment(text: str | None) -> datetime:
     except InvalidInputError as error:
         raise UsageError(f"--at {text}: {error}") from error
     except (ValueError, OverflowError, OSError) as error:
-        raise UsageError(f"SOURCE_DATE_EPOCH={epoch} is no time: {error}") from error
+        raise UsageError(f"SOURCE_DATE_EPOCH={epoch} is not a time: {error}") from error
 
 
 def _keys(keystore: Path) -> list[dict[str, Any]]:

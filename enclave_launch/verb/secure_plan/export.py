@@ -69,7 +69,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Write the files. Returns 0."""
     from enclave_launch.deployment.folder import write_folder
     from enclave_launch.deployment.placement import ONLY_HOST, place
     from enclave_launch.deployment.processes import deployed_processes

@@ -34,7 +34,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Print or write the report. Returns 0."""
     from enclave_launch.boundary.new_file import write_text
 
     document = read_plan(options.words, options)

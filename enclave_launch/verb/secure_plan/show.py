@@ -16,7 +16,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Print the plan. Returns 0."""
     from enclave_launch.report.review_text import plan_text
     from enclave_launch.review.document import plan_from_document
 

@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Print which enclaves could be merged or split. Returns 0."""
     from enclave_launch.report.review_text import suggestions_text
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.review.similarity import merges, splits

@@ -30,7 +30,7 @@ class MessagePermission(NamedTuple):
 
 
 class ZenohConfiguration(NamedTuple):
-    """``settings``: path -> value of all that is no rule; ``admitted``: common name of a certificate -> permissions;
+    """``settings``: path -> value of everything but rules; ``admitted``: common name of a certificate -> permissions;
     ``enclaves``: whose name it is, as the file says."""
 
     settings: Mapping[str, object]
