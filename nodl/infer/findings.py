@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from nodl.infer.values import BOTTOM, FieldCells, Value, join
+from nodl.infer.values import BOTTOM, FieldCells, Unknown, Value, join
 from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef
 
@@ -62,6 +62,9 @@ class OptionDefaults:
     def declare(self, name: str, default: Value) -> None:
         self._defaults[name] = join(self._defaults.get(name, BOTTOM), default)
 
+    def replace(self, name: str, default: Value) -> None:
+        self._defaults[name] = default
+
     def default(self, name: str) -> Value:
         return self._defaults.get(name, BOTTOM)
 
@@ -80,6 +83,12 @@ class Findings:
     def count(self) -> int:
         """How much was found; it never shrinks."""
         return len(self.nodes) + len(self.gaps) + sum(len(r.endpoints) + len(r.gaps) for r in self.nodes)
+
+    @property
+    def is_open(self) -> bool:
+        """Whether there is a gap already, or a name of which nothing is known."""
+        unknown = any(type(each.name) is Unknown for record in self.nodes for each in record.endpoints)
+        return unknown or bool(self.gaps) or any(record.gaps for record in self.nodes)
 
     def add_node(self, record: NodeRecord) -> NodeRecord:
         self.nodes.setdefault(record)

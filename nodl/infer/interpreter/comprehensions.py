@@ -28,7 +28,9 @@ from nodl.infer.values import (
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     inner = _inner_frame(run, frame)
     collected: list[Value] = []
-    exact = _generate(run, node.generators, 0, inner, lambda: collected.append(run.evaluate(node.elt, inner)))
+    exact = _generate(
+        run, node.generators, 0, inner, lambda: collected.append(run.evaluate(node.elt, inner)), frame
+    )
     _leave(inner)
     kind = "set" if isinstance(node, ast.SetComp) else "list"
     if exact:
@@ -48,7 +50,7 @@ def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
         value = run.evaluate(node.value, inner)
         store_item(run, result, key, value)
 
-    _generate(run, node.generators, 0, inner, add)
+    _generate(run, node.generators, 0, inner, add, frame)
     _leave(inner)
     return (result,)
 
@@ -72,11 +74,9 @@ def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
 
 
 def _inner_frame(run: Run, frame: Frame) -> Frame:
+    """Of a comprehension in ``frame``; in a class body it does not see the names of the class (reference, 4.2.2)."""
     closure = frame.closure if frame.is_class else frame
-    cells = LocalCells()
-    if frame.is_class:
-        cells.update(frame.cells)
-    inner = Frame(frame.module, cells, closure, run.state.depth)
+    inner = Frame(frame.module, LocalCells(), closure, run.state.depth)
     inner.function = frame.function
     inner.is_comprehension = True
     return inner
@@ -89,14 +89,22 @@ def _leave(inner: Frame) -> None:
 
 
 def _generate(
-    run: Run, generators: list[ast.comprehension], index: int, frame: Frame, emit: Callable[[], None]
+    run: Run,
+    generators: list[ast.comprehension],
+    index: int,
+    frame: Frame,
+    emit: Callable[[], None],
+    around: Frame | None = None,
 ) -> bool:
-    """Bind the targets for every combination and ``emit``. True: exactly the emitted elements, in order."""
+    """Bind the targets for every combination and ``emit``. True: exactly the emitted elements, in order.
+
+    ``around``: where the first of all iterables is evaluated.
+    """
     if index == len(generators):
         emit()
         return True
     generator = generators[index]
-    items = elements(run, run.evaluate(generator.iter, frame), generator.iter, frame)
+    items = elements(run, run.evaluate(generator.iter, around or frame), generator.iter, frame)
     if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.fuel):
         run.repeated += 1
         element = items.any_element()

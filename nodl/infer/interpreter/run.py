@@ -42,15 +42,15 @@ from nodl.source_ref import SourceRef
 # What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
 MAX_STEPS = 800_000
+MAX_STEPS_IN_VAIN = 200_000  # for a program of which something stays unknown, whatever else is found
 MAX_DEPTH = 120  # analysed calls inside calls
 MAX_FOLLOWED_STEPS = 100_000  # after these, loops and recursion are joined
 MAX_TURNS = 3_000  # of loops that are followed turn by turn, in one run
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
 
-_INERT = frozenset(
-    {str, int, float, bool, bytes, type(None), Text, Unknown}
-)  # others can do nothing with these
+# Others can do nothing with these.
+_INERT = frozenset({str, int, float, bool, bytes, type(None), Text, Unknown})
 _FUNCTIONS = frozenset({FunctionValue, BoundMethod, Partial})
 
 
@@ -102,9 +102,8 @@ class Run:
         self.asked: set[str] = set()  # attributes read from what is not known
         self.executed: set[ast.stmt] = set()
         self.evaluated: set[ast.AST] = set()  # calls
-        self.understood: set[ast.AST] = (
-            set()
-        )  # calls that made an interface, or ran a function of the program
+        # Calls that made an interface, or ran a function of the program.
+        self.understood: set[ast.AST] = set()
         self.stack: list[ast.AST] = []
         self.classes: dict[ast.AST, ClassValue] = {}
         self.enum_members: dict[tuple[str, int, str], Instance] = {}
@@ -123,10 +122,10 @@ class Run:
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
+        self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
-        self.in_vain: dict[
-            tuple[object, int | None], tuple[int, int]
-        ] = {}  # versions that callbacks left as they were
+        # Versions of the state that callbacks left as they were.
+        self.in_vain: dict[tuple[object, int | None], tuple[int, int]] = {}
         self.turns = MAX_TURNS
         self.undecided = 0  # tests outside of any undecided branch or repetition
         self.conditional = False  # one of them asks for the value of a parameter
@@ -134,9 +133,8 @@ class Run:
         self.try_forks = 0  # undecided branches around the innermost try
         self.tries = 0  # how many try statements surround the current point
         self.risks = 0  # what may have raised an exception, counted inside of them
-        self.entries: dict[
-            ast.AST, tuple[int, int]
-        ] = {}  # forks and repetition when a function was last entered
+        # Forks and repetition when a function was last entered.
+        self.entries: dict[ast.AST, tuple[int, int]] = {}
         self.context = 0
         self._contexts: dict[tuple[int, object], int] = {}
         self._context_ids = itertools.count(1)
@@ -186,8 +184,10 @@ class Run:
     def spend(self, count: int) -> None:
         """Count ``count`` units of work. Raises ``BudgetExceeded`` when there were too many."""
         self.steps += count
-        if self.steps + (self.state.work >> 2) > MAX_STEPS:
-            raise BudgetExceeded(f"more than {MAX_STEPS} steps")
+        if self.steps + (self.state.work >> 2) > self.limit:
+            if self.limit == MAX_STEPS or self.findings.is_open:
+                raise BudgetExceeded(f"more than {self.limit} steps")
+            self.limit = MAX_STEPS
 
     # --- variables --------------------------------------------------------------------------------------
 

@@ -36,9 +36,11 @@ from nodl.infer.values import (
     NONE,
     RESULT,
     ClassValue,
+    Dictionary,
     External,
     Instance,
     NativeObject,
+    Sequence,
     Unknown,
     Value,
     external,
@@ -68,6 +70,14 @@ _KEEPS_OFF = frozenset({
 _TRUSTED = frozenset(sys.stdlib_module_names) | _KEEPS_OFF
 
 
+# Functions that change the containers they are given, in whichever library.
+_CHANGING = frozenset({
+    "shuffle", "heapify", "heappush", "heappop", "heappushpop", "heapreplace", "insort", "insort_left", "insort_right",
+    *pure.IN_PLACE,
+})  # fmt: skip
+_CHANGEABLE = ("builtins.list", "builtins.dict", "builtins.set")
+
+
 # While these run, callbacks do.
 _WAITS = frozenset(
     {
@@ -86,6 +96,10 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     if path.endswith(RESULT) and keeps_off(path):
         run.escape(call.args, opened=False, objects=False)
         return (atom,)
+    owner, _, name = path.rpartition(".")
+    if owner in _CHANGEABLE and name != "fromkeys" and _holds_containers(call):
+        method = run.attribute(call.args.positional[0], name, call.node, call.frame)
+        return run.call(method, call.args.shifted(), call.node, call.frame)
     computed = _computed(run, path, call)
     if computed is not None:
         return computed
@@ -95,7 +109,6 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     found = ros.call_library(run, path, call)
     if found is not None:
         return found
-    owner, _, name = path.rpartition(".")
     if is_node_class(owner) or (owner == "builtins.object" and name.startswith("__")):
         return _unbound_method(run, owner, name, call)
     if is_builtin_exception(path):
@@ -115,6 +128,12 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     if keeps_off(path):
         return result_of(path)
     return unknown(f"the result of {path}()")
+
+
+def _holds_containers(call: Call) -> bool:
+    """``list.append(names, 'x')``: a method of a container, called through its class."""
+    first = call.args.positional[0] if call.args.positional else ()
+    return bool(first) and all(isinstance(atom, Sequence | Dictionary) for atom in first)
 
 
 def _computed(run: Run, path: str, call: Call) -> Value | None:
@@ -187,7 +206,9 @@ def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:
 def _hand_over(run: Run, path: str, call: Call) -> None:
     root = path.partition(".")[0]
     trusted = root in _TRUSTED or bool(ros.interface_type(path))
-    run.escape(call.args, opened=not trusted, objects=not trusted or root not in _KEEPS_OFF)
+    opened = not trusted or path.rpartition(".")[2] in _CHANGING
+    run.escape(call.args, opened=opened, objects=not trusted or root not in _KEEPS_OFF)
+    run.escape_value(call.args.keywords.get("cls", ()), opened=False)  # json makes an encoder of it
     if trusted or path.endswith(".ParamListener"):  # of generate_parameter_library: only declares parameters
         return
     for value in call.args.all_values():

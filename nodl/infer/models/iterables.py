@@ -17,6 +17,7 @@ from nodl.infer.values import (
     NONE,
     OTHER,
     Dictionary,
+    Instance,
     Items,
     Key,
     Value,
@@ -73,8 +74,10 @@ def call_sorted(run: Run, call: Call) -> Value:
         if "key" not in call.args.keywords and reverse is not None:
             ordered = sorted(exact, key=lambda item: str(item[0]), reverse=reverse)
             return run.sequence(call.node, "list", Items(tuple(ordered)))
+    element = items.any_element()
+    if "key" not in call.args.keywords and any(isinstance(atom, Instance) for atom in element):
+        element = join(element, unknown("an object in an order that the program defines"))
     if exact is not None:
-        element = items.any_element()
         items = Items(tuple(element for _ in exact))
     return run.sequence(call.node, "list", items)
 

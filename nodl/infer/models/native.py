@@ -25,6 +25,7 @@ from nodl.infer.values import (
     NONE,
     OTHER,
     Dictionary,
+    Instance,
     Items,
     Key,
     Sequence,
@@ -234,6 +235,14 @@ def _forget_length(run: Run, owner: Sequence, call: Call) -> Value:
     return NONE
 
 
+def _sorted_in_place(run: Run, owner: Sequence, call: Call) -> Value:
+    element = owner.items.any_element()
+    if "key" not in call.args.keywords and any(isinstance(atom, Instance) for atom in element):
+        element = join(element, unknown("an object in an order that the program defines"))
+    run.state.store(owner, ITEMS, (Items(None, element),))
+    return NONE
+
+
 def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
     return run.sequence(call.node, owner.kind, owner.items)
 
@@ -258,7 +267,7 @@ _SEQUENCE: dict[str, SequenceMethod] = {
     "remove": _forget_length,
     "discard": _forget_length,
     "clear": _forget_length,
-    "sort": _forget_length,
+    "sort": _sorted_in_place,
     "reverse": _forget_length,
     "copy": _copy_sequence,
     "union": _united,

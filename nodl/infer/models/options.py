@@ -7,13 +7,16 @@ from collections.abc import Callable
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models.library_objects import library_instance
-from nodl.infer.text import Input, make_text
+from nodl.infer.text import Input, Text, input_of, make_text
 from nodl.infer.values import (
     ANY,
+    BOOLEAN,
     BOTTOM,
     NONE,
+    External,
     Instance,
     Items,
+    Sequence,
     Value,
     constant_strings,
     join,
@@ -22,9 +25,10 @@ from nodl.infer.values import (
 )
 
 PARSER = "argparse.ArgumentParser"
-
-
 NAMESPACE = "argparse.Namespace"
+_KEEP_TEXT = frozenset(
+    {"builtins.str", "builtins.int"}
+)  # types under which a well-written value stays as it is
 
 
 def made_parser(run: Run, call: Call) -> Value:
@@ -43,13 +47,29 @@ def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     if isinstance(dest, str):
         owner = parser.cells.get("parser", (parser,))[0]
         assert isinstance(owner, Instance)
-        run.state.store(owner, "dest " + dest, (make_text((Input(name, run.options),)),))
+        run.state.store(owner, "dest " + dest, _parsed(run, name, call))
     return ANY
+
+
+def _parsed(run: Run, name: str, call: Call) -> Value:
+    """What the option holds: its text, unless it is a flag, several texts or made into something else."""
+    given = call.args.keywords
+    action, nargs = sole(given.get("action", ("store",))), sole(given.get("nargs", NONE))
+    if action in ("store_true", "store_false"):
+        return BOOLEAN
+    kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
+    if action != "store" or nargs not in (None, "?") or not kept:
+        return unknown(f"what is made of the command line option {name}")
+    return (make_text((Input(name, run.options),)),)
 
 
 def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
     for dest, value in call.args.keywords.items():
         cell = "dest " + dest
+        option = input_of(sole(parser.cells.get(cell)))
+        if option is not None:
+            (run.options.declare if run.state.forks else run.options.replace)(option.name, value)
+            continue
         run.state.store(parser, cell, join(parser.cells.get(cell, BOTTOM), value))
     return NONE
 
@@ -61,6 +81,9 @@ def _argument_group(run: Run, parser: Instance, call: Call) -> Value:
 def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
     namespace = library_instance(run, call, NAMESPACE)
     run.state.store(namespace, "parser", (parser,))
+    given = call.args.at(0, "args") or NONE
+    if any(isinstance(atom, Sequence) for atom in given):
+        run.state.store(namespace, "[given]", given)
     return (namespace,)
 
 
@@ -75,6 +98,9 @@ def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
     for parser in namespace.cells.get("parser", BOTTOM):
         if isinstance(parser, Instance):
             found = join(found, parser.cells.get("dest " + name, BOTTOM))
+    if "[given]" in namespace.cells:  # not what launch writes on the command line, but a list of the program
+        known = tuple(atom for atom in found if not isinstance(atom, str | Text))
+        return join(known, unknown(f"the option {name} in arguments that the program makes"))
     return found or unknown(f"the command line option {name}")
 
 

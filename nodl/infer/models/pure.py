@@ -56,7 +56,14 @@ _MATH = [
     "ceil", "floor", "sqrt", "pow", "fabs", "gcd", "lcm", "log", "log2", "log10", "sin", "cos", "tan", "atan2", "hypot",
     "radians", "degrees", "trunc", "isclose",
 ]  # fmt: skip
-_OPERATORS = [name for name in dir(operator) if not name.startswith("_") and name not in ("methodcaller",)]
+# Functions of ``operator`` that change their first argument.
+IN_PLACE = frozenset({
+    "setitem", "delitem", "iadd", "iand", "iconcat", "ifloordiv", "ilshift", "imatmul", "imod", "imul", "ior", "ipow",
+    "irshift", "isub", "itruediv", "ixor",
+})  # fmt: skip
+_OPERATORS = [
+    name for name in dir(operator) if not name.startswith("_") and name not in {"methodcaller", *IN_PLACE}
+]
 
 
 def _pattern(function: Function) -> Function:

@@ -247,6 +247,12 @@ def _register(run: Run, call: Call) -> Value:
     return ANY
 
 
+def _patched(run: Run, call: Call) -> Value:
+    run.gap(call.node, call.frame, "unittest.mock replaces something while the program runs")
+    run.escape(call.args)
+    return ANY
+
+
 def _file_contents(run: Run, call: Call) -> Value:
     return unknown("the contents of a file, read when the program runs")
 
@@ -283,6 +289,10 @@ FUNCTIONS: dict[str, Model] = {
     "random.choice": builtin.FUNCTIONS["builtins.next"],
     "importlib.import_module": import_dynamic,
     "atexit.register": _register,
+    "unittest.mock.patch": _patched,
+    "unittest.mock.patch.object": _patched,
+    "unittest.mock.patch.dict": _patched,
+    "unittest.mock.patch.multiple": _patched,
     "yaml.safe_load": _file_contents,
     "yaml.load": _file_contents,
     "json.load": _file_contents,

@@ -86,6 +86,18 @@ def test_a_budget_ends_at_the_same_step_whatever_the_clock_says(
     assert _json(program) == plain
 
 
+def test_a_program_of_which_something_stays_unknown_is_given_up_earlier(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nodl.infer.interpreter.run.MAX_STEPS", 60_000)
+    monkeypatch.setattr("nodl.infer.interpreter.run.MAX_STEPS_IN_VAIN", 10_000)
+    program = tmp_path / "endless.py"
+    program.write_text(_ENDLESS)
+    assert "more than 60000 steps" in _json(program)
+    program.write_text(_ENDLESS.replace("'before'", "input()"))
+    assert "more than 10000 steps" in _json(program)
+
+
 def test_the_hash_seed_does_not_change_a_byte(tmp_path: Path, infer: Callable[..., InferredSystem]) -> None:
     infer(_SETS)
     found = {_in_fresh_process(tmp_path, seed) for seed in ("0", "1", "2")}

@@ -180,3 +180,34 @@ def test_constants_of_a_package(names: Callable[..., list[str]]) -> None:
         """,
     }
     assert names("", files) == ["cmd", "odom"]
+
+
+@pytest.mark.parametrize(
+    "line", ["import there", "from there import NAME", "from enum import NotInThisRelease"]
+)
+def test_a_library_that_may_be_missing_leaves_both_outcomes(line: str, names: NodeBody) -> None:
+    program = f"""
+        import rclpy
+        from std_msgs.msg import String
+        try:
+            {line}
+            topic = "with_it"
+        except ImportError:
+            topic = "without"
+        rclpy.create_node("n").create_publisher(String, topic, 10)
+        """
+    assert names(program) == ["with_it", "without"]
+
+
+def test_what_python_has_in_every_release_is_there(names: NodeBody) -> None:
+    program = """
+        import rclpy
+        from std_msgs.msg import String
+        try:
+            import json
+            topic = "with_it"
+        except ImportError:
+            topic = "without"
+        rclpy.create_node("n").create_publisher(String, topic, 10)
+        """
+    assert names(program) == ["with_it"]
