@@ -129,3 +129,16 @@ def test_devices_and_real_time_are_said_to_the_engines_that_know_them(
         assert export(*words, "--hosts", str(hosts), "--accept-unexpressed") == 0
     else:
         assert (status, error) == (0, "")
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_processes_on_zenoh_are_refused_since_nothing_would_lead_them_to_a_router(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], engine: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    launch = launch_file(tmp_path, TALK, "robot.launch.xml")
+    ks = provisioned(launch, tmp_path / "ks")
+    assert export(engine, launch, ks, tmp_path / "dds") == 0
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    assert export(engine, launch, ks, tmp_path / "out", "--accept-unexpressed") == 1
+    assert "on Zenoh (rmw_zenoh_cpp): without a router" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.errors import ManifestError, UsageError
 from enclave_launch.verb.secure_plan.hosts import hosts_of
@@ -118,6 +119,12 @@ def _refuse_problems(document: Mapping[str, Any]) -> None:
     problems = [one["text"] for one in document.get("diagnostics", ()) if one["severity"] == "error"]
     if problems:
         raise ManifestError("\n".join((*problems, "the plan is not complete, so nothing was written")))
+    zenoh = sorted(one["process"] for one in document["processes"] if one.get("middleware") == ZENOH)
+    if zenoh:
+        raise ManifestError(
+            f"{', '.join(zenoh)} on Zenoh ({ZENOH}): without a router and its files they would run unprotected, and no "
+            "engine is told of these yet; nothing was written. Start them with secure-launch (docs/zenoh.md)"
+        )
 
 
 def _refuse_lost(lost: tuple[Unexpressed, ...], engine: Engine, accepted: bool) -> None:
