@@ -45,14 +45,13 @@ def resolve(
     refuse is in ``plan.problems``.
     """
     from enclave_launch.interfaces import InterfaceFinder
-    from enclave_launch.interfaces.launch_contents import launched
     from nodl.ament_index import search_prefixes
 
     chosen = options or ResolveOptions()
     evaluated = evaluate_launch(launch_file, arguments, options=chosen)
     source, evaluation = evaluated.source, evaluated.evaluation
     prefixes = search_prefixes(source.prefixes)
-    finder = InterfaceFinder(prefixes, chosen, evaluation.distro, launched(evaluation))
+    finder = InterfaceFinder(prefixes, chosen, evaluation.distro, evaluation)
     plan = Planner(source, finder, chosen.plan_options()).plan(evaluation)
     plan = plan._replace(
         problems=(*plan.problems, *_launcher_refusals(plan)),

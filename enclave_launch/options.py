@@ -6,11 +6,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.admission import AdmissionOptions
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError
 from enclave_launch.host.protocol import HostOptions
@@ -25,14 +25,7 @@ if TYPE_CHECKING:
     from keystore.steps.options import ProvisionOptions
 
 
-@dataclass(frozen=True, slots=True)
-class ResolveOptions:
-    """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
-    else the newest; ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their
-    sources be analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first;
-    ``source_folders``: where sources of compiled nodes lie, besides the workspaces of the prefixes; ``progress`` is
-    told which program is analysed next."""
-
+class _ResolveOptions(NamedTuple):
     prefixes: tuple[Path, ...] = ()
     manifests: tuple[Path, ...] = ()
     policy: Path | None = None
@@ -48,18 +41,32 @@ class ResolveOptions:
     accept_prefixes: tuple[str, ...] = ()
     accept_middlewares: tuple[str, ...] = ()
     no_python: bool = False
-    launch_configurations: Mapping[str, str] = field(default_factory=dict)
-    progress: Callable[[str], None] | None = field(default=None, compare=False)
+    launch_configurations: Mapping[str, str] = {}  # never changed
+    progress: Callable[[str], None] | None = None
 
-    def __post_init__(self) -> None:
-        """One path or name may be given where several can be: text is not taken letter by letter."""
-        for name in ("prefixes", "manifests", "library_folders", "source_folders"):
-            object.__setattr__(self, name, tuple(map(Path, _several(getattr(self, name)))))
-        for name in ("also", "accept_prefixes", "accept_middlewares"):
-            object.__setattr__(self, name, _several(getattr(self, name)))
-        if isinstance(self.policy, str):
-            object.__setattr__(self, "policy", Path(self.policy))
-        object.__setattr__(self, "enclave_scope", EnclaveScope(self.enclave_scope))
+
+class ResolveOptions(_ResolveOptions):
+    """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
+    else the newest; ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their
+    sources be analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first;
+    ``source_folders``: where sources of compiled nodes lie, besides the workspaces of the prefixes; ``progress`` is
+    told which program is analysed next."""
+
+    __slots__ = ()
+
+    if not TYPE_CHECKING:  # who checks types sees the fields
+
+        def __new__(cls, *args: Any, **given: Any) -> ResolveOptions:
+            """One path or name may be given where several can be: text is not taken letter by letter."""
+            options = super().__new__(cls, *args, **given)
+            paths = ("prefixes", "manifests", "library_folders", "source_folders")
+            names = ("also", "accept_prefixes", "accept_middlewares")
+            return options._replace(
+                **{name: tuple(map(Path, _several(getattr(options, name)))) for name in paths},
+                **{name: _several(getattr(options, name)) for name in names},
+                policy=None if options.policy is None else Path(options.policy),
+                enclave_scope=EnclaveScope(options.enclave_scope),
+            )
 
     def host_options(self) -> HostOptions:
         """What the evaluation's host is told, in a dry run and live alike."""
@@ -90,8 +97,7 @@ def _read_policy(path: Path) -> PolicyDocument:
         raise UsageError(str(error)) from error
 
 
-@dataclass(frozen=True, slots=True)
-class SecurityOptions:
+class SecurityOptions(NamedTuple):
     """How to provision: the keystore's own options (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
     the strategy that the processes are told."""
 
@@ -99,8 +105,7 @@ class SecurityOptions:
     keystore: ProvisionOptions | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class RunSettings:
+class RunSettings(NamedTuple):
     """How to run. ``secrets``: environment variables that no process of the launch sees; ``log_limit``: bytes after
     which a log file becomes ``<name>.1`` and a new one is begun, ``None`` for never; ``deadline``: when to end it, as
     ``expiry_watch.renewal_deadline`` gives it.

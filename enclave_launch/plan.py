@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.admission.handshakes import EnclaveProcess, Pair, mixed_pairs
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
 from enclave_launch.admission.middleware import ZENOH, middleware_of, vendor_of
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import (
     Diagnostic,
 )

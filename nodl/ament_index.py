@@ -15,9 +15,9 @@ import os
 import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple
 
 from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.named_tuple import NamedTuple
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")

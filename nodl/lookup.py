@@ -18,8 +18,8 @@ import os
 from collections.abc import Iterable, Sequence
 from functools import partial
 from pathlib import Path
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
 from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, ManifestNode, read_document, resource_key
 from nodl.errors import ConflictingNoDLError

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.names import InvalidNameError, expand_name
 
 Edit = tuple[str, tuple[str, ...]]

@@ -12,8 +12,8 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from enum import Enum
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"  # that it holds no "__" is checked apart

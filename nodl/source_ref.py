@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from enclave_launch.boundary.named_tuple import NamedTuple
 
 
 class SourceRef(NamedTuple):

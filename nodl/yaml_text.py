@@ -6,9 +6,9 @@ but what they unfold to is limited, as are size and depth. Pure; PyYAML does the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.errors import InvalidYAMLError
 from nodl.names import shown
 from nodl.source_ref import SourceRef
@@ -24,24 +24,21 @@ _MERGE_TAG = "tag:yaml.org,2002:merge"
 _SCALAR_TAGS = frozenset(f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null"))
 
 
-@dataclass(frozen=True, slots=True)
-class YamlScalar:
+class YamlScalar(NamedTuple):
     """``value`` is a ``str``, ``int``, ``float``, ``bool`` or ``None``."""
 
     value: str | int | float | bool | None
     source: SourceRef
 
 
-@dataclass(frozen=True, slots=True)
-class YamlList:
+class YamlList(NamedTuple):
     """A sequence, and where it is written."""
 
     items: tuple[YamlValue, ...]
     source: SourceRef
 
 
-@dataclass(frozen=True, slots=True)
-class YamlMap:
+class YamlMap(NamedTuple):
     """``items`` in document order; ``keys`` tells where each key is written."""
 
     items: dict[str, YamlValue]

@@ -8,9 +8,9 @@ known beforehand, and a subject that is chosen well avoids them.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from typing import NamedTuple
 
 from enclave_launch.admission.middleware import Vendor
+from enclave_launch.boundary.named_tuple import NamedTuple
 from keystore.formats.guid_prefix import Half, guid_prefix
 
 

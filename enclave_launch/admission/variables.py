@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple
 
 from enclave_launch.boundary.files import text_or_nothing
+from enclave_launch.boundary.named_tuple import NamedTuple
 
 OURS = (
     "ROS_SECURITY_ENABLE",

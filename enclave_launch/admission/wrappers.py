@@ -7,10 +7,9 @@ in the reviewed table below, every program of it (``nice -n 5 gdb --args``), or 
 from __future__ import annotations
 
 import re
-import shlex
 from collections.abc import Collection, Iterator, Sequence
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.ros_rules.ros_arguments import shell_words
 
@@ -168,6 +167,8 @@ def _shell_operator(text: str) -> str | None:
     """The first thing in ``text`` that makes it more than one program with its words."""
     if len(text) > _LONGEST:
         return f"more than {_LONGEST} characters"
+    import shlex
+
     lexer = shlex.shlex(text, posix=True, punctuation_chars=";&|()")
     lexer.whitespace_split = True
     lexer.commenters = ""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from dataclasses import dataclass, field
 
 from enclave_launch.boundary.terminal import printable, raw
 
@@ -18,12 +17,12 @@ def wanted(quiet: bool) -> bool:
     return sys.stderr.isatty() and not quiet
 
 
-@dataclass
 class ProgressBar:
     """Called with how many of how many are done; on stderr."""
 
-    what: str
-    _started: float = field(default_factory=time.monotonic)
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self._started = time.monotonic()
 
     def __call__(self, done: int, total: int) -> None:
         if time.monotonic() - self._started < _PATIENCE:
@@ -33,13 +32,13 @@ class ProgressBar:
         print(bar + (_CLEAR if done == total else ""), end="", file=raw(sys.stderr), flush=True)
 
 
-@dataclass
 class ProgressLine:
     """Called with what is done next; on stderr. ``clear`` at the end."""
 
-    doing: str
-    _started: float = field(default_factory=time.monotonic)
-    _shown: bool = False
+    def __init__(self, doing: str, _started: float | None = None) -> None:
+        self.doing = doing
+        self._started = time.monotonic() if _started is None else _started
+        self._shown = False
 
     def __call__(self, subject: str) -> None:
         if time.monotonic() - self._started >= _PATIENCE:

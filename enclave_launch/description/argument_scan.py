@@ -8,9 +8,9 @@ everything below at each include; here each file is summed up once (``LoadCache`
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.description.actions.arguments import DeclareLaunchArgument
 from enclave_launch.description.actions.configurations import ResetLaunchConfigurations
 from enclave_launch.description.actions.includes import IncludeLaunchDescription
@@ -25,8 +25,7 @@ REQUIRED_ARGUMENT = "Required launch argument"
 """How upstream's two texts about an argument that nobody gave begin."""
 
 
-@dataclass(slots=True)
-class Declared:
+class Declared(NamedTuple):
     """One declaration. ``given``: argument names of the includes on the way to it, ``None`` without include;
     the text is only wanted when it is missing."""
 
@@ -35,15 +34,14 @@ class Declared:
     given: list[str | None] | None = None
 
 
-@dataclass(slots=True)
-class DeclaredArguments:
+class DeclaredArguments(NamedTuple):
     """What a description declares by name, and the argument names of all includes in it.
 
     A ``None`` among the names: that include has a name which needs a context.
     """
 
-    declared: dict[str, Declared] = field(default_factory=dict)
-    given: list[str | None] = field(default_factory=list)
+    declared: dict[str, Declared]
+    given: list[str | None]
 
 
 def check_is_description(description: LaunchDescription) -> None:
@@ -87,7 +85,7 @@ def _summarize(description: LaunchDescription) -> DeclaredArguments:
     known: DeclaredArguments | None = getattr(description, "argument_summary", None)
     if known is not None:
         return known
-    summary = DeclaredArguments()
+    summary = DeclaredArguments({}, [])
     for entity, conditional in _walk(description.describe_sub_entities(), False):
         if isinstance(entity, DeclareLaunchArgument):
             conditional = conditional or entity.condition is not None

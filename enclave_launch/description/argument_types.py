@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections.abc
-import inspect
 import os
 from collections.abc import Iterable
 from typing import Any, Union
@@ -16,7 +15,7 @@ def isclassinstance(obj: object) -> bool:
 
 def is_a(obj: object, entity_type: type) -> bool:
     """Is ``obj`` an instance of the class ``entity_type``?"""
-    if not inspect.isclass(entity_type):
+    if not isinstance(entity_type, type):
         raise RuntimeError(f"entity_type '{obj}' is not a class")
     return isinstance(obj, entity_type)
 

@@ -9,8 +9,9 @@ from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.description.upstream_paths import GATES, PATHS
 
 _OURS = "enclave_launch.description."

@@ -8,8 +8,8 @@ SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it s
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.source_location import SourceLocation
 
 

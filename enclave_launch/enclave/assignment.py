@@ -17,8 +17,8 @@ Rules, from the design article "ROS 2 Security Enclaves" (section Runtime):
 from __future__ import annotations
 
 from enum import Enum
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,

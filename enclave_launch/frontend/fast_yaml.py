@@ -4,13 +4,14 @@ Launch files and their helpers (nav2's ``RewrittenYaml`` above all) read and wri
 pure Python loader and dumper; libyaml, which ships with PyYAML, does it in a tenth of the time. While we evaluate,
 ``yaml.load``, ``yaml.dump`` and their safe forms try it first. What it may treat otherwise goes the old way: texts with
 marks that it scans differently (``yaml_tree``), loaders that somebody taught new tags, objects other than plain values,
-and every error, which is therefore PyYAML's own. Equal texts are read once. ``tests/frontend/test_fast_yaml.py`` holds
-both ways equal.
+and every error, which is therefore PyYAML's own. Equal texts are read once, equal values written once.
+``tests/frontend/test_fast_yaml.py`` holds both ways equal.
 """
 
 from __future__ import annotations
 
 import io
+import marshal
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -40,6 +41,7 @@ _SIMPLE_TEXT = re.compile(r"[ -~]*", re.ASCII)
 _MAX_TEXT = 1_000
 _MAX_KEY = 100  # a key of 128 characters has a form of its own
 _MAX_DEPTH = 10
+_OPTIONS = {bool, type(None)}  # types of what is said of the style
 
 
 @contextmanager
@@ -131,9 +133,7 @@ class _Load(_Fast):
             return self._original(stream, Loader)
         found = _read(text, fast)
         if found is not None:
-            import pickle
-
-            return pickle.loads(found)
+            return marshal.loads(found)
         return self._original(stream if isinstance(stream, str) else _Again(text, stream), Loader)
 
 
@@ -155,9 +155,7 @@ def _text_of(stream: Any) -> str | None:
 
 @lru_cache(maxsize=256)
 def _read(text: str, loader: Any) -> bytes | None:
-    """The values of ``text``, pickled, so that each reader gets its own; ``None`` where PyYAML must read it."""
-    import pickle
-
+    """The values of ``text``, packed, so that each reader gets its own; ``None`` where PyYAML must read it."""
     from enclave_launch.boundary.yaml_nodes import refuse_deep_nesting
     from enclave_launch.frontend.yaml_tree import libyaml_reads_alike
 
@@ -165,8 +163,8 @@ def _read(text: str, loader: Any) -> bytes | None:
         return None
     try:
         refuse_deep_nesting(text)
-        return pickle.dumps(_values(text, loader))
-    except Exception:  # whatever it is, PyYAML says it in its own words
+        return marshal.dumps(_values(text, loader))
+    except Exception:  # dates cannot be packed; whatever else it is, PyYAML says it in its own words
         return None
 
 
@@ -187,12 +185,21 @@ class _Dump(_Fast):
         whole = type(data) in (dict, list) and _is_simple(data, 0, set())
         if fast is None or not whole or not _plain_options(given):
             return self._original(data, stream, slow, **given)
-        text = self._original(data, None, fast, **given)
+        text = _written(marshal.dumps(data, 2), self._original, fast, tuple(given.items()))
         return text if stream is None else (stream.write(text), None)[1]
 
 
+@lru_cache(maxsize=64)
+def _written(
+    packed: bytes, write: Callable[..., str], dumper: Any, given: tuple[tuple[str, Any], ...]
+) -> str:
+    """The text of packed values; equal values are written once."""
+    return write(marshal.loads(packed), None, dumper, **dict(given))
+
+
 def _plain_options(given: dict[str, Any]) -> bool:
-    return given.keys() <= {"default_flow_style", "sort_keys"} and not given.get("default_flow_style", False)
+    known = given.keys() <= {"default_flow_style", "sort_keys"}
+    return known and not given.get("default_flow_style", False) and {*map(type, given.values())} <= _OPTIONS
 
 
 def _is_simple(value: Any, depth: int, inside: set[int]) -> bool:

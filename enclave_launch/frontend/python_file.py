@@ -7,7 +7,6 @@ would run it. Nothing is written: no ``__pycache__`` beside the launch file.
 from __future__ import annotations
 
 import os
-import traceback
 from functools import lru_cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
@@ -43,6 +42,8 @@ def user_frame(error: BaseException, path: str) -> SourceLocation | None:
     """Where in ``path`` the exception came from: the innermost of that file's own frames."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return SourceLocation(path, error.lineno or 0)
+    import traceback
+
     lines = [
         line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == path
     ]

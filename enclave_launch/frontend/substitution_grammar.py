@@ -18,8 +18,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
+
+from enclave_launch.boundary.named_tuple import NamedTuple
 
 MAX_NESTING = 128  # where upstream ends in a RecursionError, too
 
@@ -27,13 +28,25 @@ TemplatePart: TypeAlias = "str | SubstitutionCall"
 Template: TypeAlias = tuple[TemplatePart, ...]
 
 
-@dataclass(frozen=True, slots=True)
 class SubstitutionCall:
-    """``$(name arg ...)``. ``rule``: upstream's grammar rule, which tells the quotes it stands in."""
+    """``$(name arg ...)``. ``rule``: upstream's grammar rule, which tells the quotes it stands in; calls that differ
+    in nothing else are equal."""
 
-    name: str
-    args: tuple[Template, ...]
-    rule: str = field(default="substitution", compare=False)
+    __slots__ = ("args", "name", "rule")
+
+    def __init__(self, name: str, args: tuple[Template, ...], rule: str = "substitution") -> None:
+        self.name = name
+        self.args = args
+        self.rule = rule
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, SubstitutionCall) and (self.name, self.args) == (other.name, other.args)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.args))
+
+    def __repr__(self) -> str:
+        return f"SubstitutionCall({self.name!r}, {self.args!r}, {self.rule!r})"
 
 
 class TemplateSyntaxError(ValueError):

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Generator
-from dataclasses import dataclass, field
 from typing import Any
 
 import yaml
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.yaml_nodes import (
     RefusedYaml,
     SafeLoader,
@@ -30,12 +30,11 @@ _LIBYAML_DIFFERS = re.compile(r"[\t!?\ufeff]")
 _COMMENT = re.compile(r"(?<!\S)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
 
 
-@dataclass(frozen=True, slots=True)
-class YamlDocument:
+class YamlDocument(NamedTuple):
     """``lines``: ``id`` of each mapping and list in ``root`` -> its line, counted from 1."""
 
     root: Any
-    lines: dict[int, int] = field(repr=False)
+    lines: dict[int, int]
 
 
 def parse_yaml(text: str) -> YamlDocument:

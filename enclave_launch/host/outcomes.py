@@ -20,8 +20,9 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.host.environment import changed, environment_snapshot
 from enclave_launch.host.moment import Moment, looked_at
 

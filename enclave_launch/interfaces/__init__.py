@@ -9,15 +9,15 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.errors import ManifestError
 from enclave_launch.interfaces.library_access import LibraryAccess
 from enclave_launch.interfaces.started_program import StartedProgram
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
-from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from nodl.dependence import Launched
+from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.errors import NoDLError
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.name_template import UnknownPart
@@ -59,15 +59,15 @@ class InterfaceFinder:
         prefixes: Sequence[str],
         options: ResolveOptions | None = None,
         distro: str = "rolling",
-        others: Launched | None = None,
+        launch: Evaluation | None = None,
     ) -> None:
-        """``others``: what of the launch some nodes must know. Raises ``UsageError`` for a folder of documents that is
-        not there."""
+        """``launch``: all that starts, for nodes that must know others. Raises ``UsageError`` for a folder of documents
+        that is not there."""
         self._options = options or ResolveOptions()
         self._prefixes = prefixes
         self._distro = distro
         self._lookup = ManifestLookup(prefixes, self._options.manifests)
-        self._library = LibraryAccess(prefixes, self._options, distro, others)
+        self._library = LibraryAccess(prefixes, self._options, distro, launch)
         self._known: dict[_Subject, Found | Missing] = {}
 
     def __call__(

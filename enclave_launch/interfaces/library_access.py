@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.errors import UsageError
 from enclave_launch.options import ResolveOptions
-from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.ament_index import list_resources, package_version
 from nodl.node_interface import NodeInterface
 
@@ -27,16 +27,16 @@ class LibraryAccess:
     """Opens nothing until a node has no manifest, or one that depends on its start."""
 
     def __init__(
-        self, prefixes: Sequence[str], options: ResolveOptions, distro: str, others: Launched | None = None
+        self, prefixes: Sequence[str], options: ResolveOptions, distro: str, launch: Evaluation | None = None
     ):
-        """``others``: what of the launch some nodes must know.
+        """``launch``: all that starts, for nodes that must know others.
 
         Raises ``UsageError`` for a folder of documents that is not there.
         """
         self._prefixes = prefixes
         self._distro = distro
         self._enabled = options.library
-        self._others = others
+        self._launch = launch
         self._folders = options.library_folders
         for folder in self._folders:
             if not folder.is_dir():
@@ -51,6 +51,13 @@ class LibraryAccess:
     @cached_property
     def _installed(self) -> frozenset[str]:
         return frozenset(list_resources("packages", self._prefixes))
+
+    @cached_property
+    def _launched(self) -> Launched:
+        from enclave_launch.interfaces.launch_contents import launched
+
+        assert self._launch is not None
+        return launched(self._launch)
 
     def find(self, package: str | None, name: str) -> Hit | None:
         """Raises ``InvalidNoDLError`` for a broken document."""
@@ -120,4 +127,4 @@ class LibraryAccess:
             situation = situation_of_process(started, interface, self._distro, installed)
         else:
             situation = situation_of_component(started, container, interface, self._distro, installed)
-        return situation._replace(launched=self._others) if self._others else situation
+        return situation if self._launch is None else situation._replace(launched=self._launched)

@@ -6,12 +6,14 @@ Takes a process or component of the evaluation; used by ``nodl.infer`` as its ``
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
-from enclave_launch.interfaces.situation import situation_of_component, situation_of_process
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from nodl.dependence import Situation
 from nodl.node_interface import NodeInterface
 from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.dependence import Situation
 
 
 class StartedProgram:
@@ -34,6 +36,8 @@ class StartedProgram:
         return situation.node, situation.namespace
 
     def _situation(self, node: str | None) -> Situation:
+        from enclave_launch.interfaces.situation import situation_of_component, situation_of_process
+
         started = self._started
         interface = NodeInterface(
             package=started.package,

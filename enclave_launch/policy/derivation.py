@@ -9,9 +9,9 @@ away takes exactly its permissions away. Time is linear in nodes and interfaces.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import permissions_large, policy_answers
 from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
@@ -31,6 +31,17 @@ LIST_NAMES: dict[Operation, str] = {
     Operation.CALL: "call_actions",
     Operation.EXECUTE: "serve_actions",
 }
+
+
+def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:
+    """What an enclave may do, sorted, by the contract's list names."""
+    lists: dict[str, set[str]] = {name: set() for name in LIST_NAMES.values()}
+    for profile in enclave.profiles:
+        for rule in profile.rules:
+            if rule.qualifier is Qualifier.ALLOW:
+                lists[LIST_NAMES[rule.operation]].add(rule.expression)
+    return {name: sorted(names) for name, names in lists.items()}
+
 
 # Below that, even actions with names of the greatest length stay under the sizes that matter.
 _MANY_RULES = 20
@@ -88,7 +99,7 @@ def derive_policy(
     """
     chosen = options or PolicyOptions()
     whole = chosen.actions_as_a_whole
-    collection = _Collection({path: {} for path in also})
+    collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
         collection.add(
             node_permissions(
@@ -118,14 +129,13 @@ def _merged(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
     )
 
 
-@dataclass(slots=True)
-class _Collection:
+class _Collection(NamedTuple):
     """Permissions by enclave and profile while they come in."""
 
     profiles: dict[str, dict[ProfileKey, Reasons]]
-    nodes: dict[str, list[RunningNode]] = field(default_factory=dict)
-    problems: list[list[Diagnostic]] = field(default_factory=list)  # of each node
-    warnings: list[Diagnostic] = field(default_factory=list)
+    nodes: dict[str, list[RunningNode]]
+    problems: list[list[Diagnostic]]  # of each node
+    warnings: list[Diagnostic]
 
     def add(self, found: NodePermissions, policy_file: PolicyDocument | None) -> None:
         node = found.node

@@ -8,10 +8,10 @@ and namespace, then the first matching remap rule replaces it (``nodl.remap``).
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from functools import lru_cache
-from typing import Literal, NamedTuple
+from typing import Literal
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import (
     action_remap_idle,
@@ -81,14 +81,13 @@ class Unresolved(NamedTuple):
     diagnostic: Diagnostic
 
 
-@dataclass(slots=True)
-class NodePermissions:
+class NodePermissions(NamedTuple):
     """``permissions`` in the order found, with repetitions; ``unresolved`` must not be passed over."""
 
     node: RunningNode
-    permissions: list[Permission] = field(default_factory=list)
-    unresolved: list[Unresolved] = field(default_factory=list)
-    warnings: list[Diagnostic] = field(default_factory=list)
+    permissions: list[Permission]
+    unresolved: list[Unresolved]
+    warnings: list[Diagnostic]
 
 
 def node_permissions(
@@ -122,7 +121,7 @@ class _Collector:
         self._whole = actions_as_a_whole
         self._accept_patterns = accept_patterns
         self._names = NodeNames(node.name, node.namespace, node.rules)
-        self._result = NodePermissions(node)
+        self._result = NodePermissions(node, [], [], [])
 
     def collect(self) -> NodePermissions:
         try:

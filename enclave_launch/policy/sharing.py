@@ -5,14 +5,12 @@ DDS enforces the union of an enclave; in a container all nodes even share memory
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.policy.derivation import DerivedPolicy
 from keystore.formats.policy import Qualifier, Rule
 
 
-@dataclass(frozen=True, slots=True)
-class Gain:
+class Gain(NamedTuple):
     """``gained``: rules of its enclave that ``node`` does not need itself. ``composed``: in a container."""
 
     enclave: str

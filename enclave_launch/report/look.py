@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import os
 import re
-import textwrap
 from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, TextIO
+from typing import TextIO
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.diagnostics import Diagnostic
@@ -49,6 +49,8 @@ class Look(NamedTuple):
         if self.width is None:
             return [self.painted(first + text)]
         room = max(self.width, len(first) + _NARROWEST)
+        import textwrap
+
         lines = textwrap.wrap(
             text, room, initial_indent=first, subsequent_indent=further,
             break_long_words=False, break_on_hyphens=False,

@@ -7,13 +7,13 @@ from collections.abc import Iterable, Mapping
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
-from enclave_launch.policy.derivation import LIST_NAMES
+from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
 from enclave_launch.policy.node_permissions import Reason
 from enclave_launch.process import LauncherCall, Reaction, RemapRule
 from enclave_launch.report.unknown import label, unknown_by_enclave
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
-from keystore.formats.policy import EnclavePolicy, Qualifier, Rule
+from keystore.formats.policy import Qualifier, Rule
 from nodl.node_interface import NodeInterface
 
 VERSION = 1
@@ -172,16 +172,6 @@ def _interface(rule: Rule, reason: Reason) -> dict[str, object]:
         "note": reason.note,
         "qos": dict(reason.qos),
     }
-
-
-def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:
-    """What an enclave may do, sorted, by the contract's list names."""
-    lists: dict[str, set[str]] = {name: set() for name in LIST_NAMES.values()}
-    for profile in enclave.profiles:
-        for rule in profile.rules:
-            if rule.qualifier is Qualifier.ALLOW:
-                lists[LIST_NAMES[rule.operation]].add(rule.expression)
-    return {name: sorted(names) for name, names in lists.items()}
 
 
 def _remaps(rules: Iterable[RemapRule]) -> list[list[str]]:

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.words import counted
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
-from enclave_launch.policy.derivation import LIST_NAMES
+from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
 from enclave_launch.report.look import Look
-from enclave_launch.report.plan_json import allowed_names
 from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_enclave
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import EnclavePolicy

@@ -16,9 +16,9 @@ import re
 from collections.abc import Sequence
 from enum import Enum
 from functools import lru_cache
-from typing import NamedTuple
 
 from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.named_tuple import NamedTuple
 
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)

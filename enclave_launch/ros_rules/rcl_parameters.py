@@ -17,9 +17,10 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 
@@ -78,13 +79,14 @@ def resolve_parameters(
             unread.append((error.path, error.why))
             continue
         for section, values in found.items():
+            if not section_applies(section, fqn_tokens):
+                continue
             slots = sections.setdefault(section, {})
             for name, value in values.items():
                 slots.setdefault(name, {})[_slot(value)] = value
     resolved: dict[str, ParameterValue] = {}
-    for section, parameters in sections.items():
-        if section_applies(section, fqn_tokens):
-            resolved.update({name: slots[min(slots)] for name, slots in parameters.items()})
+    for parameters in sections.values():
+        resolved.update({name: slots[min(slots)] for name, slots in parameters.items()})
     return ResolvedParameters(resolved, tuple(unread))
 
 
@@ -166,17 +168,21 @@ def _read_cached(path: str, _modified: int, _size: int) -> Mapping[str, Section]
     return parameters_of_text(text, path)
 
 
-@lru_cache(maxsize=256)
 def parameters_of_text(text: str, path: str) -> Mapping[str, Section]:
     """The sections of the parameter file ``path``. Raises ``UnreadableParameters`` where it is no YAML."""
     import yaml
 
-    from enclave_launch.boundary.yaml_nodes import compose
-
     try:
-        document = compose(text)
+        return _sections_of_text(text)
     except yaml.YAMLError as error:
         raise UnreadableParameters(path, f"not YAML: {' '.join(str(error).split())}") from error
+
+
+@lru_cache(maxsize=256)
+def _sections_of_text(text: str) -> Mapping[str, Section]:
+    from enclave_launch.boundary.yaml_nodes import compose
+
+    document = compose(text)
     sections: dict[str, dict[str, ParameterValue]] = {}
     if document is not None:
         _collect_sections(document, (), sections)

@@ -8,8 +8,8 @@ outside of them a word with ``:=`` is still taken as a remap rule (deprecated th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.shell_words import split_words
 from nodl.remap import InvalidRemapRuleError, parse_rule
 

@@ -21,14 +21,12 @@ if TYPE_CHECKING:
 
 def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
     """The status of the launch; else 1 when the plan would refuse something, or not everything could be seen."""
-    from dataclasses import replace
-
     from enclave_launch.flow import run
 
     warn(*plan.problems)
     audit = Audit(plan)
     recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])
-    status = run(plan, options=replace(settings, companion=recording))
+    status = run(plan, options=settings._replace(companion=recording))
     report = audit.report()
     sys.stdout.write(audit_text(report))
     if options.audit_report is not None:

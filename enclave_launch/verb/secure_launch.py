@@ -7,7 +7,6 @@ import gc
 import os
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
@@ -157,7 +156,7 @@ def _resolve(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
         return resolve(target.launch_file, target.arguments, options=chosen)
     line = ProgressLine("analysing")
     try:
-        return resolve(target.launch_file, target.arguments, options=replace(chosen, progress=line))
+        return resolve(target.launch_file, target.arguments, options=chosen._replace(progress=line))
     finally:
         line.clear()
 

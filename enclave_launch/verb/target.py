@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.suggestion import did_you_mean
 from enclave_launch.errors import UsageError
 from nodl import ament_index

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.errors import UsageError
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from keystore.errors import InvalidInputError, printable
 
 LOWEST_ID = 0

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from enum import Enum
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from keystore.errors import InvalidInputError
 from keystore.formats.permissions_patterns import has_wildcard
 

@@ -16,8 +16,8 @@ Rules of includes, merging and collisions: ros-tooling/nodl, ``nodl_schema``.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.document.manifest_node import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services
@@ -33,8 +33,7 @@ from nodl.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 VERSION = 2
 
 
-@dataclass(frozen=True, slots=True)
-class _Identity:
+class _Identity(NamedTuple):
     package: str | None
     node: str | None
     namespace: str | None

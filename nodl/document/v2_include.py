@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from enclave_launch.boundary.files import read_bytes
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.ament_index import INDEX_FOLDER, find_resource
 from nodl.document import RESOURCE_TYPE, resource_key
 from nodl.document.v2_schema import check_document
@@ -27,8 +27,7 @@ COMMON = Path(__file__).parent / "common"
 _PACKAGE_OR_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.:-]*\Z")
 
 
-@dataclass(frozen=True, slots=True)
-class Included:
+class Included(NamedTuple):
     """One document: the file as found and its checked content."""
 
     file: str

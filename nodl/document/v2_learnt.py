@@ -16,8 +16,8 @@ for the reader: plans show them.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.words import counted
 from nodl.document.v2_section import IDENTITY_KEY
 from nodl.errors import InvalidElementError

@@ -8,20 +8,19 @@ runs nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import check_regular
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError, executable_path
-from nodl.infer.start import Start
 from nodl.node_interface import NodeInterface
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reach import SourcesInReach
+    from nodl.infer.start import Start
 
 
-@dataclass(frozen=True, slots=True)
-class InferredExecutable:
+class InferredExecutable(NamedTuple):
     """``interfaces`` is empty when nothing could be inferred; ``why`` then says what was found instead."""
 
     interfaces: tuple[NodeInterface, ...]
@@ -72,7 +71,7 @@ def _compiled(
 ) -> InferredExecutable:
     if sources is None:
         return InferredExecutable((), f"{what}, whose sources were not looked for")
-    from nodl.infer.cpp.syntax import CppSupportMissing
+    from nodl.infer.cpp.answer import CppSupportMissing
 
     try:
         answer = sources.infer(package, executable, plugin, start_of)

@@ -70,7 +70,7 @@ def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
     """C++ sources. Without the extra ``cpp`` they are one gap."""
     if not files:
         return [], []
-    from nodl.infer.cpp.syntax import CppSupportMissing
+    from nodl.infer.cpp.answer import CppSupportMissing
     from nodl.infer.cpp.system import infer_sources
 
     try:

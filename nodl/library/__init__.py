@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.errors import NoDLError
-from nodl.library.document import LibraryDocument, read_library_document
 from nodl.library.index import IndexEntry, read_index, scanned
 from nodl.node_interface import NodeInterface
+
+if TYPE_CHECKING:
+    from nodl.library.document import LibraryDocument
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "documents")
 
@@ -43,6 +46,8 @@ class Library:
         Raises ``InvalidNoDLError`` for a broken document.
         """
         for folder in self._all():
+            if folder == SHIPPED and not os.path.isdir(os.path.join(folder, package)):
+                continue  # the documents of a package lie in its folder
             entries = [e for e in self._entries(folder) if e.package == package and name in e.programs]
             if entries:
                 return self._chosen(folder, entries, distro, version)
@@ -80,7 +85,7 @@ class Library:
         for folder in self._all():
             for entry in self._entries(folder):
                 if entry.transport and entry.transport not in found:
-                    interface = read_library_document(folder, entry.file).interface
+                    interface = self._document(folder, entry.file).interface
                     found[entry.transport] = (entry.transport, entry.package, interface)
         return tuple(found.values())
 
@@ -91,7 +96,7 @@ class Library:
             for entry in self._entries(folder):
                 seen.setdefault(entry.stem, (folder, entry.file))
         for stem in sorted(seen):
-            yield read_library_document(*seen[stem])
+            yield self._document(*seen[stem])
 
     def _all(self) -> Sequence[str]:
         return [*self._folders, *([self._shipped] if self._shipped else [])]
@@ -105,10 +110,20 @@ class Library:
         """The entry for this version, else the last, with a doubt that names both."""
         fitting = [entry for entry in entries if fits(entry.versions, distro, version)]
         file = (fitting or entries)[-1].file
+        document = self._document(folder, file)
+        return Hit(document, "" if fitting else _doubt(document, distro, version))
+
+    def _document(self, folder: str, file: str) -> LibraryDocument:
         if (folder, file) not in self._documents:
             self._documents[folder, file] = read_library_document(folder, file)
-        document = self._documents[folder, file]
-        return Hit(document, "" if fitting else _doubt(document, distro, version))
+        return self._documents[folder, file]
+
+
+def read_library_document(folder: str, file: str) -> LibraryDocument:
+    """As ``nodl.library.document``'s, whose reader of NoDL documents is imported when there is one to read."""
+    from nodl.library.document import read_library_document as read
+
+    return read(folder, file)
 
 
 class LibraryDocuments(NamedTuple):

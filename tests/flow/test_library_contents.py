@@ -10,7 +10,7 @@ import pytest
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
-from enclave_launch.report.plan_json import allowed_names
+from enclave_launch.policy.derivation import allowed_names
 
 Launch = Callable[..., LaunchPlan]
 

@@ -13,8 +13,9 @@ from enclave_launch.errors import ManifestError, UsageError
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
+from enclave_launch.policy.derivation import allowed_names
 from enclave_launch.report.explained import explained
-from enclave_launch.report.plan_json import allowed_names, plan_json
+from enclave_launch.report.plan_json import plan_json
 from enclave_launch.report.tree import plan_tree
 
 QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import collections.abc
-import inspect
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any
@@ -78,6 +77,8 @@ class OpaqueCoroutine(Action):
         **left_over_kwargs: Any,
     ) -> None:
         super().__init__(**left_over_kwargs)
+        import inspect  # and with it a third of what Python's own modules cost a launch file
+
         if not inspect.iscoroutinefunction(coroutine):
             raise TypeError(
                 f"OpaqueCoroutine expected a coroutine function for 'coroutine', got '{type(coroutine)}'"

@@ -8,8 +8,8 @@ A name that is not registered yet is looked for in our own modules, then in othe
 from __future__ import annotations
 
 import functools
-import inspect
 from collections.abc import Callable, Iterable
+from types import FunctionType, MethodType
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from enclave_launch.description.markup import extensions
@@ -114,7 +114,7 @@ def _exposer(kind: str, name: str, gate: Feature | None) -> Callable[[Exposed], 
 
     def expose(exposed: Exposed) -> Exposed:
         method = _parse_method(exposed, name, kind)
-        known = inspect.unwrap(methods[name]) if name in methods else method
+        known = _registered(methods[name]) if name in methods else method
         if known != method:
             raise RuntimeError(f"Two {kind} parsing methods exposed with the same name: [{name}].")
         methods[name] = _checking_leftovers(method) if kind == "action" else method
@@ -129,18 +129,25 @@ def forget(module: str) -> None:
     """Drop what ``module`` registered: a launch file may register elements, each time it is evaluated."""
     for methods in _METHODS.values():
         for name, method in list(methods.items()):
-            registered = inspect.unwrap(method)
+            registered = _registered(method)
             if getattr(registered, "__self__", registered).__module__ == module:
                 del methods[name]
 
 
+def _registered(method: Any) -> Any:
+    """What was exposed, without what ``_checking_leftovers`` and others have put around it."""
+    while hasattr(method, "__wrapped__"):
+        method = method.__wrapped__
+    return method
+
+
 def _parse_method(exposed: object, name: str, kind: str) -> ParseMethod:
-    if inspect.isclass(exposed):
+    if isinstance(exposed, type):
         method = getattr(exposed, "parse", None)
-        if not inspect.ismethod(method):
+        if not isinstance(method, MethodType):
             raise RuntimeError("Did not find a class method called 'parse' in the class being decorated.")
         return method
-    if inspect.isfunction(exposed):
+    if isinstance(exposed, FunctionType):
         return exposed
     raise RuntimeError(
         f"Exposed {kind} parser for {name} is not a callable or a class containing a parse method"

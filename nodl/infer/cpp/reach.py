@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_text
 from nodl.infer.cpp.answer import Answer
-from nodl.infer.start import Start
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.answering import Answering
     from nodl.infer.cpp.reading.project import SourcePackage, Workspace
+    from nodl.infer.start import Start
 
 _HOME = re.compile(r"^CMAKE_HOME_DIRECTORY:\w+=(.+)$", re.MULTILINE)
 
@@ -39,7 +39,8 @@ class SourcesInReach:
         self, package: str, executable: str | None, plugin: str | None, start: Start | None = None
     ) -> Answer:
         """The nodes of an executable or component. Raises ``CppSupportMissing``."""
-        found = self._workspace.packages.get(package)
+        places = self._folders or self._workspaces
+        found = self._workspace.packages.get(package) if places else None
         if found is None:
             return Answer((), f"the sources of package '{package}' are not in reach ({self._searched()})")
         return self._answering.of_program(found, executable, plugin, start)

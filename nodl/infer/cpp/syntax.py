@@ -6,12 +6,10 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.answer import CppSupportMissing
+
 if TYPE_CHECKING:
     from tree_sitter import Node, Parser, Tree
-
-
-class CppSupportMissing(Exception):
-    """tree-sitter is not installed: ``pip install enclave-launch[cpp]``."""
 
 
 @lru_cache(maxsize=1)

@@ -1,0 +1,77 @@
+"""``typing.NamedTuple`` at a fraction of what it costs to define one, for the value types that every dry run defines.
+
+``typing`` compiles each annotation and the constructor when a class is defined. Here annotations stay text and the
+constructor is compiled for the first instance, which most of the hundred classes never have; ``bench/resolve.py`` shows
+what start-up costs. Type checkers see ``typing``'s own, whose interface this has.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from typing import NamedTuple as NamedTuple
+else:
+    from collections import namedtuple
+
+    _Field = type(namedtuple("_One", "field").field)
+
+    def _constructor(cls):
+        """What ``collections.namedtuple`` would compile for the fields of ``cls``."""
+        names = "".join(f"{field}, " for field in cls._fields)
+        code = f"lambda _cls, {names}: _tuple_new(_cls, ({names}))"
+        constructor = eval(code, {"_tuple_new": tuple.__new__, "__builtins__": {}})
+        constructor.__defaults__ = tuple(cls._field_defaults.values())
+        return constructor
+
+    class _Definition(type):
+        """Makes the annotated names of a class its fields."""
+
+        def __new__(mcs, name, bases, members):
+            if isinstance(bases[0], _Definition) and not hasattr(bases[0], "_fields"):
+                fields = tuple(members["__annotations__"])
+                members["_field_defaults"] = {field: members[field] for field in fields if field in members}
+                members.update((field, _Field(index, "")) for index, field in enumerate(fields))
+                members["_fields"] = members["__match_args__"] = fields
+                members["__slots__"] = ()
+            return super().__new__(mcs, name, bases, members)
+
+        @property
+        def __signature__(cls):
+            import inspect
+
+            _cls, *given = inspect.signature(_constructor(cls)).parameters.values()
+            return inspect.Signature(given)
+
+    class NamedTuple(tuple, metaclass=_Definition):
+        """A tuple whose fields are the annotated names of the class."""
+
+        __slots__ = ()
+
+        def __new__(cls, /, *args, **given):
+            home = next(base for base in cls.__mro__ if "_fields" in vars(base))
+            home.__new__ = staticmethod(_constructor(home))
+            return home.__new__(cls, *args, **given)
+
+        @classmethod
+        def _make(cls, values):
+            made = tuple.__new__(cls, values)
+            if len(made) != len(cls._fields):
+                raise TypeError(f"Expected {len(cls._fields)} arguments, got {len(made)}")
+            return made
+
+        def _replace(self, /, **changed):
+            made = self._make(map(changed.pop, self._fields, self))
+            if changed:
+                raise ValueError(f"Got unexpected field names: {list(changed)!r}")
+            return made
+
+        def _asdict(self):
+            return dict(zip(self._fields, self, strict=True))
+
+        def __repr__(self):
+            shown = ", ".join(f"{name}={value!r}" for name, value in self._asdict().items())
+            return f"{type(self).__name__}({shown})"
+
+        def __getnewargs__(self):
+            return tuple(self)
