@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import os
 import re
 import subprocess
 import sys
@@ -10,6 +11,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+from bench.synthetic_stack import write_nodes
 
 ROOT = Path(__file__).parent.parent
 PACKAGES = ("enclave_launch", "nodl", "keystore")
@@ -169,7 +172,7 @@ def test_only_the_disk_room_of_the_keystore_makes_files_that_may_hold_a_key() ->
     assert makers == {"disk"}
 
 
-def modules_loaded_by(arguments: list[str]) -> set[str]:
+def modules_loaded_by(arguments: list[str], **environment: str) -> set[str]:
     """What a whole run of ``secure-launch`` imports."""
     code = (
         "import sys\n"
@@ -178,7 +181,10 @@ def modules_loaded_by(arguments: list[str]) -> set[str]:
         "print('\\n'.join(sys.modules), file=sys.stderr)\n"
         "sys.exit(status)\n"
     )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    run = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True, text=True, check=True, cwd=ROOT, env={**os.environ, **environment},
+    )  # fmt: skip
     return set(run.stderr.split())
 
 
@@ -197,7 +203,16 @@ def test_a_dry_run_imports_only_what_its_path_needs(form: str) -> None:
     )
     assert {"nodl.document.v1", "enclave_launch.plan"} <= loaded
     heavy = {"cryptography", "pydantic", "asyncio", "yaml", "lxml", "hashlib", "cyclonedds", "tree_sitter"}
-    assert loaded.isdisjoint(heavy)
+    slow_to_define = {"dataclasses", "inspect"}  # value types are ``boundary.named_tuple``'s
+    assert loaded.isdisjoint(heavy | slow_to_define)
+
+
+def test_where_there_is_nothing_to_read_no_reader_is_imported(tmp_path: Path) -> None:
+    """A compiled node without sources that the library does not know: ``bench/resolve.py`` has what that saves."""
+    loaded = modules_loaded_by(["--dry-run", str(write_nodes(tmp_path, 2))], AMENT_PREFIX_PATH=str(tmp_path))
+    assert {"nodl.infer.executable", "nodl.library"} <= loaded
+    readers = {"nodl.infer.cpp.reading.project", "nodl.document.v2", "nodl.document.v1", "json"}
+    assert loaded.isdisjoint(readers)
 
 
 def named_in_architecture() -> list[str]:

@@ -40,8 +40,10 @@ else:
         def __signature__(cls):
             import inspect
 
-            _cls, *given = inspect.signature(_constructor(cls)).parameters.values()
-            return inspect.Signature(given)
+            _cls, *fields = inspect.signature(_constructor(cls)).parameters.values()
+            home = next(base for base in cls.__mro__ if "_fields" in vars(base))
+            types = vars(home)["__annotations__"]
+            return inspect.Signature([each.replace(annotation=types.get(each.name)) for each in fields])
 
     class NamedTuple(tuple, metaclass=_Definition):
         """A tuple whose fields are the annotated names of the class."""

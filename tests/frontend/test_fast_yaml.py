@@ -161,3 +161,49 @@ def test_parameter_files_of_nav2s_size_go_the_fast_way(tmp_path: Path) -> None:
         assert yaml.safe_load(stream) == tree
     assert fast_yaml._read.cache_info().currsize == 1
     assert fast_yaml._is_simple(tree, 0, set())
+
+
+def test_what_an_alias_names_is_the_same_object_for_its_reader() -> None:
+    with accelerated(yaml):
+        for _ in range(2):
+            read = yaml.safe_load("a: &x [1]\nb: *x\n")
+            assert read["a"] is read["b"]
+
+
+@pytest.mark.parametrize(
+    "text", ["a: 2026-11-22\n", "a: !!set {b, c}\n", "a: !!binary aGk=\n", "a: .inf\nb: -0.0\n"]
+)
+def test_values_of_every_kind_are_those_of_pyyaml(text: str) -> None:
+    plainly = yaml.safe_load(text)
+    with accelerated(yaml):
+        for _ in range(2):
+            assert repr(yaml.safe_load(text)) == repr(plainly)
+
+
+EQUAL_TO_PYTHON = (
+    {"a": 1},
+    {"a": 1.0},
+    {"a": True},
+    {"b": 1, "a": 2},
+    {"a": 2, "b": 1},
+    {"a": 0.0},
+    {"a": -0.0},
+)
+
+
+@pytest.mark.parametrize(
+    "options", [{}, {"sort_keys": False}, {"default_flow_style": None}, {"sort_keys": 0}]
+)
+def test_values_that_python_takes_for_equal_are_written_each_in_its_own_way(options: dict[str, Any]) -> None:
+    plainly = [yaml.dump(value, **options) for value in EQUAL_TO_PYTHON]
+    with accelerated(yaml):
+        for _ in range(2):
+            assert [yaml.dump(value, **options) for value in EQUAL_TO_PYTHON] == plainly
+
+
+def test_what_is_written_is_as_it_is_at_that_moment() -> None:
+    values = {"a": [1]}
+    with accelerated(yaml):
+        first = yaml.dump(values)
+        values["a"].append(2)
+        assert yaml.dump(values) != first

@@ -39,8 +39,7 @@ class SourcesInReach:
         self, package: str, executable: str | None, plugin: str | None, start: Start | None = None
     ) -> Answer:
         """The nodes of an executable or component. Raises ``CppSupportMissing``."""
-        places = self._folders or self._workspaces
-        found = self._workspace.packages.get(package) if places else None
+        found = self._workspace.packages[package] if self.hold(package) else None
         if found is None:
             return Answer((), f"the sources of package '{package}' are not in reach ({self._searched()})")
         return self._answering.of_program(found, executable, plugin, start)
