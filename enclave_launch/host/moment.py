@@ -13,8 +13,9 @@ import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.host.environment import environment_snapshot
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ matches. Cyclone DDS 0.10.2 handles 140 kB.
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from keystore.formats.permissions_names import dds_topics, full_name
 from keystore.formats.policy import EnclavePolicy, Operation, Profile
 
@@ -28,8 +28,7 @@ def _bytes_without_name(operation: Operation) -> tuple[int, int]:
 _BYTES = {operation: _bytes_without_name(operation) for operation in Operation}
 
 
-@dataclass(frozen=True, slots=True)
-class SizeConcern:
+class SizeConcern(NamedTuple):
     """``fatal``: no Fast DDS participant will match this enclave. ``text`` says what to do about it."""
 
     size: int
