@@ -21,7 +21,7 @@ REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "pydantic>=1.8"]
 PACKAGE_DATA = {
     "enclave_launch": ["py.typed", "__init__.pyi", "recording/recorder.c", "report/html/assets/*"],
     "nodl": ["py.typed", "schemas/*", "library/documents/*", "library/documents/*/*", "document/common/*/*"],
-    "keystore": ["py.typed", "schemas/*"],
+    "keystore": ["py.typed", "__init__.pyi", "schemas/*"],
 }
 ENTRY_POINTS = {
     "console_scripts": [

@@ -7,37 +7,8 @@ costs nothing.
 
 from __future__ import annotations
 
-from typing import Any
-
+from enclave_launch.boundary.public_names import public_names
 from enclave_launch.boundary.version import VERSION
 
 __version__ = VERSION
-
-
-def _homes() -> dict[str, str]:
-    """Each public name and the module that has it, as the stub says."""
-    import re
-    from pathlib import Path
-
-    stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-    return {
-        name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \w+$", stub, re.MULTILINE)
-    }
-
-
-def __getattr__(name: str) -> Any:
-    if name.startswith("__") and name != "__all__":
-        raise AttributeError(f"module 'enclave_launch' has no attribute {name!r}")
-    homes = _homes()
-    if name == "__all__":
-        return sorted(homes)
-    if name not in homes:
-        raise AttributeError(f"module 'enclave_launch' has no attribute {name!r}")
-    from importlib import import_module
-
-    value = globals()[name] = getattr(import_module(homes[name]), name)
-    return value
-
-
-def __dir__() -> list[str]:
-    return sorted(["__version__", *_homes()])
+__getattr__, __dir__ = public_names(__name__, __file__)
