@@ -5,7 +5,7 @@ Source: rclcpp/include/rclcpp/node.hpp, rclcpp_lifecycle/lifecycle_node.hpp, nod
 
 from __future__ import annotations
 
-import itertools
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.findings import NodeRecord
@@ -87,7 +87,7 @@ def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, fr
             words = tuple(_word(run, item) for item in atom.items)
             if words not in record.arguments:
                 record.arguments.append(words)
-            _read_parameters(run, record, words, node, frame)
+            _read_parameters(run, record, words, atom.items, node, frame)
         else:
             record.gap(
                 run.place(node, frame), "remap rules given in code (NodeOptions.arguments) are not known"
@@ -104,15 +104,29 @@ def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, fr
 
 
 def _read_parameters(
-    run: Machine, record: NodeRecord, words: tuple[str | None, ...], node: Node, frame: Frame
+    run: Machine,
+    record: NodeRecord,
+    words: tuple[str | None, ...],
+    items: Sequence[Value],
+    node: Node,
+    frame: Frame,
 ) -> None:
     """rcl/src/rcl/arguments.c: ``-p name:=value`` and files of parameters, given to the node in code."""
-    for flag, word in itertools.pairwise(words):
-        if flag in ("-p", "--param") and word is not None and ":=" in word:
-            name, _, value = word.partition(":=")
-            record.overrides[name] = literal(value)
+    for flag, word, item in zip(words, words[1:], items[1:], strict=False):
+        names = {_assigned(atom) for atom in item} if flag in ("-p", "--param") else set()
+        if len(names) == 1 and None not in names:
+            value = (
+                literal(word.partition(":=")[2]) if word is not None else unknown("a parameter given in code")
+            )
+            record.overrides[str(names.pop())] = value
         elif flag in ("--params-file", "-p", "--param"):
             record.gap(run.place(node, frame), f"parameters given in code ({flag} {word}) are not known")
+
+
+def _assigned(atom: object) -> str | None:
+    """The name in ``name:=value``, which may be known where the value is not."""
+    first = atom.parts[0] if isinstance(atom, Text) and atom.parts else None
+    return first.partition(":=")[0] if isinstance(first, str) and ":=" in first else None
 
 
 def _asked_for(run: Machine, record: NodeRecord, options: Obj, node: Node, frame: Frame) -> None:

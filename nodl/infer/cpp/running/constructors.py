@@ -61,9 +61,9 @@ def construct(
 
 
 _NUMBERS_ONLY = re.compile(
-    r"\{(?:\s*(?:const |unsigned )*(?:double|float|int|bool|char|long|short|size_t|u?int\d+_t)\b[^;{}()]*;)*\s*\}"
+    r"\{(?:\s*(?:const |unsigned )*(?:double|float|int|bool|char|long|short|size_t|\w+_t)\b[^;{}()]*;)*\s*\}"
 )
-"""A structure without a name whose members are numbers."""
+"""A structure without a name whose members are numbers or structures of C."""
 
 
 def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: bool) -> None:
@@ -325,7 +325,8 @@ def _likeness(parameter: FunctionParameter, value: Value) -> int:
     if isinstance(atom, bool):
         return 3 if "bool" in kind else (1 if is_generic else -2)
     if isinstance(atom, int | float):
-        return 2 if re.search(r"int|double|float|size_t|long", kind) else (1 if is_generic else -2)
+        own = r"double|float" if isinstance(atom, float) else r"int|size_t|long"
+        return 3 if re.search(own, kind) else 2 if _NUMBER.search(kind) else (1 if is_generic else -2)
     if isinstance(atom, Lambda | Bound):
         return 2 if "function" in kind or "allback" in kind else (1 if is_generic else -2)
     if isinstance(atom, Seq | Map):
@@ -333,11 +334,16 @@ def _likeness(parameter: FunctionParameter, value: Value) -> int:
     return 0
 
 
+_NUMBER = re.compile(r"int|double|float|size_t|long")
+
+
 def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value], inner: Frame) -> None:
     inner.function = function
     for index, parameter in enumerate(function.parameters):
         if index < len(arguments):
             value = arguments[index]
+            if function.variadic and index + 1 == len(function.parameters) < len(arguments):
+                value = unknown("several arguments of a parameter pack")
             if not parameter.type.rstrip().endswith(("&", "*")):
                 value = copied(run, value, function.node, inner)
         else:

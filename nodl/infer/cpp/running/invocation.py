@@ -51,6 +51,8 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             found.append(call_values(run, inner, _placed(fixed, values), node, frame))
         else:
             name = text(node.child_by_field_name("function"))[:60]
+            if "*" in name and ("->*" in name or ".*" in name):
+                run.gap(node, frame, f"which method {name} is is not known; it may make interfaces")
             handed_over(run, f"{name}()", values, node, frame)
             found.append(unknown(f"the result of {name}()"))
     run.left = run.left if len(found) == 1 else None

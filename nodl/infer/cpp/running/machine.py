@@ -124,7 +124,10 @@ class Machine:
             raise BudgetExceeded
         handler = EXPRESSIONS.get(node.type)
         if handler is None:
-            return unknown(f"the C++ {node.type.replace('_', ' ')}")
+            what = f"the C++ {node.type.replace('_', ' ')}"
+            if node.type in _CALLS_ALL and self.subtree_matters(node):
+                self.gap(node, frame, f"{what} is not followed; it may make interfaces")
+            return unknown(what)
         return handler(self, node, frame)
 
     def execute(self, node: Node, frame: Frame) -> int:
@@ -361,6 +364,7 @@ class Machine:
         return record
 
 
+_CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})
 WORD = re.compile(r"[A-Za-z_]\w*")
 
 

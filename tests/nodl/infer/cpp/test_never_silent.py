@@ -275,3 +275,26 @@ def test_structures_of_numbers_are_no_gap(made: str, tmp_path: Path) -> None:
 def test_a_structure_that_holds_something_else_is_one(tmp_path: Path) -> None:
     source = in_class("span s;", before="#include <acme/acme.hpp>\ntypedef struct { acme::Thing a; } span;\n")
     assert gaps(infer(tmp_path, source))
+
+
+UNFOLLOWED = {
+    "a fold over a pack": (
+        'each("b", "c");',
+        "template <typename... A> void each(A... a) { (pub(a), ...); }",
+    ),
+    "a method by its pointer": ('auto m = &Demo::pub; (this->*m)("b");', ""),
+    "several arguments of a pack": (
+        'H<Base> h(this, "b");',
+        "struct Base { Base(Demo * d, std::string t) { d->pub(t); } };"
+        "template <typename T> struct H : T { template <typename... X> explicit H(X &&... x) : T(x...) {} };",
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "members"), UNFOLLOWED.values(), ids=UNFOLLOWED)
+def test_a_call_that_is_not_followed_is_told_though_its_target_ran_elsewhere(
+    body: str, members: str, tmp_path: Path
+) -> None:
+    members += "void pub(std::string t) { create_publisher<std_msgs::msg::String>(t, 1); }"
+    system = infer(tmp_path, in_class(f'pub("a"); {body}', members))
+    assert "b" in names(system) or gaps(system) or any("?" in each for each in names(system))

@@ -182,10 +182,16 @@ def test_parameters_and_options_that_the_program_gives_its_node(tmp_path: Path) 
     node = 'class Demo : public rclcpp::Node { public: explicit Demo(const rclcpp::NodeOptions & o) : Node("n", o) {\n'
     node += 'create_publisher<std_msgs::msg::String>(declare_parameter("t", "default"), 1); } };\n'
     by_flag = 'auto o = rclcpp::NodeOptions().arguments({"--ros-args", "-p", "t:=flag"}); Demo d(o);'
+    beside = by_flag.replace(
+        '"t:=flag"', '"t:=flag", "-p", "use_sim_time:=" + std::string(x() ? "true" : "false")'
+    )
     by_reference = 'rclcpp::NodeOptions o; o.parameter_overrides() = {{"t", "reference"}}; Demo d(o);'
-    for number, (body, expected) in enumerate(((by_flag, "flag"), (by_reference, "reference"))):
+    for number, (body, expected) in enumerate(
+        ((by_flag, "flag"), (beside, "flag"), (by_reference, "reference"))
+    ):
         system = infer(tmp_path / str(number), HEAD + node + f"int main() {{ {body} }}\n")
         assert {e.name.fill({}).text for each in system.nodes for e in each.endpoints} == {expected}
+        assert not gaps(system)
 
 
 def test_what_is_written_through_a_function_is_a_gap(tmp_path: Path) -> None:
