@@ -7,9 +7,10 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.drift.compare import Security
 from enclave_launch.drift_watch import DriftWatch, WatchOptions
-from enclave_launch.errors import ProvisionError
+from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.report.plan_json import plan_document
 
 if TYPE_CHECKING:
@@ -21,18 +22,21 @@ if TYPE_CHECKING:
 def watch_plain_launch(
     plan: LaunchPlan, options: argparse.Namespace, settings: Callable[[DriftWatch], RunSettings]
 ) -> int:
-    """Of an unsecured launch. Gives its status; 1 for alarms."""
+    """Of an unsecured launch. Gives its status; 1 for alarms. Raises ``UsageError`` for processes on Zenoh."""
     from enclave_launch.flow import run
 
+    _check_middlewares(plan)
     watch = DriftWatch(plan_document(plan), _options(options))
     return watch.status(run(plan, options=settings(watch)))
 
 
 def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespace) -> DriftWatch:
-    """With an enclave of its own in the launch's keystore. Raises ``ProvisionError`` where it cannot be made."""
+    """With an enclave of its own in the launch's keystore. Raises ``ProvisionError`` where it cannot be made, and
+    ``UsageError`` for processes on Zenoh."""
     from keystore.errors import KeystoreError
     from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
 
+    _check_middlewares(launch.plan)
     root = launch.settings.keystore
     try:
         enclave = provide_watcher(root, launch.options)
@@ -41,6 +45,15 @@ def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespa
         raise ProvisionError(f"--watch: {error}") from error
     directory = Path(root) / "enclaves" / enclave.lstrip("/")
     return DriftWatch(plan_document(launch.plan), _options(options, security, directory))
+
+
+def _check_middlewares(plan: LaunchPlan) -> None:
+    """The observer takes part in DDS: what is on Zenoh would look as if it were missing, or be overlooked."""
+    zenoh = [item.process.process_name for item in plan.processes if item.middleware == ZENOH]
+    if zenoh:
+        raise UsageError(
+            f"--watch looks at DDS only, and {', '.join(zenoh)} on Zenoh: start this without --watch"
+        )
 
 
 def _options(

@@ -85,6 +85,16 @@ def test_without_an_installed_router_it_is_said_what_is_missing_and_nothing_is_w
     assert not workspace.keystore.exists()
 
 
+def test_what_only_looks_at_dds_is_not_taken_for_a_watch_of_zenoh(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    workspace.at_a_free_port()
+    done = workspace.secure_launch("--watch", workspace.launch_file())
+    assert (
+        done.returncode == 2 and "--watch looks at DDS only, and talker-1, listener-2 on Zenoh" in done.stdout
+    )
+    assert "process started" not in done.stdout
+
+
 def test_a_stranger_in_the_place_of_the_router_is_not_taken_for_it(tmp_path: Path) -> None:
     workspace = Workspace(tmp_path)
     address = workspace.at_a_free_port()
