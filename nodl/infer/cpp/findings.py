@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.values import BOTTOM, Text, Value, join
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
@@ -49,11 +50,11 @@ class NodeRecord:
     cls: Class | None = None
     created: bool = False
     endpoints: dict[FoundEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
-    parameters: dict[str, Value] = field(default_factory=dict)
+    parameters: Notes = field(default_factory=Notes)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)
     use_global_arguments: bool = True
-    overrides: dict[str, Value] = field(default_factory=dict)
+    overrides: Notes = field(default_factory=Notes)
     description: str = ""
 
     def declare(self, name: str, default: Value) -> None:
@@ -61,7 +62,8 @@ class NodeRecord:
 
     def default(self, name: str) -> Value:
         """What the program gives for the parameter itself: in its node options, else where it declares it."""
-        return self.overrides.get(name) or self.parameters.get(name, BOTTOM)
+        given: Value = self.overrides.get(name) or self.parameters.get(name, BOTTOM)
+        return given
 
     def gap(self, source: SourceRef, why: str) -> None:
         self.gaps.setdefault((source, why))

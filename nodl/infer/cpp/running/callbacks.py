@@ -13,7 +13,7 @@ from nodl.infer.cpp.reading.writes import Writes, writes_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, WORD, Machine
-from nodl.infer.cpp.running.store import Cell, Changes
+from nodl.infer.cpp.running.store import Cell, Reads
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 5
 """Rounds after which a variable that callbacks still change counts as not known."""
-MAX_ROUNDS = 16
+MAX_ROUNDS = 32
 SIDE_STEPS = 30_000
 """For a callback that makes no interface itself; what one that needs more may change is not known."""
 
@@ -46,10 +46,10 @@ Key = tuple[object, object]
 
 @dataclass
 class _Ran:
-    """When a callback ran last: what it read, and how much was known of the program beside its variables."""
+    """When a callback ran last: what it read, and how many nodes there were."""
 
-    reads: Changes
-    facts: tuple[int, ...]
+    reads: Reads
+    nodes: int
 
 
 @dataclass
@@ -96,7 +96,12 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
             run.called.add(atom.function)
         return False
     last = rounds.last.get(key)
-    if not certainly and last is not None and last.facts == _facts(run) and run.store.holds(last.reads):
+    if (
+        not certainly
+        and last is not None
+        and last.nodes == len(run.nodes)
+        and run.store.holds(last.reads, in_any_order=True)
+    ):
         return False
     if key in rounds.given_up:
         return _unsettle(rounds, atom)
@@ -111,9 +116,9 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
     if not done:
         rounds.given_up.add(key)
         return _unsettle(rounds, atom)
-    rounds.last[key] = _Ran(reads, _facts(run))
-    rounds.read.update(reads)
-    rounds.names_read.update(name for _, name in reads)
+    rounds.last[key] = _Ran(reads, len(run.nodes))
+    rounds.read.update(reads.cells)
+    rounds.names_read.update(name for _, name in reads.cells)
     return True
 
 
@@ -143,16 +148,6 @@ def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
         return NEXT
 
     run.branches([go] if certainly else [go, lambda: NEXT])
-
-
-def _facts(run: Machine) -> tuple[int, ...]:
-    """What a callback may see beside variables; grows only."""
-    return (
-        len(run.objects),
-        sum(len(obj.data) for obj in run.objects.values()),
-        sum(len(record.parameters) for record in run.nodes),
-        len(run.nodes),
-    )
 
 
 def _matters(rounds: _Rounds, atom: object) -> bool:

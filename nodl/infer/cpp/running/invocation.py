@@ -14,6 +14,7 @@ from nodl.infer.cpp.running.constructors import bind_parameters, candidates, cho
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
+from nodl.infer.cpp.running.memory import MEMORY_DEPTH, Outcome
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
@@ -23,7 +24,7 @@ from nodl.infer.cpp.syntax import children, text, unwrapped
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.reading.declarations import Function
+    from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
     from nodl.infer.cpp.reading.type_names import Type
 
 
@@ -191,6 +192,31 @@ def invoke(
         inner.bindings = {**_class_bindings(run, function, this_object), **(bindings or {})}
     deduced = {**_element_types(run, function, node, frame), **_deduced(run, function, values, types)}
     inner.bindings = {**inner.bindings, **deduced}
+    given = (tuple(values), inner.bindings, inner.conditions, len(run.nodes))
+    key = (function, this_object, inner.path)
+    outcome = _outcome(run, key, given, inner.depth, lambda: _run_body(run, function, values, inner))
+    _write_back(run, function, outcome, node, frame)
+    run.left = node.id if outcome.ends else None
+    return outcome.returned
+
+
+def _outcome(run: Machine, key: object, given: object, depth: int, action: Callable[[], Outcome]) -> Outcome:
+    """Of ``action``, or of the same call before, whose steps count again: a budget means the same in every round."""
+    if depth > MEMORY_DEPTH:
+        return action()
+    known = run.memory.find(key, given)
+    if known is not None:
+        run.count(known[1])
+        return known[0]
+
+    def counted() -> tuple[Outcome, int]:
+        before = run.steps
+        return action(), run.steps - before
+
+    return run.memory.keep(key, given, counted)
+
+
+def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: Frame) -> Outcome:
     inner.active, inner.mark = True, run.store.mark()
     run.active.append(function)
     bind_parameters(run, function, values, inner)
@@ -199,10 +225,10 @@ def invoke(
         inner.exits = _successes(inner)
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
-    _write_back(run, function, inner, node, frame)
-    run.left = node.id if not outcome & NEXT and not inner.exits else None
+    left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if _is_written_back(p)}
+    ends = not outcome & NEXT and not inner.exits
     inner.active, inner.finished = False, not inner.captured
-    return inner.returned
+    return Outcome(inner.returned, left, ends)
 
 
 # Transitions of a lifecycle node (rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp).
@@ -266,18 +292,22 @@ def _deduced(
     return bound
 
 
-def _write_back(run: Machine, function: Function, inner: Frame, node: Node, frame: Frame) -> None:
+def _is_written_back(parameter: FunctionParameter) -> bool:
+    marked = parameter.type.rstrip().endswith(("&", "*"))
+    return marked and "const" not in parameter.type.split() and bool(parameter.name)
+
+
+def _write_back(run: Machine, function: Function, outcome: Outcome, node: Node, frame: Frame) -> None:
     """What a function does to its reference parameters shows in the caller's variables."""
     given = children(node.child_by_field_name("arguments"))
     for parameter, argument in zip(function.parameters, given, strict=False):
-        marks = parameter.type.rstrip()
-        if not marks.endswith(("&", "*")) or "const" in parameter.type.split() or not parameter.name:
+        if not _is_written_back(parameter):
             continue
         target = unwrapped(argument)
         if target is not None and target.type == "pointer_expression":
             target = target.child_by_field_name("argument")
         if target is None or target.type not in ("identifier", "field_expression", "subscript_expression"):
             continue
-        value = run.store.get((inner, parameter.name))
+        value = outcome.parameters[parameter.name]
         if value is not None and value != run.evaluate(target, frame):
             assign(run, target, value, frame)

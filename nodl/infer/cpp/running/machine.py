@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.findings import Condition, Follows, FoundEndpoint, NodeRecord
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
-from nodl.infer.cpp.reading.declarations import Function
+from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.memory import Memory
+from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.store import AbstractStore, Changes
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -88,6 +90,8 @@ class Machine:
         self.names = names
         self.settings = settings or Settings()
         self.store = AbstractStore()
+        self.memory = Memory(self.store)
+        self.size = Notes(self.store.log)  # how many nodes and classes the program has, so far
         self.nodes: dict[NodeRecord, None] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.objects: dict[object, Obj] = {}
@@ -111,7 +115,8 @@ class Machine:
         self.unset: dict[
             tuple[str, int], tuple[SourceRef, str, str]
         ] = {}  # calls on pointers that hold nothing
-        self._used: tuple[int, set[str]] = (-1, set())
+        self._used: set[str] = set()
+        self._known: set[Class] = set()
         self._leading: dict[tuple[object, int], bool] = {}
 
     # --- running ------------------------------------------------------------------------------------------
@@ -129,6 +134,12 @@ class Machine:
                 self.gap(node, frame, f"{what} is not followed; it may make interfaces")
             return unknown(what)
         return handler(self, node, frame)
+
+    def count(self, steps: int) -> None:
+        """Raises ``BudgetExceeded``."""
+        self.steps += steps
+        if self.steps > self.limit:
+            raise BudgetExceeded
 
     def execute(self, node: Node, frame: Frame) -> int:
         self.steps += 1
@@ -201,9 +212,10 @@ class Machine:
     def obj(self, key: object, kind: Type, **values: object) -> Obj:
         found = self.objects.get(key)
         if found is None:
-            found = self.objects[key] = Obj(kind)
+            found = self.objects[key] = Obj(kind, data=Notes(self.store.log))
             for name, value in values.items():
                 setattr(found, name, value)
+            self._uses(found.cls)
         return found
 
     def frame(self, key: object, fresh: Frame) -> Frame:
@@ -327,6 +339,7 @@ class Machine:
         return {"name": name, "ns": namespace}.get(part.what, f"{namespace.rstrip('/')}/{name}")
 
     def _parameter_part(self, part: ParameterPart) -> str | None:
+        self.size.get("nodes")
         for record in self.nodes:
             if part.name in record.parameters:
                 value = self.given(record, part.name)
@@ -338,10 +351,14 @@ class Machine:
 
     def used_classes(self) -> set[str]:
         """The classes of all objects that were made, with their bases."""
-        if len(self.objects) != self._used[0]:
-            made = {obj.cls for obj in self.objects.values() if obj.cls is not None}
-            self._used = (len(self.objects), {each.name for cls in made for each in self.names.ancestry(cls)})
-        return self._used[1]
+        self.size.get("classes")
+        return self._used
+
+    def _uses(self, cls: Class | None) -> None:
+        if cls is not None and cls not in self._known:
+            self._known.add(cls)
+            self._used |= {each.name for each in self.names.ancestry(cls)}
+            self.size["classes"] = len(self._used)
 
     def makes_interfaces(self, function: Function) -> bool:
         """Whether ``function``, or anything that it may call, may make an interface or a node."""
@@ -359,8 +376,11 @@ class Machine:
     def new_node(self, node: Node, frame: Frame, key: object) -> NodeRecord:
         record = self.records.get(key)
         if record is None:
-            record = self.records[key] = NodeRecord(self.place(node, frame))
+            log = self.store.log
+            record = NodeRecord(self.place(node, frame), parameters=Notes(log), overrides=Notes(log))
+            self.records[key] = record
             self.nodes[record] = None
+            self.size["nodes"] = len(self.nodes)
         return record
 
 

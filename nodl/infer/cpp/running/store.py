@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
+from nodl.infer.cpp.running.notes import Log, Noted, hold
 from nodl.infer.cpp.running.values import BOTTOM, Value, join
 
 Cell = tuple[object, str]
@@ -11,36 +13,62 @@ Changes = dict[Cell, Value]
 _ABSENT: Value = (("absent",),)
 
 
+class Reads(NamedTuple):
+    """What somebody read: cells with the values that they had before, and notes."""
+
+    cells: Changes
+    noted: Noted
+
+
 class AbstractStore:
     def __init__(self) -> None:
         self._cells: dict[Cell, Value] = {}
         self._trail: list[tuple[Cell, Value]] = []
         self._reads: set[Cell] | None = None
+        self.log = Log()
 
     def get(self, cell: Cell) -> Value | None:
         if self._reads is not None:
             self._reads.add(cell)
         return self._cells.get(cell)
 
-    def watched(self, action: Callable[[], None]) -> Changes:
-        """Run ``action``; the cells that it read, with the values that they had before."""
-        outer, self._reads = self._reads, set()
+    def watched(self, action: Callable[[], None]) -> Reads:
+        """Run ``action``; what it read and did not write itself before. Who watches the caller learns of it, too."""
+        outer, outer_noted = self._reads, self.log.noted
+        self._reads, self.log.noted = set(), {}
         mark = len(self._trail)
         try:
             action()
         finally:
-            reads, self._reads = self._reads, outer
-        before = {}
-        for cell, old in reversed(self._trail[mark:]):
-            before[cell] = old
-        cells = self._cells
-        found = {cell: before[cell] if cell in before else cells.get(cell, _ABSENT) for cell in reads}
-        return {cell: value for cell, value in found.items() if value is not _ABSENT or not _is_local(cell)}
+            read, noted = self._reads, self.log.noted
+            self._reads, self.log.noted = outer, outer_noted
+            before = {}
+            for cell, old in reversed(self._trail[mark:]):
+                before[cell] = old
+            cells = self._cells
+            found = {cell: before[cell] if cell in before else cells.get(cell, _ABSENT) for cell in read}
+            kept = {c: value for c, value in found.items() if value is not _ABSENT or not _is_local(c)}
+            reads = Reads(kept, noted)
+            self.saw(reads)
+        return reads
 
-    def holds(self, values: Changes) -> bool:
-        """Whether all these cells have the same values as in ``values``."""
-        cells = self._cells
-        return all(_same(cells.get(cell, _ABSENT), value) for cell, value in values.items())
+    def saw(self, reads: Reads) -> None:
+        """Tell who watches that all this was read."""
+        if self._reads is not None and self.log.noted is not None:
+            self._reads.update(reads.cells)
+            for key, said in reads.noted.items():
+                self.log.noted.setdefault(key, said)
+
+    def holds(self, reads: Reads, *, in_any_order: bool = False) -> bool:
+        """Whether all this says what it said; ``in_any_order``: alternatives may have changed places."""
+        get = self._cells.get
+        for cell, value in reads.cells.items():
+            present = get(cell, _ABSENT)
+            if present is value or present == value:
+                continue
+            if not in_any_order or set(present) != set(value):
+                return False
+        return hold(reads.noted)
 
     def set(self, cell: Cell, value: Value) -> None:
         old = self._cells.get(cell, _ABSENT)
@@ -80,10 +108,6 @@ class AbstractStore:
         for cell in dict.fromkeys(cell for changes in alternatives for cell in changes):
             present = self._cells.get(cell, BOTTOM)
             self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
-
-
-def _same(first: Value, second: Value) -> bool:
-    return first is second or first == second or set(first) == set(second)
 
 
 def _is_local(cell: Cell) -> bool:

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from nodl.infer.cpp.running.notes import Notes
 from nodl.name_template import ParameterPart, Part, UnknownPart
 
 if TYPE_CHECKING:
@@ -121,7 +122,7 @@ class Obj:
     cls: Class | None = None
     node: NodeRecord | None = None
     bindings: dict[Class, dict[str, Type]] = field(default_factory=dict)
-    data: dict[str, Any] = field(default_factory=dict)  # of library classes
+    data: Notes = field(default_factory=Notes)  # of library classes
     heap: bool = False
     foreign_base: str = ""
     is_node: bool = False  # the node itself; else something that belongs to it
