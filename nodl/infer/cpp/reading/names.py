@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
+from nodl.infer.cpp.reading.c_headers import is_of_c
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 
@@ -234,6 +235,11 @@ class Names:
         if not found and re.search(r"(?:^|::)\w*Node$", name):
             return "no header in reach defines it"
         return found
+
+    def is_of_c(self, name: str, file: FileIndex) -> bool:
+        """Whether a type that is not in reach comes from a header of C that ``file`` includes."""
+        seen = (self.files[each].source.foreign for each in self.visible(file.file) if each in self.files)
+        return is_of_c(name, [header for foreign in seen for header in foreign])
 
     def is_foreign(self, folder: str, file: str) -> bool:
         """Whether a folder of headers belongs to a package that the sources depend on and nobody has reviewed."""

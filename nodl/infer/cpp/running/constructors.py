@@ -75,6 +75,8 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
         if not _NUMBERS_ONLY.fullmatch(kind.name):
             run.gap(node, frame, "a structure without a name is made: its members may make interfaces")
         return
+    if run.names.is_of_c(kind.name, frame.file):
+        return
     first = kind.name.partition("::")[0]
     if first in KNOWN_HEADERS and not (deliberate and first in ROS_LIBRARIES):
         return
