@@ -14,7 +14,7 @@ from nodl.infer.cpp.running.constructors import bind_parameters, candidates, cho
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
-from nodl.infer.cpp.running.memory import MEMORY_DEPTH, Outcome
+from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
@@ -200,7 +200,9 @@ def invoke(
     return outcome.returned
 
 
-def _outcome(run: Machine, key: object, given: object, depth: int, action: Callable[[], Outcome]) -> Outcome:
+def _outcome(
+    run: Machine, key: object, given: object, depth: int, action: Callable[[], CallOutcome]
+) -> CallOutcome:
     """Of ``action``, or of the same call before, whose steps count again: a budget means the same in every round."""
     if depth > MEMORY_DEPTH:
         return action()
@@ -209,14 +211,14 @@ def _outcome(run: Machine, key: object, given: object, depth: int, action: Calla
         run.count(known[1])
         return known[0]
 
-    def counted() -> tuple[Outcome, int]:
+    def counted() -> tuple[CallOutcome, int]:
         before = run.steps
         return action(), run.steps - before
 
     return run.memory.keep(key, given, counted)
 
 
-def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: Frame) -> Outcome:
+def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: Frame) -> CallOutcome:
     inner.active, inner.mark = True, run.store.mark()
     run.active.append(function)
     bind_parameters(run, function, values, inner)
@@ -228,7 +230,7 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
     left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if _is_written_back(p)}
     ends = not outcome & NEXT and not inner.exits
     inner.active, inner.finished = False, not inner.captured
-    return Outcome(inner.returned, left, ends)
+    return CallOutcome(inner.returned, left, ends)
 
 
 # Transitions of a lifecycle node (rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp).
@@ -297,7 +299,7 @@ def _is_written_back(parameter: FunctionParameter) -> bool:
     return marked and "const" not in parameter.type.split() and bool(parameter.name)
 
 
-def _write_back(run: Machine, function: Function, outcome: Outcome, node: Node, frame: Frame) -> None:
+def _write_back(run: Machine, function: Function, outcome: CallOutcome, node: Node, frame: Frame) -> None:
     """What a function does to its reference parameters shows in the caller's variables."""
     given = children(node.child_by_field_name("arguments"))
     for parameter, argument in zip(function.parameters, given, strict=False):

@@ -12,7 +12,7 @@ MEMORY_DEPTH = 20
 """Paths of calls are whole up to this depth (``Frame.path``): then the same path means the same callers."""
 
 
-class Outcome(NamedTuple):
+class CallOutcome(NamedTuple):
     """``parameters``: what the function leaves in them; ``ends``: it never comes back."""
 
     returned: Value
@@ -25,7 +25,7 @@ class _Kept(NamedTuple):
     steps: int
     reads: Reads
     changes: Changes
-    outcome: Outcome
+    outcome: CallOutcome
 
 
 class Memory:
@@ -35,7 +35,7 @@ class Memory:
         self._store = store
         self._kept: dict[object, _Kept] = {}
 
-    def find(self, key: object, given: object) -> tuple[Outcome, int] | None:
+    def find(self, key: object, given: object) -> tuple[CallOutcome, int] | None:
         """The outcome of the last run, if that depended on ``given`` and all that it read is as it was; its steps."""
         kept = self._kept.get(key)
         if kept is not None and kept.given == given and self._store.holds(kept.reads):
@@ -45,9 +45,9 @@ class Memory:
             return kept.outcome, kept.steps
         return None
 
-    def keep(self, key: object, given: object, action: Callable[[], tuple[Outcome, int]]) -> Outcome:
+    def keep(self, key: object, given: object, action: Callable[[], tuple[CallOutcome, int]]) -> CallOutcome:
         """The outcome of ``action``, which takes so many steps."""
-        found: list[tuple[Outcome, int]] = []
+        found: list[tuple[CallOutcome, int]] = []
         mark = self._store.mark()
         reads = self._store.watched(lambda: found.append(action()))
         ((outcome, steps),) = found

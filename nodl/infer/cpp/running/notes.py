@@ -9,7 +9,7 @@ Noted = dict[tuple["Notes", str], object]  # what was asked for, and the answer 
 _ABSENT = object()
 
 
-class Log:
+class NoteLog:
     """The notes that were read since somebody wanted to know; ``None`` while nobody does."""
 
     def __init__(self) -> None:
@@ -19,7 +19,7 @@ class Log:
 class Notes:
     """Values by name, equal to themselves alone. What is read is told to the log."""
 
-    def __init__(self, log: Log | None = None) -> None:
+    def __init__(self, log: NoteLog | None = None) -> None:
         self._log = log
         self._values: dict[str, Any] = {}
 

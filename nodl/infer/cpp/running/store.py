@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from nodl.infer.cpp.running.notes import Log, Noted, hold
+from nodl.infer.cpp.running.notes import Noted, NoteLog, hold
 from nodl.infer.cpp.running.values import BOTTOM, Value, join
 
 Cell = tuple[object, str]
@@ -25,7 +25,7 @@ class AbstractStore:
         self._cells: dict[Cell, Value] = {}
         self._trail: list[tuple[Cell, Value]] = []
         self._reads: set[Cell] | None = None
-        self.log = Log()
+        self.log = NoteLog()
 
     def get(self, cell: Cell) -> Value | None:
         if self._reads is not None:

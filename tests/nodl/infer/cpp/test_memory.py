@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nodl.infer.cpp.running.memory import Memory, Outcome
+from nodl.infer.cpp.running.memory import CallOutcome, Memory
 from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.store import AbstractStore
 from nodl.infer.cpp.running.values import Value, literal
@@ -31,11 +31,11 @@ class Called:
         outcome = known[0] if known is not None else self.memory.keep("call", given, self._run)
         return outcome.returned
 
-    def _run(self) -> tuple[Outcome, int]:
+    def _run(self) -> tuple[CallOutcome, int]:
         self.runs += 1
         found = (*(self.store.get(("object", "topic")) or ()), *literal(self.notes["default"]))
         self.store.set(("object", "name"), found)
-        return Outcome(found, {}), 1
+        return CallOutcome(found, {}), 1
 
 
 def test_a_call_that_finds_everything_as_it_was_is_not_run_again_and_writes_what_it_wrote() -> None:
