@@ -7,6 +7,7 @@ from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.review.document import GrantedName
 from keystore.formats.permissions_patterns import has_wildcard
 
@@ -50,6 +51,13 @@ class Expected(NamedTuple):
 
     def nodes_of(self, enclave: str) -> Iterable[ExpectedNode]:
         return (node for node in self.nodes.values() if node.enclave == enclave)
+
+
+def out_of_sight(documents: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+    """Processes on Zenoh. An observer takes part in DDS: to it they would look as if they were missing, and what
+    runs beside them would be overlooked."""
+    processes = (process for document in documents for process in document["processes"])
+    return tuple(process["process"] for process in processes if process["middleware"] == ZENOH)
 
 
 def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected:

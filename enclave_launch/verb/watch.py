@@ -7,8 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.drift.compare import Security
+from enclave_launch.drift.expected import out_of_sight
 from enclave_launch.drift_watch import DriftWatch, WatchOptions
 from enclave_launch.errors import ProvisionError, UsageError
 from enclave_launch.report.plan_json import plan_document
@@ -25,8 +25,7 @@ def watch_plain_launch(
     """Of an unsecured launch. Gives its status; 1 for alarms. Raises ``UsageError`` for processes on Zenoh."""
     from enclave_launch.flow import run
 
-    _check_middlewares(plan)
-    watch = DriftWatch(plan_document(plan), _options(options))
+    watch = DriftWatch(_seen_document(plan), _options(options))
     return watch.status(run(plan, options=settings(watch)))
 
 
@@ -36,7 +35,7 @@ def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespa
     from keystore.errors import KeystoreError
     from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
 
-    _check_middlewares(launch.plan)
+    document = _seen_document(launch.plan)
     root = launch.settings.keystore
     try:
         enclave = provide_watcher(root, launch.options)
@@ -44,16 +43,18 @@ def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespa
     except KeystoreError as error:
         raise ProvisionError(f"--watch: {error}") from error
     directory = Path(root) / "enclaves" / enclave.lstrip("/")
-    return DriftWatch(plan_document(launch.plan), _options(options, security, directory))
+    return DriftWatch(document, _options(options, security, directory))
 
 
-def _check_middlewares(plan: LaunchPlan) -> None:
-    """The observer takes part in DDS: what is on Zenoh would look as if it were missing, or be overlooked."""
-    zenoh = [item.process.process_name for item in plan.processes if item.middleware == ZENOH]
+def _seen_document(plan: LaunchPlan) -> dict[str, object]:
+    """The plan's. Raises ``UsageError`` for processes that no observer sees."""
+    document = plan_document(plan)
+    zenoh = out_of_sight([document])
     if zenoh:
         raise UsageError(
             f"--watch looks at DDS only, and {', '.join(zenoh)} on Zenoh: start this without --watch"
         )
+    return document
 
 
 def _options(

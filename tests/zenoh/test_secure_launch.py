@@ -6,6 +6,8 @@ import contextlib
 import json
 import re
 import socket
+import subprocess
+import sys
 import threading
 from pathlib import Path
 
@@ -93,6 +95,17 @@ def test_what_only_looks_at_dds_is_not_taken_for_a_watch_of_zenoh(tmp_path: Path
         done.returncode == 2 and "--watch looks at DDS only, and talker-1, listener-2 on Zenoh" in done.stdout
     )
     assert "process started" not in done.stdout
+
+
+def test_drift_of_a_plan_on_zenoh_is_refused_and_not_told_as_missing_nodes(tmp_path: Path) -> None:
+    workspace = Workspace(tmp_path)
+    done = subprocess.run(
+        [sys.executable, "-m", "enclave_launch.verb.secure_plan", "drift", "--prefix", str(workspace.prefix),
+         str(workspace.launch_file())],
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=90,
+    )  # fmt: skip
+    assert done.returncode == 2 and "only DDS is observed" in done.stdout, done.stdout
+    assert "talker-1, listener-2" in done.stdout and "missing" not in done.stdout
 
 
 def test_a_stranger_in_the_place_of_the_router_is_not_taken_for_it(tmp_path: Path) -> None:
