@@ -40,7 +40,7 @@ def encoded(value: object) -> object:
         return {"record": name, "fields": [encoded(each) for each in _fields(value)]}
     if isinstance(value, Mapping):
         return {"mapping": [[encoded(key), encoded(each)] for key, each in value.items()]}
-    if isinstance(value, tuple | list):
+    if isinstance(value, tuple | list) and not hasattr(value, "_fields"):  # a record that is not listed
         return [encoded(each) for each in value]
     raise TypeError(f"{name} is not kept")
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
@@ -146,6 +147,15 @@ def test_without_a_place_to_keep_them_answers_are_made_each_time(
 def test_answers_are_read_back_as_they_were_written(workspace: Path) -> None:
     nodes = asked(workspace).nodes
     assert decoded(encoded(nodes)) == nodes
+
+
+def test_a_record_that_is_not_on_the_list_is_not_kept_as_a_plain_tuple() -> None:
+    class Stranger(NamedTuple):
+        word: str
+
+    assert decoded(encoded(("word",))) == ("word",)
+    with pytest.raises(TypeError, match="Stranger is not kept"):
+        encoded(Stranger("word"))
 
 
 @pytest.mark.parametrize(
