@@ -15,11 +15,23 @@ settings.load_profile("unhurried")
 
 FAST = ("description", "evaluation", "frontend", "launch_ros", "nodl", "policy")
 """Folders whose tests start no node, make no key and need no network."""
+THOROUGH = (
+    "evaluation/test_error_text.py",
+    "evaluation/test_explore.py",
+    "launch_ros/test_enclave_scopes.py",
+    "nodl/infer/cpp/test_in_a_launch.py",
+    "nodl/infer/test_deceptions.py",
+    "nodl/infer/test_in_a_launch.py",
+    "policy/test_components.py",
+)
+"""Tables in these folders that take more than three seconds each: together half of the time."""
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     tests = Path(__file__).parent
     for item in items:
-        folder = item.path.relative_to(tests).parts[0]
-        if folder in FAST or item.path.parent == tests:
+        file = item.path.relative_to(tests)
+        if file.as_posix() in THOROUGH:
+            continue
+        if file.parts[0] in FAST or item.path.parent == tests:
             item.add_marker(pytest.mark.fast)
