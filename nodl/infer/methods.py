@@ -8,6 +8,8 @@ from nodl.infer.values import BOTTOM, ClassValue, FunctionValue, HeapObject, Val
 
 
 class BoundMethod:
+    """A function of the program with the object or class that becomes its first argument."""
+
     __slots__ = ("function", "receiver")
 
     def __init__(self, function: FunctionValue, receiver: object) -> None:
@@ -70,6 +72,8 @@ class ForeignMethod:
 
 @dataclass(frozen=True, slots=True)
 class Partial:
+    """``functools.partial``: a callable with its first arguments and keywords given in advance."""
+
     function: Value
     positional: tuple[Value, ...]
     keywords: tuple[tuple[str, Value], ...]
@@ -104,6 +108,8 @@ class PropertyValue:
 
 @dataclass(frozen=True, slots=True)
 class ClassMethod:
+    """A function under ``@classmethod``, or under ``@staticmethod`` (``static``)."""
+
     function: Value
     static: bool
 

@@ -20,6 +20,8 @@ _PROGRAMS = re.compile(r"install\s*\(\s*PROGRAMS(.*?)DESTINATION", re.S | re.I)
 
 @dataclass(frozen=True, slots=True)
 class EntryPoint:
+    """An entry point in setup.py or setup.cfg: an executable with the module and function it calls."""
+
     executable: str
     module: str
     function: str
@@ -50,6 +52,7 @@ def find_package(file: str) -> Package | None:
 
 @lru_cache(maxsize=512)
 def read_package(folder: str) -> Package:
+    """What the files in ``folder`` tell; the folder's name stands in where package.xml gives none."""
     base = Path(folder)
     match = _NAME.search(text_or_nothing(base / "package.xml"))
     name = match[1] if match else base.name

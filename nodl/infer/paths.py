@@ -23,6 +23,8 @@ Follow = Callable[[Decisions], Run]
 
 @dataclass(slots=True)
 class Path:
+    """A run that followed one path through the program, with the outcomes that led it there."""
+
     run: Run
     decisions: Decisions
 

@@ -126,6 +126,7 @@ def _endpoints(found: FoundEndpoint, note: str) -> list[Endpoint]:
 
 
 def certainty_of(template: NameTemplate) -> Certainty:
+    """Exact for a literal, from default if nothing is open, a pattern if a part is known, else unknown."""
     if template.is_literal:
         return Certainty.EXACT
     known = [part for part in template.parts if isinstance(part, str) and part.strip("/~")]

@@ -19,6 +19,8 @@ Written = dict[tuple[int, object], tuple[Cells, object, Value]]  # by cell: its 
 
 
 class ProgramState:
+    """The trail of all writes of one run, by which branches are undone and joined."""
+
     def __init__(self) -> None:
         self._trail: list[tuple[Cells, object, Value | None]] = []
         self._stamps = itertools.count(1)

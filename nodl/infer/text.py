@@ -41,6 +41,8 @@ class NodePart:
 
 @dataclass(frozen=True, slots=True)
 class Hole:
+    """A part of a text that is not known, and why; holes are equal whatever their reason."""
+
     why: str
 
     def __eq__(self, other: object) -> bool:
@@ -103,6 +105,7 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
 
 
 def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
+    """The pieces of a text; a ``str`` is a single one."""
     return text.pieces if isinstance(text, Text) else (text,)
 
 

@@ -86,6 +86,7 @@ _externals: dict[str, Value] = {}
 
 
 def external(path: str) -> Value:
+    """The value of a library's name, one shared object per path."""
     value = _externals.get(path)
     if value is None:
         value = _externals[path] = (External(path),)
@@ -189,6 +190,8 @@ class Key:
 
 
 class Dictionary(HeapObject):
+    """A dictionary of any kind: a cell for each constant key, and ``OTHER`` for all other keys."""
+
     __slots__ = ("default", "kind")
 
     def __init__(self) -> None:
@@ -217,6 +220,8 @@ class Dictionary(HeapObject):
 
 
 class ModuleValue(HeapObject):
+    """An analysed module, whose cells are its global variables."""
+
     __slots__ = ("source", "stars")
 
     def __init__(self, source: SourceModule):
@@ -281,6 +286,8 @@ class NativeObject:
 
 
 class ClassValue(HeapObject):
+    """An analysed class, whose cells hold what its body and later assignments set."""
+
     __slots__ = ("bases", "fields", "hooked", "linear", "module", "name", "node")
 
     def __init__(self, node: ast.ClassDef, name: str, module: ModuleValue, bases: Value):
@@ -327,6 +334,7 @@ def join(left: Value, right: Value) -> Value:
 
 
 def join_all(values: Iterable[Value]) -> Value:
+    """What may be any of ``values``; ``BOTTOM`` when there are none."""
     result: Value = BOTTOM
     for value in values:
         result = join(result, value)
@@ -361,6 +369,7 @@ def _limited(value: Value) -> Value:
 
 
 def widened_texts(texts: list[str | Text]) -> object:
+    """One pattern for all ``texts``: common prefix and suffix around a hole; ``Unknown`` without either."""
     text = common_text(texts, "too many possible names")
     return text if not text.is_hole else unknown("too many possible names")[0]
 
@@ -382,6 +391,7 @@ def present(value: Value) -> Value:
 
 
 def constant_strings(value: Value) -> list[str]:
+    """The strings among the alternatives that are known in full."""
     return [atom for atom in value if isinstance(atom, str)]
 
 

@@ -31,6 +31,7 @@ from nodl.infer.values import (
 
 
 def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
+    """Bind ``value`` to a name, field or element, or take it apart for a tuple or list of targets."""
     if isinstance(target, ast.Name):
         run.assign_name(target.id, value, frame)
     elif isinstance(target, ast.Attribute):
@@ -44,6 +45,7 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
 
 
 def assign_unknown(run: Run, target: ast.expr, frame: Frame) -> None:
+    """Assign a value of which nothing is known, to each part of a tuple or list as well."""
     assign(run, target, ANY, frame)
 
 
@@ -65,6 +67,7 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
 
 
 def plain_store(run: Run, owner: HeapObject, name: str, value: Value, certain: bool = True) -> None:
+    """Write the cell past setters and ``__setattr__``; unless ``certain``, the old value may stay."""
     if certain:
         run.state.store(owner, name, value)
     else:

@@ -47,6 +47,7 @@ class Summary:
 
 
 def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
+    """What a call gives: nothing if no path comes back, unknown (and a gap) if calls nest too deep."""
     node = function.node
     if len(run.stack) >= MAX_DEPTH:
         run.gap(call.node, call.frame, "calls are nested too deep to be followed")
@@ -220,5 +221,6 @@ def _widen_parameters(run: Run, summary: Summary, cells: LocalCells) -> None:
 
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
+    """Call the method's function with the receiver as its first argument."""
     shifted = Call(call.args.preceded((method.receiver,)), call.node, call.frame)
     return call_function(run, method.function, shifted)

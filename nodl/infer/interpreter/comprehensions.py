@@ -26,6 +26,7 @@ from nodl.infer.values import (
 
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
+    """A list (a set for a set comprehension), exact only where iterables and conditions are decided."""
     inner = _inner_frame(run, frame)
     collected: list[Value] = []
     exact = _generate(
@@ -42,6 +43,7 @@ def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp,
 
 
 def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
+    """A dictionary with the entries of all turns whose conditions are not certainly false."""
     inner = _inner_frame(run, frame)
     result = run.allocate(node, "dict", Dictionary)
 

@@ -60,6 +60,7 @@ def _defines_truth(cls: ClassValue) -> bool:
 
 
 def truth(value: Value) -> bool | None:
+    """``bool(value)`` if all alternatives agree; ``None`` if they differ or one of them is open."""
     seen = {truth_of(atom) for atom in value}
     return seen.pop() if len(seen) == 1 else None
 
@@ -196,6 +197,7 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
 
 
 def compare_values(operator: ast.cmpop, left: Value, right: Value) -> bool | None:
+    """The outcome of comparing all pairs if they agree; ``None``: not known, or more than 16 pairs."""
     if len(left) * len(right) > 16 or not left or not right:
         return None
     outcomes = {_compare_atoms(operator, a, b) for a in left for b in right}
@@ -250,4 +252,5 @@ def _compare_constants(operator: ast.cmpop, left: object, right: object) -> bool
 
 
 def is_unknown(value: Value) -> bool:
+    """Whether one of the alternatives is ``Unknown``."""
     return any(type(atom) is Unknown for atom in value)

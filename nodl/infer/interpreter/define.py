@@ -41,6 +41,7 @@ _DATACLASSES = frozenset(
 
 
 def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> FunctionValue:
+    """A ``def`` or ``lambda`` with its defaults; made again in one context it is one ``shared`` value."""
     closure = frame.closure if frame.is_class else frame
     if not frame.is_class:
         frame.capture()
@@ -69,6 +70,7 @@ def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> Func
 
 
 def define_function(run: Run, node: ast.FunctionDef | ast.AsyncFunctionDef, frame: Frame) -> bool:
+    """``def``: make the function, apply the decorators from the last to the first, bind the name."""
     function = make_function(run, node, node.name, frame)
     value: Value = (function,)
     for decorator in reversed(node.decorator_list):
@@ -128,6 +130,7 @@ def _take_name(run: Run, function: FunctionValue, decorator: ast.Call, frame: Fr
 
 
 def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
+    """``class``: run the body, complete the class, apply the decorators last to first, bind the name."""
     bases = tuple(sole(run.evaluate(base, frame)) for base in node.bases if not isinstance(base, ast.Starred))
     keywords = {
         keyword.arg: run.evaluate(keyword.value, frame)

@@ -84,6 +84,7 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
 
 
 def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:
+    """The evaluated arguments of a call; ``*`` and ``**`` are expanded as far as their contents are known."""
     args = Arguments([], {})
     for argument in node.args:
         if isinstance(argument, ast.Starred):
@@ -179,6 +180,7 @@ def _dict(run: Run, node: ast.Dict, frame: Frame) -> Value:
 
 
 def copy_dictionary(run: Run, target: Dictionary, source: Value) -> None:
+    """Add the entries of ``source``; what is escaped or not a dictionary may add any value under any key."""
     for atom in source:
         if isinstance(atom, Dictionary):
             for key, value, certain in atom.entries():

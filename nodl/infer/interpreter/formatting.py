@@ -71,6 +71,7 @@ def text_value(texts: Iterable[TextAtom]) -> Value:
 
 
 def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
+    """The texts that an f-string may give, with holes for what is not known."""
     operands: list[list[TextAtom]] = []
     for part in node.values:
         if isinstance(part, ast.Constant):

@@ -14,6 +14,7 @@ from nodl.source_ref import SourceRef
 
 
 def run_import(run: Run, node: ast.Import, frame: Frame) -> bool:
+    """``import``: bind the module to its ``as`` name; without one, bind the top package to its own."""
     for alias in node.names:
         whole = import_module(run, alias.name, frame)
         if alias.asname:
@@ -25,6 +26,7 @@ def run_import(run: Run, node: ast.Import, frame: Frame) -> bool:
 
 
 def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
+    """``from ... import``: bind each name to what the module holds; ``*`` of a library goes to ``stars``."""
     base = absolute_name(node, frame.module.source)
     module = import_module(run, base, frame) if base else external("")
     if not isinstance(module[0], ModuleValue):
@@ -49,6 +51,7 @@ def absolute_name(node: ast.ImportFrom, source: SourceModule) -> str:
 
 
 def member(run: Run, module: Value, base: str, name: str, frame: Frame) -> Value:
+    """What a module holds under ``name``, or its submodule; an ``External`` where neither is found."""
     atom = module[0]
     if not isinstance(atom, ModuleValue):
         inner = f"{base}.{name}" if base else name

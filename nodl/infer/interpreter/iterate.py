@@ -174,6 +174,7 @@ def input_items(text: Text) -> Value:
 
 
 def keys_of(obj: Dictionary) -> Items:
+    """The keys in order if all are known and certainly there; else what any key may be."""
     entries = obj.entries()
     keys = tuple((cell.constant,) for cell, _, _ in entries)
     if obj.is_open:
@@ -186,6 +187,7 @@ def keys_of(obj: Dictionary) -> Items:
 
 
 def values_of(obj: Dictionary) -> Items:
+    """The values in the order of their keys if all are known and certainly there; else what any may be."""
     entries = obj.entries()
     values = tuple(value for _, value, _ in entries)
     if obj.is_open:
@@ -198,6 +200,7 @@ def values_of(obj: Dictionary) -> Items:
 
 
 def enum_members(run: Run, cls: ClassValue, node: ast.AST, frame: Frame) -> Items:
+    """What iterating over an enumeration gives: each name assigned in its body; anything without one."""
     names = [
         target.id
         for statement in cls.node.body

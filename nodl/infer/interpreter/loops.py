@@ -66,6 +66,7 @@ def _is_streamed(run: Run, value: Value) -> bool:
 
 
 def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
+    """``for``: turn by turn as far as elements are known, else to a fixpoint. False: control cannot pass."""
     iterated = run.evaluate(node.iter, frame)
     if _is_streamed(run, iterated):
         return _streamed(run, node, iterated, frame)
@@ -223,6 +224,7 @@ def _unrolled(
 
 
 def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
+    """``while``: turn by turn while the test is decided, then to a fixpoint. False: control cannot pass."""
     before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = False
     frame.loop_forks = run.state.forks

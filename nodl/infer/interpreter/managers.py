@@ -32,6 +32,7 @@ from nodl.infer.values import (
 
 
 def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
+    """``with``: the body, whose exceptions the managers may swallow. False: control cannot pass."""
     managers: list[Value] = []
     for item in node.items:
         manager = run.evaluate(item.context_expr, frame)

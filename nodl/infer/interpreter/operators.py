@@ -45,6 +45,7 @@ _LARGE = 1 << 40
 
 
 def binary(run: Run, node: ast.BinOp, frame: Frame) -> Value:
+    """Evaluate both sides, the left one first, and apply the operator."""
     left = run.evaluate(node.left, frame)
     right = run.evaluate(node.right, frame)
     return binary_operation(run, node, left, node.op, right, frame)
@@ -53,6 +54,7 @@ def binary(run: Run, node: ast.BinOp, frame: Frame) -> Value:
 def binary_operation(
     run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
 ) -> Value:
+    """``left op right``, by special methods of the program first; ``ANY`` where nothing is known."""
     if special.has_own(left) or special.has_own(right):
         defined = special.binary(run, left, op, right, node, frame)
         if defined:

@@ -47,6 +47,7 @@ def matches(run: Run, pattern: ast.pattern, value: Value, frame: Frame) -> Outco
 
 
 def both(first: Outcome, second: Outcome) -> Outcome:
+    """``and``: false if one of them is false, true if both are true, else ``None``."""
     if first is False or second is False:
         return False
     return True if first and second else None

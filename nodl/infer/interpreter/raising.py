@@ -31,6 +31,7 @@ class Raised(Exception):
 
 
 def is_certain(run: Run) -> bool:
+    """Whether no undecided branch lies between here and the innermost ``try`` (or the start)."""
     return run.state.forks == run.try_forks
 
 
@@ -95,6 +96,7 @@ def _builtin(path: str) -> type[BaseException] | None:
 
 
 def is_builtin_exception(path: str) -> bool:
+    """Whether the path of an ``External`` names an exception class of Python itself."""
     return path.startswith("builtins.") and _builtin(path) is not None
 
 

@@ -66,6 +66,8 @@ AttributeReader = Callable[["Run", Any, str, ast.AST, Frame], Value]
 
 @dataclass(frozen=True)
 class Tables:
+    """The handler of each kind of syntax, callable and attribute owner, and what is asked about libraries."""
+
     expressions: dict[type, Evaluator]
     statements: dict[type, Executor]
     callables: dict[type, Caller]

@@ -61,6 +61,7 @@ def binary(run: Run, left: Value, op: ast.operator, right: Value, node: ast.AST,
 
 
 def in_place(run: Run, left: Value, op: ast.operator, right: Value, node: ast.AST, frame: Frame) -> Value:
+    """``left op= right`` by ``__iadd__`` and the like; nothing where no class of ``left`` defines it."""
     name = f"__i{OPERATORS.get(type(op), '')}__"
     result: Value = BOTTOM
     for atom in left:

@@ -34,6 +34,7 @@ from nodl.infer.values import (
 
 
 def subscript(run: Run, node: ast.Subscript, frame: Frame) -> Value:
+    """What ``owner[key]`` gives for each owner but ``None``; ``ANY`` when nothing comes of it."""
     owner = run.evaluate(node.value, frame)
     key = run.evaluate(node.slice, frame) if not isinstance(node.slice, ast.Slice) else ANY
     if isinstance(node.slice, ast.Slice) and not all(isinstance(a, str | Sequence) for a in owner):
@@ -106,6 +107,7 @@ def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Fra
 
 
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:
+    """What ``obj[key]`` gives; fills a ``defaultdict``. Raises ``Raised`` where a ``KeyError`` is certain."""
     result: Value = BOTTOM
     everything = False
     everywhere = not obj.escaped

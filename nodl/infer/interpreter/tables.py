@@ -14,4 +14,5 @@ TABLES = Tables(EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES, may_fail, keeps_
 
 
 def new_run(program: Program, main: SourceModule) -> Run:
+    """A run of ``main`` with the handlers of all concerns; nothing is executed yet."""
     return Run(program, TABLES, main)

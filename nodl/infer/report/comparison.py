@@ -55,6 +55,7 @@ def _named(node: NodeInterface, endpoint: Endpoint) -> Named | None:
 
 
 def to_text(program: str, found: Lacking) -> str:
+    """How many interfaces the manifest has, then a line for each that it lacks and for what stays open."""
     lines = [
         f"{program}: the manifest has {found.agreed} of {found.agreed + len(found.endpoints)} interfaces"
     ]

@@ -35,6 +35,8 @@ class ExpandedInterface:
 
 @dataclass(frozen=True, slots=True)
 class ExpandedNode:
+    """A node with all its interfaces, built-in ones included; ``*`` stands for a name that is not known."""
+
     interface: NodeInterface
     interfaces: tuple[ExpandedInterface, ...]
     programs: tuple[str, ...] = ()  # executables and plugins of packages that hold it
@@ -50,12 +52,16 @@ class ExpandedNode:
 
 @dataclass(frozen=True, slots=True)
 class OpenQuestion:
+    """Something that the analysis could not find out, with the place in the source."""
+
     source: SourceRef
     why: str
 
 
 @dataclass(frozen=True, slots=True)
 class ExpandedSystem:
+    """All nodes by namespace and name, and by place what stayed open, each question once."""
+
     nodes: tuple[ExpandedNode, ...]
     unresolved: tuple[OpenQuestion, ...]
 

@@ -7,6 +7,7 @@ from nodl.infer.report.expanded import ExpandedSystem
 
 
 def to_text(system: ExpandedSystem, *, built_in: bool = False) -> str:
+    """A line for each node, interface and open question; built-in interfaces only if ``built_in``."""
     lines: list[str] = []
     for node in system.nodes:
         held = f" in {', '.join(node.programs)}" if node.programs else ""
