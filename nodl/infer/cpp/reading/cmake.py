@@ -60,6 +60,8 @@ _LIBRARY_WORDS = frozenset(
 
 @dataclass
 class Target:
+    """An executable or library. ``links``: names as written, of this package or of others."""
+
     name: str
     executable: bool
     sources: list[str] = field(default_factory=list)

@@ -60,6 +60,7 @@ class Layer(dict[str, str]):
 
 
 def end_of_block(listed: Sequence[Command], start: int) -> int:
+    """The index of the command that closes the block at ``start``; of the last command if none does."""
     name = listed[start][0]
     depth = 0
     for index in range(start, len(listed)):
@@ -84,6 +85,7 @@ def expand(words: list[str], variables: dict[str, str]) -> list[str]:
 
 
 def condition_state(condition: list[str]) -> bool | None:
+    """Whether a condition holds on Linux without tests; ``None`` for all but a few simple ones."""
     words = [word.lstrip('"') for word in condition if word not in ("(", ")")]
     if words in (
         ["BUILD_TESTING"],
@@ -101,15 +103,18 @@ def condition_state(condition: list[str]) -> bool | None:
 
 
 def absolute(word: str, variables: dict[str, str]) -> str:
+    """A path as seen from ``CMAKE_CURRENT_SOURCE_DIR``, normalised; an absolute one stays where it is."""
     return os.path.normpath(os.path.join(variables.get("CMAKE_CURRENT_SOURCE_DIR", ""), word))
 
 
 def recursive_pattern(pattern: str, how: str) -> str:
+    """For ``GLOB_RECURSE`` the pattern with ``**`` before the file name; else the pattern as it is."""
     folder, name = os.path.split(pattern)
     return os.path.join(folder, "**", name) if how == "GLOB_RECURSE" else pattern
 
 
 def compile_definitions(words: list[str], only_flags: bool = False) -> dict[str, str]:
+    """Macros with their values, ``1`` by default; with ``only_flags`` only words that start with ``-D``."""
     found = {}
     for word in words:
         if word.startswith("-D"):

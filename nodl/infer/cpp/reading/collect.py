@@ -284,6 +284,7 @@ def _plain_name(name: str) -> str:
 
 
 def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:
+    """Parameters in order, without a lone ``void``; ``...`` or a pack marks ``function`` as variadic."""
     listed = declarator.child_by_field_name("parameters")
     found = []
     for child in listed.named_children if listed is not None else ():

@@ -25,6 +25,8 @@ _NUMBERS = frozenset({
 
 @dataclass(eq=False, slots=True)
 class FunctionParameter:
+    """``type``: as written, with ``const`` and ``&`` or ``*``; ``name``: empty if the parameter has none."""
+
     name: str
     type: str
     default: Node | None = None
@@ -76,6 +78,8 @@ class Function:
 
 @dataclass(eq=False, slots=True)
 class Field:
+    """A data member. ``pointer``: declared with ``*`` or ``&``, which ``type`` then leaves out."""
+
     name: str
     type: str
     default: Node | None
@@ -86,6 +90,8 @@ class Field:
 
 @dataclass(eq=False, slots=True)
 class Class:
+    """A class with a body; ``fields``, ``methods`` and ``declared`` leave out what its bases have."""
+
     name: str
     qualified: str
     file: FileIndex
@@ -109,6 +115,8 @@ class Class:
 
 @dataclass(eq=False, slots=True)
 class Global:
+    """A variable outside of functions; for a static member defined there ``scope`` ends with the class."""
+
     name: str
     type: str
     value: Node | None
@@ -141,6 +149,7 @@ class FileIndex:
 
 
 def function_declarator(node: Node) -> Node | None:
+    """The declarator with the parameters; ``None`` for variables, arrays and pointers to functions."""
     declarator = node.child_by_field_name("declarator")
     while declarator is not None and declarator.type != "function_declarator":
         if declarator.type in ("init_declarator", "array_declarator"):
@@ -155,4 +164,5 @@ def function_declarator(node: Node) -> Node | None:
 
 
 def type_text(node: Node) -> str:
+    """The type as written, on one line, without ``const``, ``&`` and ``*`` around it; may be empty."""
     return re.sub(r"\s+", " ", text(node.child_by_field_name("type")))

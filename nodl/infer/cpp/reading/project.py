@@ -35,6 +35,8 @@ class PluginClass:
 
 @dataclass
 class SourcePackage:
+    """A package folder; its build, plugins and include folders are read when first asked for."""
+
     name: str
     folder: str
     depends: frozenset[str] = frozenset()
@@ -165,6 +167,7 @@ def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
 
 
 def read_source_package(folder: str) -> SourcePackage:
+    """Name and dependencies from ``package.xml``; the name of the folder where that gives no name."""
     manifest = re.sub(r"<!--(?:.|\n)*?-->", "", text_or_nothing(os.path.join(folder, "package.xml")))
     match = _NAME.search(manifest)
     return SourcePackage(

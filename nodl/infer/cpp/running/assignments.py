@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 @expression("assignment_expression")
 def assignment(run: Machine, node: Node, frame: Frame) -> Value:
+    """Writes to the left side and gives what was written, before a number took the type of that side."""
     from nodl.infer.cpp.running.operators import has_text
 
     left, operator = node.child_by_field_name("left"), text(node.child_by_field_name("operator"))

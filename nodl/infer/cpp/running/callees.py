@@ -30,8 +30,10 @@ def callee_name(callee: Node) -> str:
 
 
 def types_of(run: Machine, callee: Node, frame: Frame) -> list[Type]:
+    """The template arguments that a call writes out; empty when it leaves them to deduction."""
     return [run.type_of(text(each), frame) for each in template_arguments(callee)]
 
 
 def is_only_declared(run: Machine, cls: Class, name: str) -> bool:
+    """Whether ``cls`` or a base declares the method without a body; ask after no body was found."""
     return bool(run.names.declarations(cls, name))

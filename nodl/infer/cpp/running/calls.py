@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 @expression("call_expression")
 def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
+    """Calls a method on an object, something by its name, or else whatever the callee evaluates to."""
     callee = unwrapped(node.child_by_field_name("function"))
     if callee is None:
         return unknown("a call")

@@ -161,6 +161,7 @@ def _is_delegate(run: Machine, cls: Class, written: str, inner: Frame) -> bool:
 
 
 def class_frame(run: Machine, this: Obj, cls: Class, frame: Frame) -> Frame:
+    """The frame of a constructor of ``cls`` before its parameters: scope, template arguments, ``this``."""
     return Frame(cls.file, cls.scope, None, this, this.bindings.get(cls, {}), path=frame.path)
 
 
@@ -340,6 +341,7 @@ _NUMBER = re.compile(r"int|double|float|size_t|long")
 
 
 def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value], inner: Frame) -> None:
+    """Each parameter gets its argument, a copy unless ``&`` or ``*``; else its default or an unknown."""
     inner.function = function
     for index, parameter in enumerate(function.parameters):
         if index < len(arguments):

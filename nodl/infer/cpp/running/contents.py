@@ -93,6 +93,7 @@ def iterated(run: Machine, subject: Value, node: Node, frame: Frame) -> tuple[li
 
 
 def items_of(run: Machine, atom: object) -> tuple[list[Value], bool]:
+    """Items of a container or list parameter, and whether exactly these; one unknown item for all else."""
     if isinstance(atom, Seq):
         return list(atom.items), not atom.open
     if isinstance(atom, Map):

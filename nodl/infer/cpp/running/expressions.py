@@ -24,6 +24,7 @@ _ESCAPES = {"n": "\n", "t": "\t", "\\": "\\", '"': '"', "'": "'", "0": "\0", "r"
 
 @expression("string_literal")
 def string_literal(run: Machine, node: Node, frame: Frame) -> Value:
+    """The text between the quotes with its escapes resolved; a prefix like ``u8`` is dropped."""
     whole = text(node)
     inner = whole[whole.find('"') + 1 : -1]
     return literal(re.sub(r"\\(x[0-9a-fA-F]+|[0-7]{1,3}|u[0-9a-fA-F]{4}|.)", lambda m: _escaped(m[1]), inner))
@@ -39,16 +40,19 @@ def _escaped(written: str) -> str:
 
 @expression("raw_string_literal")
 def raw_string(run: Machine, node: Node, frame: Frame) -> Value:
+    """The text between the outer parentheses, backslashes as they are."""
     return literal(text(node).partition("(")[2].rpartition(")")[0])
 
 
 @expression("concatenated_string")
 def concatenated_string(run: Machine, node: Node, frame: Frame) -> Value:
+    """Adjacent literals as one text; a macro name between them may become an unknown part of it."""
     return concatenated(*(run.evaluate(child, frame) for child in children(node)))
 
 
 @expression("user_defined_literal")
 def user_defined(run: Machine, node: Node, frame: Frame) -> Value:
+    """Texts with the suffix ``s`` or ``sv``; any other suffix, such as ``ms``, makes an unknown."""
     inner = children(node)
     suffix = text(inner[-1]) if len(inner) > 1 else ""
     plain = suffix in ("s", "sv") and inner[0].type.endswith("string_literal")
@@ -57,12 +61,14 @@ def user_defined(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("char_literal")
 def character(run: Machine, node: Node, frame: Frame) -> Value:
+    """The letter as a text, with simple escapes such as that for a newline resolved."""
     inner = text(node)[1:-1]
     return literal(_ESCAPES.get(inner[1:], inner[1:]) if inner.startswith("\\") else inner)
 
 
 @expression("number_literal")
 def number(run: Machine, node: Node, frame: Frame) -> Value:
+    """An integer where the digits make one, else a float; unknown if they make neither."""
     written = (
         text(node).replace("'", "").rstrip("uUlLfF")
         if not text(node).startswith("0x")
@@ -83,16 +89,19 @@ def number(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("true", "false")
 def boolean(run: Machine, node: Node, frame: Frame) -> Value:
+    """``true`` and ``false`` as a Python ``bool``."""
     return (node.type == "true",)
 
 
 @expression("null", "nullptr")
 def null(run: Machine, node: Node, frame: Frame) -> Value:
+    """No alternative at all: a null pointer adds nothing to what a variable may be."""
     return BOTTOM
 
 
 @expression("this")
 def this(run: Machine, node: Node, frame: Frame) -> Value:
+    """The object whose method runs; in a lambda that of the function around it; unknown outside of both."""
     owner: Frame | None = frame
     while owner is not None and owner.this is None:
         owner = owner.outer
@@ -107,6 +116,7 @@ def this(run: Machine, node: Node, frame: Frame) -> Value:
     "parameter_pack_expansion",
 )
 def inside(run: Machine, node: Node, frame: Frame) -> Value:
+    """Parentheses, a condition, ``args...``: the value of the expression in them."""
     return run.evaluate(
         unwrapped(node) if node.type != "parameter_pack_expansion" else node.named_children[0], frame
     )
@@ -114,6 +124,7 @@ def inside(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("comma_expression")
 def comma(run: Machine, node: Node, frame: Frame) -> Value:
+    """Evaluates every operand and gives the last."""
     found = BOTTOM
     for child in children(node):
         found = run.evaluate(child, frame)
@@ -125,11 +136,13 @@ def comma(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("identifier", "field_identifier", "namespace_identifier", "type_identifier")
 def identifier(run: Machine, node: Node, frame: Frame) -> Value:
+    """A variable, member, constant, enumerator or function; unknown when none of that name is in reach."""
     return variable(run, text(node), frame)
 
 
 @expression("qualified_identifier")
 def qualified(run: Machine, node: Node, frame: Frame) -> Value:
+    """As ``identifier``, for a name with ``::``, which is looked up without blanks."""
     return variable(run, re.sub(r"\s+", "", text(node)), frame)
 
 
@@ -138,6 +151,7 @@ def qualified(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("initializer_list")
 def initializer_list(run: Machine, node: Node, frame: Frame) -> Value:
+    """Braces without a type: a map if every item is a pair that starts with a text, else a list."""
     items = [run.evaluate(child, frame) for child in children(node)]
     pairs = [
         item for item in items if len(item) == 1 and isinstance(item[0], Seq) and len(item[0].items) == 2
@@ -149,11 +163,13 @@ def initializer_list(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("initializer_pair")
 def initializer_pair(run: Machine, node: Node, frame: Frame) -> Value:
+    """Of ``.field = value`` the value; who fills an aggregate reads the field."""
     return run.evaluate(node.child_by_field_name("value"), frame)
 
 
 @expression("argument_list")
 def argument_list(run: Machine, node: Node, frame: Frame) -> Value:
+    """The value of a single argument; several, or none, make a ``Group``."""
     inner = children(node)
     return (
         run.evaluate(inner[0], frame)
@@ -164,12 +180,14 @@ def argument_list(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("compound_literal_expression")
 def compound_literal(run: Machine, node: Node, frame: Frame) -> Value:
+    """``Foo{...}``: what the items in the braces make of the type."""
     kind = run.type_of(text(node.child_by_field_name("type")), frame)
     return made(run, node, kind, children(node.child_by_field_name("value")), frame)
 
 
 @expression("new_expression")
 def new(run: Machine, node: Node, frame: Frame) -> Value:
+    """``new Foo(...)``: what its constructor makes, on the heap, so that assigning it copies nothing."""
     kind = run.type_of(text(node.child_by_field_name("type")), frame)
     given = [run.evaluate(child, frame) for child in children(node.child_by_field_name("arguments"))]
     return construct(run, kind._replace(pointer=False), given, node, frame, heap=True)
@@ -177,6 +195,7 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("sizeof_expression")
 def size_of(run: Machine, node: Node, frame: Frame) -> Value:
+    """The bytes of a fundamental type on 64 bit Linux; unknown for any other operand."""
     size = SIZES.get(text(node.child_by_field_name("type") or node.child_by_field_name("value")).strip("() "))
     return unknown("a size") if size is None else (size,)
 
@@ -188,11 +207,13 @@ def size_of(run: Machine, node: Node, frame: Frame) -> Value:
     "requires_expression",
 )
 def nothing_known(run: Machine, node: Node, frame: Frame) -> Value:
+    """Gives an unknown and leaves the operands unevaluated."""
     return unknown("a computed value")
 
 
 @expression("cast_expression")
 def c_cast(run: Machine, node: Node, frame: Frame) -> Value:
+    """``(T) x``, converted like ``static_cast<T>(x)``."""
     kind = run.type_of(text(node.child_by_field_name("type")), frame)
     return cast(run, kind, run.evaluate(node.child_by_field_name("value"), frame))
 
@@ -231,4 +252,5 @@ def _is_by_reference(capture: Node) -> bool:
 
 
 def words_of(node: Node) -> list[str]:
+    """Every identifier in ``node``, in order and with repetitions."""
     return [text(each) for each in walk(node) if each.type in ("identifier", "field_identifier")]

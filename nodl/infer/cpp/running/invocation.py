@@ -87,6 +87,7 @@ def _placed(fixed: Sequence[Value], values: Sequence[Value]) -> list[Value]:
 
 
 def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node, frame: Frame) -> Value:
+    """Runs the body where the lambda was made and gives what it returns; unknown when calls nest too deep."""
     if frame.depth > MAX_DEPTH:
         return unknown("a recursion")
     outer = atom.frame
@@ -116,6 +117,7 @@ def call_functions(
     frame: Frame,
     types: Sequence[Type],
 ) -> Value:
+    """What the overloads that fit best may return; ``unknown_call`` decides if none fits."""
     fitting = candidates(functions, values)
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
@@ -148,6 +150,7 @@ def call_methods(
     exactly: bool = False,
     bindings: dict[str, Type] | None = None,
 ) -> Value:
+    """As ``call_functions``; if none fits, bases (unless ``exactly``) and methods of nodes are tried."""
     function = chosen(methods, values)
     if function is None and this_object is not None and this_object.cls is not None and not exactly:
         for base in run.names.ancestry(this_object.cls)[1:]:
