@@ -31,6 +31,8 @@ class Follows:
 
 @dataclass(frozen=True)
 class FoundEndpoint:
+    """An interface made at ``source``; ``follows`` where its name derives from another topic."""
+
     kind: EndpointKind
     name: Text
     type: str

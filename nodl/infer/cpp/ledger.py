@@ -45,6 +45,8 @@ _STRINGS = re.compile(r'"(?:\\.|[^"\\\n])*"')
 
 
 class Site(NamedTuple):
+    """A place whose ``word`` may make an interface; ``offset`` counts bytes of the preprocessed text."""
+
     file: str
     offset: int
     line: int

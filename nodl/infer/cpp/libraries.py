@@ -85,6 +85,8 @@ def is_harmless_function(name: str) -> bool:
 
 
 def library_class(*names: str) -> Callable[[ClassModel], ClassModel]:
+    """Decorator: the model of these classes, run where one is made, by itself or as a base."""
+
     def register(model: ClassModel) -> ClassModel:
         LIBRARY_CLASSES.update(dict.fromkeys(names, model))
         return model
@@ -93,6 +95,8 @@ def library_class(*names: str) -> Callable[[ClassModel], ClassModel]:
 
 
 def library_function(*names: str) -> Callable[[FunctionModel], FunctionModel]:
+    """Decorator: the model of these functions, run in place of the library's code."""
+
     def register(model: FunctionModel) -> FunctionModel:
         LIBRARY_FUNCTIONS.update(dict.fromkeys(names, model))
         return model
@@ -101,6 +105,8 @@ def library_function(*names: str) -> Callable[[FunctionModel], FunctionModel]:
 
 
 def library_method(cls: str, *names: str) -> Callable[[FunctionModel], FunctionModel]:
+    """Decorator: the model of these methods of ``cls``, run in place of the library's code."""
+
     def register(model: FunctionModel) -> FunctionModel:
         LIBRARY_METHODS.update({(cls, name): model for name in names})
         return model
@@ -109,6 +115,8 @@ def library_method(cls: str, *names: str) -> Callable[[FunctionModel], FunctionM
 
 
 def node_method(*names: str) -> Callable[[FunctionModel], FunctionModel]:
+    """Decorator: the model of these methods on any node whose class has none of its own for them."""
+
     def register(model: FunctionModel) -> FunctionModel:
         NODE_METHODS.update(dict.fromkeys(names, model))
         return model

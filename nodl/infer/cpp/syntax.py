@@ -50,6 +50,7 @@ def text(node: Node | None) -> str:
 
 
 def line_of(node: Node) -> int:
+    """The line that ``node`` begins in, counted from 1."""
     return int(node.start_point[0]) + 1
 
 

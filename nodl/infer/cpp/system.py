@@ -23,6 +23,8 @@ _TESTS = frozenset({"test", "tests", "testing", "benchmark", "examples", "exampl
 
 @dataclass
 class Inferred:
+    """The nodes, the gaps of programs that gave none, and the places that make nothing, with the reason."""
+
     nodes: list[NodeInterface] = field(default_factory=list)
     gaps: list[Gap] = field(default_factory=list)
     dead: list[Gap] = field(default_factory=list)
@@ -128,6 +130,7 @@ def programs(workspace: Workspace, sources: Sources, given: set[str]) -> list[tu
 def package_programs(
     package: SourcePackage, workspace: Workspace, sources: Sources, given: set[str] | None = None
 ) -> list[tuple[LaunchKey, Entry]]:
+    """The executables and components of one package; with ``given`` those built from one of these files."""
     found: list[tuple[LaunchKey, Entry]] = []
     build = package.build
     for target in build.targets.values():

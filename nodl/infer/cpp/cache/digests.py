@@ -21,4 +21,5 @@ def digest_of(path: str) -> str:
 
 
 def digest_of_content(content: bytes) -> str:
+    """SHA-256 of bytes, in hexadecimal."""
     return hashlib.sha256(content).hexdigest()

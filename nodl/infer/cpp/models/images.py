@@ -186,6 +186,7 @@ def chosen_transport(run: Machine, chosen: Param, known: Sequence[str]) -> str |
 
 
 def only_if(parameter: str, default: str, value: str) -> Value:
+    """An empty ending for a name, which drops the name unless the parameter has this ``value``."""
     return (Text((ParameterPart(parameter, default, None, (("only if equal", (value,)),)),)),)
 
 

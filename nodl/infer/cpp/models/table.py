@@ -105,10 +105,12 @@ ROWS.update(dict.fromkeys(NONE, ()))
 
 
 def texts_in(arguments: Sequence[Value], run: Machine) -> list[Value]:
+    """The arguments that hold something and no node: names and the like."""
     return [value for value in arguments if value and not nodes_in(run, value)]
 
 
 def owner_in(run: Machine, arguments: Sequence[Value]) -> Obj | None:
+    """The first node among the arguments or in lists among them; ``None`` if they hold none."""
     return next((obj for value in arguments for obj in nodes_in(run, value)), None)
 
 

@@ -26,6 +26,7 @@ MAX_ROUNDS = 3
 @statement("for_range_loop")
 @in_a_block
 def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
+    """One turn for each item; each turn may also be left out where the items are not exactly known."""
     right = node.child_by_field_name("right")
     subject = run.evaluate(right, frame)
     items, exact = iterated(run, subject, node, frame)
@@ -89,6 +90,7 @@ def _iteration(run: Machine, body: Node, frame: Frame, start: int, breaks: list[
 @statement("for_statement")
 @in_a_block
 def for_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Runs like ``while``; with an iterator up to ``end()``, one turn for each element of the container."""
     initializer = node.child_by_field_name("initializer")
     iterator = _iterator(node)
     if iterator is not None:
@@ -140,6 +142,7 @@ def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: 
 @statement("while_statement")
 @in_a_block
 def while_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Turn by turn while its condition is decided; else, as for ``while (true)``, to a fixpoint."""
     return _counted(run, node, frame, node.child_by_field_name("condition"), None)
 
 
@@ -214,6 +217,7 @@ def _repeated(
 
 @statement("do_statement")
 def do_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """The body once, then any number of times unless it left or the condition is certainly false."""
     body = node.child_by_field_name("body")
     start = run.store.mark()
     breaks: list[Changes] = []

@@ -63,6 +63,8 @@ class BudgetExceeded(Exception):
 
 
 def statement(*kinds: str) -> Callable[[StatementHandler], StatementHandler]:
+    """Decorator: the handler runs statements of these tree-sitter types and says which ways lead on."""
+
     def register(handler: StatementHandler) -> StatementHandler:
         STATEMENTS.update(dict.fromkeys(kinds, handler))
         return handler
@@ -71,6 +73,8 @@ def statement(*kinds: str) -> Callable[[StatementHandler], StatementHandler]:
 
 
 def expression(*kinds: str) -> Callable[[ExpressionHandler], ExpressionHandler]:
+    """Decorator: the handler gives the value of expressions of these tree-sitter types."""
+
     def register(handler: ExpressionHandler) -> ExpressionHandler:
         EXPRESSIONS.update(dict.fromkeys(kinds, handler))
         return handler
@@ -86,6 +90,8 @@ class Settings:
 
 
 class Machine:
+    """The state of one run and what it found: nodes, gaps, dead code, the parameters that decided."""
+
     def __init__(self, names: Names, settings: Settings | None = None):
         self.names = names
         self.settings = settings or Settings()

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
 
 
 def is_library_method(this_object: Obj, name: str) -> bool:
+    """Whether the tables have this method for the object: as a node, by its class or its library base."""
     if this_object.is_node and name in NODE_METHODS:
         return True
     return (this_object.foreign_base, name) in LIBRARY_METHODS or (
@@ -51,6 +52,7 @@ def is_library_method(this_object: Obj, name: str) -> bool:
 
 
 def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame: Frame) -> Value:
+    """``x.f(...)`` for each thing that ``x`` may be, results joined; ``BOTTOM`` where ``x`` holds nothing."""
     receiver_node = callee.child_by_field_name("argument")
     field = unwrapped(callee.child_by_field_name("field"))
     name = callee_name(field) if field is not None else ""
@@ -164,6 +166,7 @@ def _on_atom(
 def on_object(
     run: Machine, atom: Obj, name: str, node: Node, callee: Node, given: list[Node], frame: Frame
 ) -> Value:
+    """A method of one object: its source, else a closure in a member, else the tables, else unknown code."""
     types = types_of(run, callee, frame)
     if atom.cls is not None:
         argument = callee.child_by_field_name("argument")
@@ -255,4 +258,5 @@ def _on_unknown(
 
 
 def is_own_class(run: Machine, kind: Type) -> bool:
+    """Whether the program's files have a class of this name, in whatever namespace."""
     return kind.last in run.names.classes

@@ -85,6 +85,7 @@ def _is_auto(written: str) -> bool:
 
 
 def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = False) -> Value:
+    """What ``= v`` (copied unless ``reference``), ``(v)`` or ``{v}`` gives; ``BOTTOM`` for empty brackets."""
     if value.type in ("argument_list", "initializer_list"):
         inner = children(value)
         if len(inner) == 1:
@@ -210,6 +211,7 @@ def _all_of(kind: Type, value: Value) -> bool:
 
 
 def as_map(items: Sequence[Value]) -> Value:
+    """A map with these pairs as entries; a map among them comes back as it is, all else gives an unknown."""
     entries = []
     for value in items:
         for atom in value:
@@ -223,6 +225,7 @@ def as_map(items: Sequence[Value]) -> Value:
 
 
 def is_aggregate(run: Machine, cls: Class) -> bool:
+    """Whether braces fill its fields: the class has neither bases nor constructors."""
     return not (cls.bases or run.names.find_methods(cls, cls.name) or cls.name in cls.declared)
 
 

@@ -41,6 +41,7 @@ if TYPE_CHECKING:
 
 @expression("field_expression")
 def field(run: Machine, node: Node, frame: Frame) -> Value:
+    """``x.f`` or ``x->f``: a member of an object, ``first`` or ``second`` of a pair; unknown for all else."""
     owners = run.evaluate(node.child_by_field_name("argument"), frame)
     name = text(node.child_by_field_name("field"))
     found: list[Value] = []
@@ -60,6 +61,7 @@ def field(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("binary_expression")
 def binary(run: Machine, node: Node, frame: Frame) -> Value:
+    """``a && b`` with ``b`` run only where it may be, arithmetic, comparisons, joined texts, streams."""
     operator = text(node.child_by_field_name("operator"))
     left_node, right_node = node.child_by_field_name("left"), node.child_by_field_name("right")
     left = run.evaluate(left_node, frame)
@@ -80,6 +82,7 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
 
 
 def has_text(value: Value) -> bool:
+    """Whether one of the alternatives is a text or a parameter."""
     return any(isinstance(atom, Text | Param) for atom in value)
 
 
@@ -104,6 +107,7 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
 
 
 def computed(operator: str, left: object, right: object) -> Value:
+    """A comparison or arithmetic on two alternatives, enumerators by their number; unknown if undecided."""
     if operator in ("==", "!="):
         same = _same(left, right)
         return unknown("a comparison") if same is None else (same == (operator == "=="),)
@@ -180,6 +184,7 @@ def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | Non
 
 @expression("unary_expression")
 def unary(run: Machine, node: Node, frame: Frame) -> Value:
+    """``!x``, ``-x`` and ``+x``; unknown for other operators and for what cannot be computed."""
     operator = text(node.child_by_field_name("operator"))
     value = run.evaluate(node.child_by_field_name("argument"), frame)
     if operator in ("!", "not"):
@@ -192,6 +197,7 @@ def unary(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("pointer_expression")
 def pointer(run: Machine, node: Node, frame: Frame) -> Value:
+    """``&x`` and ``*x`` are ``x``; ``&Foo::f`` is the method, ``&text[i]`` is unknown."""
     argument = node.child_by_field_name("argument")
     if text(node).startswith("&") and argument is not None and argument.type == "qualified_identifier":
         found = method_pointer(run, argument, frame)
@@ -216,6 +222,7 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
 
 @expression("conditional_expression")
 def conditional(run: Machine, node: Node, frame: Frame) -> Value:
+    """``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
     known = truth(run.evaluate(node.child_by_field_name("condition"), frame))
     sides = {True: node.child_by_field_name("consequence"), False: node.child_by_field_name("alternative")}
     if known is not None:
@@ -235,6 +242,7 @@ def conditional(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("update_expression")
 def update(run: Machine, node: Node, frame: Frame) -> Value:
+    """``++x`` or ``x--``; an ``x`` that was not one known integer becomes unknown."""
     argument = node.child_by_field_name("argument")
     before = run.evaluate(argument, frame)
     step = 1 if "++" in text(node) else -1
@@ -246,6 +254,7 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("subscript_expression")
 def subscript(run: Machine, node: Node, frame: Frame) -> Value:
+    """``container[key]`` for all that the container may be; unknown where nothing is found."""
     container = node.child_by_field_name("argument")
     keys = [run.evaluate(child, frame) for child in children(node.child_by_field_name("indices"))]
     found = [element(run, atom, keys[0] if keys else BOTTOM) for atom in run.evaluate(container, frame)]

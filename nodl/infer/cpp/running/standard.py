@@ -186,6 +186,7 @@ def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame, ty
 
 
 def same(left: Value, right: Value) -> bool | None:
+    """Whether two literals read the same; ``None`` unless each value is exactly one literal."""
     first = plain(left[0]) if len(left) == 1 else None
     second = plain(right[0]) if len(right) == 1 else None
     return None if first is None or second is None else first == second

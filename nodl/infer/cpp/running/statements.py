@@ -46,6 +46,7 @@ def in_a_block(handler: StatementHandler) -> StatementHandler:
 
 @statement("compound_statement")
 def braces(run: Machine, node: Node, frame: Frame) -> int:
+    """Names declared inside end here; those in the body of a function stay in its frame."""
     parent = node.parent
     if parent is None or parent.type in ("function_definition", "lambda_expression"):
         return block(run, node, frame)
@@ -60,6 +61,7 @@ def braces(run: Machine, node: Node, frame: Frame) -> int:
     "else_clause",
 )
 def block(run: Machine, node: Node, frame: Frame) -> int:
+    """The children in order, without a scope of their own."""
     return sequence(run, children(node), frame)
 
 
@@ -67,6 +69,7 @@ _inner_block = in_a_block(block)
 
 
 def sequence(run: Machine, listed: list[Node], frame: Frame) -> int:
+    """Runs statements until one certainly leaves; those behind it are dead. Gives every way out."""
     outcome = 0
     for index, child in enumerate(listed):
         result = run.execute(child, frame)
@@ -80,6 +83,7 @@ def sequence(run: Machine, listed: list[Node], frame: Frame) -> int:
 
 @statement("expression_statement")
 def expression_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Evaluates it; leaves like a return where a call certainly throws or ends the program."""
     for child in children(node):
         run.left = None
         run.evaluate(child, frame)
@@ -94,6 +98,7 @@ _ENDS = frozenset({"exit", "std::exit", "abort", "std::abort", "_exit", "std::te
 
 @statement("return_statement", "co_return_statement")
 def return_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Adds the value and what was written to the ways out of the call."""
     value = BOTTOM
     for child in children(node):
         value = run.evaluate(child, frame)
@@ -105,6 +110,7 @@ def return_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 @statement("throw_statement")
 def throw_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Leaves like a return, but adds nothing to what the call gives back."""
     for child in children(node):
         run.evaluate(child, frame)
     return RETURN
@@ -112,6 +118,7 @@ def throw_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 @statement("break_statement")
 def break_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Keeps what was written for the end of the innermost loop or switch."""
     if frame.loops:
         frame.loops[-1].breaks.append(run.store.changes(frame.loops[-1].start))
     return BREAK
@@ -119,6 +126,7 @@ def break_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 @statement("continue_statement")
 def continue_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Keeps what was written for the end of this turn of the innermost loop, past any switch."""
     loops = [loop for loop in frame.loops if not isinstance(loop, _Switch)]
     if loops:
         loops[-1].continues.append(run.store.changes(loops[-1].mark))
@@ -132,6 +140,7 @@ class _Switch(Loop):
 @statement("if_statement")
 @in_a_block
 def if_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """The side that the condition chooses, the other one dead; both, joined, if that is not decided."""
     condition = node.child_by_field_name("condition")
     for child in children(condition):
         if child.type in ("init_statement", "declaration"):
@@ -150,6 +159,7 @@ def if_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 
 def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool | None:
+    """Runs a condition: certainly true or false, else ``None``, as for a condition that declares."""
     inner = condition
     if condition is not None and condition.type == "condition_clause":
         inner = condition.child_by_field_name("value")
@@ -176,6 +186,7 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 @statement("switch_statement")
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """The chosen case and those it falls through to; any of the cases where that is not decided."""
     subject = condition_atoms(run, node.child_by_field_name("condition"), frame)
     cases = [c for c in children(node.child_by_field_name("body")) if c.type == "case_statement"]
     chosen, certain = _chosen_cases(run, cases, subject, frame)
@@ -197,6 +208,7 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 
 def condition_atoms(run: Machine, condition: Node | None, frame: Frame) -> Value:
+    """Everything that the condition of a switch may be."""
     inner = condition.child_by_field_name("value") if condition is not None else None
     return run.evaluate(inner if inner is not None else unwrapped(condition), frame)
 
@@ -235,6 +247,7 @@ def _falling(run: Machine, cases: list[Node], frame: Frame) -> Callable[[], int]
 
 @statement("try_statement")
 def try_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Runs the body, and after it none or any one of the catch clauses."""
     body = node.child_by_field_name("body")
     outcome = run.execute(body, frame) if body is not None else NEXT
     catches = [child for child in children(node) if child.type == "catch_clause"]
@@ -259,6 +272,7 @@ def try_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 @statement("declaration")
 def declaration(run: Machine, node: Node, frame: Frame) -> int:
+    """Sets the variables, also static ones, structured bindings and ``Foo f(a);`` read as a function."""
     written = type_text(node)
     for declarator in node.children_by_field_name("declarator"):
         if declarator.type == "function_declarator":
@@ -325,6 +339,7 @@ def _vexing(run: Machine, node: Node, declarator: Node, written: str, frame: Fra
            "class_specifier", "struct_specifier", "enum_specifier", "namespace_alias_definition", "preproc_call",
            "preproc_def", "preproc_include", "template_declaration", "function_definition")  # fmt: skip
 def nothing(run: Machine, node: Node, frame: Frame) -> int:
+    """Runs nothing; ``using``, aliases and typedefs change what names of types mean from here on."""
     if node.type in ("using_declaration", "alias_declaration", "type_definition"):
         _local_alias(run, node, frame)
     return NEXT

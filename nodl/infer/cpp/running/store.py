@@ -21,6 +21,8 @@ class Reads(NamedTuple):
 
 
 class AbstractStore:
+    """What every cell holds now; writes can be undone and joined, reads watched."""
+
     def __init__(self) -> None:
         self._cells: dict[Cell, Value] = {}
         self._trail: list[tuple[Cell, Value]] = []

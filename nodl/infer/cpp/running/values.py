@@ -50,6 +50,8 @@ class DerivedName(str):
 
 
 class Unknown(NamedTuple):
+    """Something that is not known; ``why``, such as ``the result of f()``, is what gaps say of it."""
+
     why: str
 
 
@@ -89,6 +91,8 @@ class Seq(NamedTuple):
 
 
 class Map(NamedTuple):
+    """Entries of key and value. ``open``: it may hold others, or lack some."""
+
     entries: tuple[tuple[Value, Value], ...]
     open: bool = False
 
@@ -107,6 +111,8 @@ class Bound(NamedTuple):
 
 
 class Lambda(NamedTuple):
+    """A lambda expression with the frame of its captures."""
+
     node: Node
     frame: Frame
 
@@ -198,10 +204,12 @@ def _one_unknown(atoms: Iterable[Atom]) -> Value:
 
 
 def unknown(why: str) -> Value:
+    """A value that is not known, whose only alternative says ``why``."""
     return (Unknown(why),)
 
 
 def literal(value: str) -> Value:
+    """A value that is exactly this text; an empty one has no parts."""
     return (Text((value,)) if value else Text(()),)
 
 
@@ -249,6 +257,7 @@ def spread(atom: Atom) -> list[tuple[Part | NodePart, ...]]:
 
 
 def melted(parts: Iterable[Part | NodePart]) -> tuple[Part | NodePart, ...]:
+    """The parts without empty ones, literals that stand side by side as one."""
     found: list[Part | NodePart] = []
     for part in parts:
         if part == "":

@@ -35,6 +35,7 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
 
 
 def current_object(frame: Frame | None) -> Obj | None:
+    """What ``this`` is, in a lambda that of the function around it; ``None`` outside of methods."""
     while frame is not None:
         if frame.this is not None:
             return frame.this
@@ -59,6 +60,7 @@ def member(run: Machine, owner: Obj, name: str, frame: Frame) -> Value | None:
 
 
 def static_member(run: Machine, cls: object, name: str) -> Value:
+    """What a static field holds; its initial value when it is asked for first."""
 
     from nodl.infer.cpp.running.objects import default_value
 
@@ -93,6 +95,7 @@ def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Va
 
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
+    """Global, static member, enumerator or functions of that name; ``None`` if none is found."""
     from nodl.infer.cpp.running.objects import default_value
 
     cell_owner = run.names.find_global(name, frame.scope, frame.file)
