@@ -92,6 +92,7 @@ _WAITS = frozenset(
 
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
+    """What a call into a library gives: as its model says, else unknown, and the arguments escape."""
     path = atom.path
     if path.endswith(RESULT) and keeps_off(path):
         run.escape(call.args, opened=False, objects=False)
@@ -188,6 +189,7 @@ def _creates(path: str) -> bool:
 
 @functools.lru_cache(maxsize=4096)
 def is_node_class(path: str) -> bool:
+    """Whether ``path`` is a node class of rclpy or one in the table of library nodes."""
     if path.startswith("rclpy."):
         return path.endswith(("Node", ".LifecycleNode"))
     return library_node(path) is not None
@@ -219,6 +221,7 @@ def _hand_over(run: Run, path: str, call: Call) -> None:
 
 
 def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
+    """A method from a library's class: as its model says, else unknown, and the arguments escape."""
     receiver, path, name = method.receiver, method.path, method.name
     assert isinstance(receiver, Instance)
     if is_node_class(path):
@@ -303,6 +306,7 @@ def _common_callback(run: Run, name: str, call: Call) -> None:
 
 
 def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
+    """A method of a text, container or real object, or of something unknown that may be a node."""
     receiver, name = method.receiver, method.name
     if isinstance(receiver, NativeObject):
         return _native_method(run, receiver, name, call)

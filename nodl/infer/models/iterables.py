@@ -30,11 +30,13 @@ MAX_RANGE = 64
 
 
 def argument_items(run: Run, call: Call, index: int = 0) -> Items:
+    """The elements of the argument at ``index``; an empty sequence when it is not given."""
     value = call.args.at(index)
     return Items(()) if value is None else elements(run, value, call.node, call.frame)
 
 
 def call_range(run: Run, call: Call) -> Value:
+    """``range``: the numbers if they are known and few; else any number, tied to an input that bounds it."""
     bounds = [sole(value) for value in call.args.positional]
     integers = [bound for bound in bounds if isinstance(bound, int)]
     if len(integers) == len(bounds) and (len(bounds) in (1, 2) or (len(bounds) == 3 and integers[2])):
@@ -49,6 +51,8 @@ def call_range(run: Run, call: Call) -> Value:
 
 
 def made_sequence(kind: str) -> Callable[[Run, Call], Value]:
+    """The model of ``list`` or ``tuple``: a sequence of that kind with the elements of the argument."""
+
     def make(run: Run, call: Call) -> Value:
         return run.sequence(call.node, kind, argument_items(run, call))
 
@@ -56,6 +60,7 @@ def made_sequence(kind: str) -> Callable[[Run, Call], Value]:
 
 
 def call_set(run: Run, call: Call) -> Value:
+    """``set`` and ``frozenset``: element by element if all are known texts, else what any element may be."""
     items = argument_items(run, call)
     if items.exact is not None and not all(
         len(item) == 1 and isinstance(item[0], str) for item in items.exact
@@ -65,6 +70,7 @@ def call_set(run: Run, call: Call) -> Value:
 
 
 def call_sorted(run: Run, call: Call) -> Value:
+    """``sorted``: known texts in order without a key; else each place may hold any of the elements."""
     items = argument_items(run, call)
     if "key" in call.args.keywords:
         run.call(call.args.keywords["key"], Arguments([items.any_element() or ANY]), call.node, call.frame)
@@ -83,6 +89,7 @@ def call_sorted(run: Run, call: Call) -> Value:
 
 
 def call_reversed(run: Run, call: Call) -> Value:
+    """``reversed``: known elements in reverse order, others as they are."""
     items = argument_items(run, call)
     if items.exact is not None:
         items = Items(items.exact[::-1])
@@ -90,6 +97,7 @@ def call_reversed(run: Run, call: Call) -> Value:
 
 
 def call_enumerate(run: Run, call: Call) -> Value:
+    """``enumerate``: a list of pairs; one pair stands for all if the length or the start is not known."""
     items = argument_items(run, call)
     start = sole(call.args.at(1, "start") or (0,))
     if items.exact is not None and type(start) is int:
@@ -100,6 +108,7 @@ def call_enumerate(run: Run, call: Call) -> Value:
 
 
 def call_zip(run: Run, call: Call) -> Value:
+    """``zip``: a list of rows, one for all if a length is not known; unknown if ``*x`` cannot be counted."""
     columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
     if call.args.more:
         return ANY
@@ -111,6 +120,7 @@ def call_zip(run: Run, call: Call) -> Value:
 
 
 def call_map(run: Run, call: Call) -> Value:
+    """``map``: the function is called for each element, or once for all if they are not known one by one."""
     function = call.args.at(0) or ANY
     items = argument_items(run, call, 1)
     if len(call.args.positional) != 2 or items.exact is None:
@@ -125,6 +135,7 @@ def call_map(run: Run, call: Call) -> Value:
 
 
 def call_filter(run: Run, call: Call) -> Value:
+    """``filter``: any element may be in the list; the function is called once for all of them."""
     items = argument_items(run, call, 1)
     element = items.any_element()
     function = call.args.at(0) or NONE
@@ -134,6 +145,7 @@ def call_filter(run: Run, call: Call) -> Value:
 
 
 def call_dict(run: Run, call: Call) -> Value:
+    """``dict``: made of dictionaries, pairs and keywords; keys that are not constant go under ``OTHER``."""
     obj = run.allocate(call.node, "dict", Dictionary)
     assert isinstance(obj, Dictionary)
     for atom in call.args.at(0) or BOTTOM:
@@ -169,8 +181,10 @@ def chosen(run: Run, call: Call) -> Value:
 
 
 def same_items(run: Run, call: Call) -> Value:
+    """``iter``: the argument itself, since walking along it gives the same."""
     return call.args.at(0) or ANY
 
 
 def any_all(run: Run, call: Call) -> Value:
+    """``any``, ``all`` and ``callable``: true or false, left open."""
     return BOOLEAN

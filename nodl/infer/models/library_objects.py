@@ -11,6 +11,7 @@ from nodl.infer.values import (
 
 
 def library_instance(run: Run, call: Call, path: str) -> Instance:
+    """The object of the library class ``path`` that this call makes; made twice it stands for all of them."""
     site = (call.source.file, call.source.line)
     instance = run.allocate(call.node, path, lambda: Instance(External(path), site))
     assert isinstance(instance, Instance)

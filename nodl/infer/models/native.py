@@ -48,6 +48,7 @@ _SPLITS = frozenset({"split", "rsplit", "splitlines", "partition", "rpartition"}
 
 
 def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
+    """What a method of a text or container gives and, in a container, changes; unknown without a model."""
     if isinstance(receiver, str | Text):
         return _text_method(run, receiver, name, call)
     if isinstance(receiver, bytes):

@@ -32,6 +32,7 @@ _KEEP_TEXT = frozenset(
 
 
 def made_parser(run: Run, call: Call) -> Value:
+    """``ArgumentParser(...)``: the object that collects the options declared on it."""
     return (library_instance(run, call, PARSER),)
 
 
@@ -94,6 +95,7 @@ def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
 
 
 def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
+    """What ``args.<name>`` may be; anything if no parser declares it or the program passes the arguments."""
     found: Value = BOTTOM
     for parser in namespace.cells.get("parser", BOTTOM):
         if isinstance(parser, Instance):

@@ -37,6 +37,7 @@ from nodl.infer.values import (
 
 
 def call_getattr(run: Run, call: Call) -> Value:
+    """``getattr``: the attribute, the default or either; throws ``AttributeError`` where that is certain."""
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
     there = has_attribute(run, sole(owner), sole(names))
     if there is False:
@@ -81,6 +82,7 @@ def _any_method(run: Run, owner: Value, names: Value) -> None:
 
 
 def call_setattr(run: Run, call: Call) -> Value:
+    """``setattr``: an unknown name may be any attribute of an object; on a class or module it is a gap."""
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
     value = call.args.at(2) or ANY
     known = constant_strings(names)
@@ -100,6 +102,7 @@ def call_setattr(run: Run, call: Call) -> Value:
 
 
 def call_hasattr(run: Run, call: Call) -> Value:
+    """``hasattr``: true, false, or either where that is not decided."""
     outcome = has_attribute(run, sole(call.args.at(0)), sole(call.args.at(1)))
     return BOOLEAN if outcome is None else (outcome,)
 
@@ -132,11 +135,13 @@ def has_attribute(run: Run, owner: object, name: object) -> bool | None:
 
 
 def call_isinstance(run: Run, call: Call) -> Value:
+    """``isinstance``: true, false, or either where that is not decided."""
     outcome = patterns.is_instance(call.args.at(0) or ANY, call.args.at(1) or ANY)
     return BOOLEAN if outcome is None else (outcome,)
 
 
 def call_type(run: Run, call: Call) -> Value:
+    """``type(x)``: the class of an object, else unknown; with three arguments, a new class or a gap."""
     if len(call.args.positional) == 3:
         return _made_class(run, call)
     atom = sole(call.args.at(0))
@@ -165,11 +170,13 @@ def _made_class(run: Run, call: Call) -> Value:
 
 
 def dynamic_code(run: Run, call: Call) -> Value:
+    """``eval``, ``exec`` and ``compile``: a gap, and an unknown result."""
     run.gap(call.node, call.frame, "code made at run time (eval, exec) is not analysed")
     return unknown("the result of code made at run time")
 
 
 def import_dynamic(run: Run, call: Call) -> Value:
+    """``import_module(name)`` and ``__import__``: the modules it may be; a gap when no name is known."""
     names = constant_strings(call.args.at(0) or ANY)
     if not names:
         run.gap(call.node, call.frame, "a module whose name is made at run time is not analysed")
@@ -181,6 +188,7 @@ def import_dynamic(run: Run, call: Call) -> Value:
 
 
 def call_vars(run: Run, call: Call) -> Value:
+    """``vars``: the variables of an object, class or module; unknown in a function without argument."""
     found = call.args.at(0)
     if found is None:
         return call_globals(run, call) if call.frame.function is None else unknown("the local variables")
@@ -190,10 +198,12 @@ def call_vars(run: Run, call: Call) -> Value:
 
 
 def call_globals(run: Run, call: Call) -> Value:
+    """``globals``: the variables of the module that calls it."""
     return (Variables(call.frame.module),)
 
 
 def call_locals(run: Run, call: Call) -> Value:
+    """``locals``: as ``globals`` outside of functions; inside unknown, and local functions may be called."""
     if call.frame.function is None:
         return call_globals(run, call)
     for value in list(call.frame.cells.values()):
@@ -216,20 +226,24 @@ def object_new(run: Run, call: Call) -> Value:
 
 
 def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
+    """An object of ``cls`` whose constructor has not run."""
     from nodl.infer.interpreter import instantiation
 
     return instantiation.new_instance(run, cls, call)
 
 
 def nothing(run: Run, call: Call) -> Value:
+    """The model of functions that have no effect and return ``None``."""
     return NONE
 
 
 def call_property(run: Run, call: Call) -> Value:
+    """``property(fget, fset, fdel)``: what is left out, or ``None``, stays empty."""
     given = [call.args.at(index, name) for index, name in enumerate(("fget", "fset", "fdel"))]
     getter, setter, deleter = (tuple(a for a in value or () if a is not None) for value in given)
     return (PropertyValue(getter, setter, deleter),)
 
 
 def call_object(run: Run, call: Call) -> Value:
+    """``object()``: an unknown value."""
     return ANY

@@ -54,10 +54,12 @@ NodeMethod = Callable[[Run, NodeRecord, Call], Value]
 
 
 def argument(call: Call, where: Argument) -> Value | None:
+    """The value of this argument of the call; ``None`` when it is not given."""
     return call.args.at(where.position, where.keyword)
 
 
 def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call: Call) -> None:
+    """Add the call's endpoint to each node, once per possible name and type, and register its callbacks."""
     names = argument(call, made.name) or unknown("a name that is not given")
     types = argument(call, made.type) or ANY
     qos = known_quality(call, made.qos) if made.qos else ()
@@ -228,6 +230,7 @@ def makes_interfaces(path: str) -> bool:
 
 
 def instance_of(run: Run, path: str, call: Call) -> Value:
+    """The object that this call of the library's ``path`` gives; made twice it stands for all of them."""
     site = (call.source.file, call.source.line)
     return (run.allocate(call.node, "library", lambda: Instance(External(path), site)),)
 

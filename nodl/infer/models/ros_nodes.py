@@ -40,6 +40,7 @@ LIFECYCLE_CLASS = "rclpy.lifecycle.Node"
 
 
 def is_lifecycle(path: str) -> bool:
+    """Whether the path of a node class says that its nodes are lifecycle nodes."""
     return ".lifecycle" in path or path.endswith("LifecycleNode")
 
 
@@ -123,6 +124,7 @@ def strings_in(run: Run, value: Value, call: Call) -> Value:
 
 
 def record_of_instance(run: Run, instance: Instance, call: Call) -> NodeRecord:
+    """The node record of ``instance``; if it has none, a new one, not yet marked as created."""
     if instance.node is None:
         instance.node = run.findings.add_node(NodeRecord(call.source))
         instance.node.class_key = instance.cls

@@ -32,6 +32,7 @@ PARAMETER_CLASS = "rclpy.parameter.Parameter"
 
 
 def parameter_object(run: Run, call: Call, value: Value, key: str = "parameter") -> Value:
+    """An rclpy ``Parameter`` that holds ``value``; ``key`` tells those made by one call apart."""
     instance = run.allocate(
         call.node, key, lambda: Instance(External(PARAMETER_CLASS), (call.source.file, call.source.line))
     )
@@ -144,6 +145,7 @@ def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
 
 
 def assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) -> None:
+    """Set the node's parameters to what the ``Parameter`` objects hold; unknown entries become a gap."""
     for entry in _each(run, listed, call):
         for atom in entry:
             if isinstance(atom, Instance):

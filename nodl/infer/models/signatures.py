@@ -49,6 +49,8 @@ class EndpointCall:
 
 @dataclass(frozen=True, slots=True)
 class FixedEndpoint:
+    """An endpoint whose name and type are fixed by the library."""
+
     kind: EndpointKind
     name: str
     type: str
