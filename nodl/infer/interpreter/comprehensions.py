@@ -135,11 +135,29 @@ def _one(
     generator = generators[index]
     run.spend(1)
     assign(run, generator.target, element, frame)
-    certain = True
-    for condition in generator.ifs:
-        outcome = decide(run, condition, frame)
-        if outcome is False:
-            return True
-        narrowed(run, condition, True, frame)
-        certain = certain and outcome is True
-    return _generate(run, generators, index + 1, frame, emit) and certain
+    return _where(run, generators, index, generator.ifs, frame, emit)
+
+
+def _where(
+    run: Run,
+    generators: list[ast.comprehension],
+    index: int,
+    tests: list[ast.expr],
+    frame: Frame,
+    emit: Callable[[], None],
+) -> bool:
+    """``emit`` where all ``tests`` hold; what an undecided one lets through may be there or not."""
+    if not tests:
+        return _generate(run, generators, index + 1, frame, emit)
+    outcome = decide(run, tests[0], frame)
+    if outcome is False:
+        return True
+
+    def go_on() -> bool:
+        narrowed(run, tests[0], True, frame)
+        return _where(run, generators, index, tests[1:], frame, emit)
+
+    if outcome is True:
+        return go_on()
+    run.state.maybe(lambda: go_on() or True)
+    return False

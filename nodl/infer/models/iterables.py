@@ -38,6 +38,8 @@ def argument_items(run: Run, call: Call, index: int = 0) -> Items:
 def call_range(run: Run, call: Call) -> Value:
     """``range``: the numbers if they are known and few; else any number, tied to an input that bounds it."""
     bounds = [sole(value) for value in call.args.positional]
+    if not bounds or call.args.more:  # range(*bounds)
+        return run.sequence(call.node, "tuple", Items(None, unknown("a number of a loop")))
     integers = [bound for bound in bounds if isinstance(bound, int)]
     if len(integers) == len(bounds) and (len(bounds) in (1, 2) or (len(bounds) == 3 and integers[2])):
         numbers = range(*integers)

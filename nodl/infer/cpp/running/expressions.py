@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.constructors import construct
@@ -68,23 +69,15 @@ def character(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("number_literal")
 def number(run: Machine, node: Node, frame: Frame) -> Value:
-    """An integer where the digits make one, else a float; unknown if they make neither."""
-    written = (
-        text(node).replace("'", "").rstrip("uUlLfF")
-        if not text(node).startswith("0x")
-        else text(node).rstrip("uUlL")
-    )
-    try:
-        return (
-            int(written, 0)
-            if not written.startswith("0") or len(written) == 1 or written[1] in "xXbB"
-            else int(written, 8),
-        )
-    except ValueError:
-        try:
-            return (float(written),)
-        except ValueError:
-            return unknown("a number")
+    """An integer where the digits make one, else a float ([lex.icon], [lex.fcon]); unknown if they make neither."""
+    written = text(node).replace("'", "").lower()
+    digits, hexadecimal = written.rstrip("ulz"), written.startswith("0x")
+    octal = digits.isdigit() and digits.startswith("0")
+    with suppress(ValueError):
+        return (int(digits, 8 if octal else 0),)
+    with suppress(ValueError):
+        return (float.fromhex(written) if hexadecimal else float(written.rstrip("fl")),)
+    return unknown("a number")
 
 
 @expression("true", "false")

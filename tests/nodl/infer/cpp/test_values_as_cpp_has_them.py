@@ -52,6 +52,11 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'int k = 4; k <<= 1; pub("k" + std::to_string(k)); pub("c" + std::to_string(\'a\'));',
         "", "", {"d6", "b1", "n2", "k8"}, {"u260", "d5", "b3", "n2.900000", "ca"},
     ),
+    "numbers are read in every base, with their suffixes": (
+        'pub("h" + std::to_string(0X1F)); pub("i" + std::to_string(0x1fUL)); pub("o" + std::to_string(017));'
+        'pub("b" + std::to_string(0B101)); pub("t" + std::to_string(1\'000u)); pub("z" + std::to_string(0));',
+        "", "", {"h31", "i31", "o15", "b5", "t1000", "z0"}, {"h1", "o17", "b101"},
+    ),
     "a text of so many letters is no number": (
         "pub(std::string(3, 'a')); std::string s(2, 'b'); pub(s);", "", "", {"aaa", "bb"}, {"3", "2"},
     ),
