@@ -230,16 +230,41 @@ def _unpack_star(
 
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:
-    """``del``: a removed element makes the length of a list unknown; all else may stay (it only adds)."""
+    """``del``: of elements that are known exactly what goes; else the length is unknown, and all may stay."""
     if isinstance(target, ast.Attribute):
         owners = run.evaluate(target.value, frame)
         for owner in owners:
             _delete_attribute(run, owner, target.attr, len(owners) == 1, target, frame)
     elif isinstance(target, ast.Subscript):
         owners = run.evaluate(target.value, frame)
-        key = run.evaluate(target.slice, frame) if not isinstance(target.slice, ast.Slice) else ANY
+        part = _deleted_part(run, target, frame)
+        key = part if isinstance(part, tuple) else ANY
         for owner in owners:
+            if isinstance(owner, Sequence) and len(owners) == 1 and _delete_known(run, owner, part):
+                continue
             _delete_item(run, owner, key, len(owners) == 1, target, frame)
+
+
+def _deleted_part(run: Run, target: ast.Subscript, frame: Frame) -> Value | slice | None:
+    """The key, or the slice if its bounds are known."""
+    from nodl.infer.interpreter.subscripts import slice_of
+
+    if isinstance(target.slice, ast.Slice):
+        return slice_of(run, target.slice, frame)
+    return run.evaluate(target.slice, frame)
+
+
+def _delete_known(run: Run, owner: Sequence, part: Value | slice | None) -> bool:
+    """Whether the elements are known, and which of them go."""
+    which = part[0] if isinstance(part, tuple) and len(part) == 1 else part
+    if owner.items.exact is None or not isinstance(which, int | slice):
+        return False
+    left = list(owner.items.exact)
+    if isinstance(which, int) and not -len(left) <= which < len(left):
+        return False
+    del left[which]
+    run.state.store(owner, ITEMS, (Items(tuple(left)),))
+    return True
 
 
 def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: ast.AST, frame: Frame) -> None:

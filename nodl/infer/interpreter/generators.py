@@ -17,6 +17,7 @@ from nodl.infer.interpreter import loops
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import decide
 from nodl.infer.interpreter.frames import Call, Frame
+from nodl.infer.interpreter.handling import swallows
 from nodl.infer.interpreter.raising import Raised
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models.concrete import NotConcrete, from_python, to_python
@@ -166,6 +167,7 @@ def _try_finally(run: Run, node: ast.Try, frame: Frame, call: Call) -> Steps:
     try:
         passes = yield from _body(run, [*node.body, *node.orelse], frame, call)
     except Raised:
-        run.execute(node.finalbody, frame)
+        if swallows(run, node.finalbody, frame):
+            return False
         raise
     return run.execute(node.finalbody, frame) and passes

@@ -17,6 +17,7 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.values import (
     ANY,
     Value,
+    join,
 )
 
 
@@ -24,7 +25,7 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
     """Handlers run after a certain exception, or after any prefix of a body that may have raised one."""
     mark = run.state.mark()
     before = Unwinding(run, frame)
-    risks = run.risks
+    risks, returned = run.risks, frame.returned
     raised = None
     run.state.depth += 1
     run.tries += 1
@@ -46,18 +47,37 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
         elif raised is not None or run.risks != risks:
             passes = _perhaps_handled(run, node, passes, mark, frame)
     except Raised:
-        if node.finalbody:
-            run.execute(node.finalbody, frame)
+        if node.finalbody and swallows(run, node.finalbody, frame):
+            return False
         raise
     if node.finalbody:
-        if not passes:
-            jump = frame.jump
-            run.state.join_seen(mark)
-            done = run.execute(node.finalbody, frame)
-            frame.jump = jump if done else frame.jump
-            return False
-        passes = run.execute(node.finalbody, frame)
+        return _finally(run, node.finalbody, returned, passes, mark, frame)
     return passes
+
+
+def swallows(run: Run, body: list[ast.stmt], frame: Frame) -> bool:
+    """Whether a ``finally`` that runs for an exception returns or jumps, perhaps: the exception is gone then."""
+    before = frame.returned
+    if not run.execute(body, frame):
+        return True
+    if frame.returned == before:
+        return False
+    run.risks += 1  # it may still be on its way
+    return True
+
+
+def _finally(run: Run, body: list[ast.stmt], returned: Value, passes: bool, mark: int, frame: Frame) -> bool:
+    """``finally`` after what did not raise. Where it returns itself, what the statement returned is replaced by that;
+    ``returned``: by what stands before the statement."""
+    jump, within = frame.jump, frame.returned
+    frame.returned = returned
+    if not passes:
+        run.state.join_seen(mark)
+    done = run.execute(body, frame)
+    if done:
+        frame.returned = join(within, frame.returned)
+        frame.jump = frame.jump if passes else jump
+    return done and passes
 
 
 def raised_risks(raised: Raised) -> int:
