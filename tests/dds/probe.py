@@ -85,6 +85,10 @@ class Answers:
         return {said for _, _, said in self.heard}
 
 
+_ASSERTION_OF_FAST_DDS = "Assertion `receiving_list.size() > 0' failed"
+"""In SecurityManager::encode_rtps_message of 2.9.1; seen on a busy machine after all answers were given."""
+
+
 @dataclass(frozen=True)
 class Probe:
     """One DDS implementation. ``crowd``: how many talkers beside an honest one it authenticates promptly."""
@@ -94,11 +98,15 @@ class Probe:
     crowd: int
 
     def try_endpoints(self, domain: int, participants: Iterable[Participant]) -> Answers:
-        """Create everything, talk to nobody."""
-        with self._running(domain, participants) as run:
-            run.process.wait(LONGEST_SECONDS)
-            answers = run.answers()
-            assert run.process.returncode == 0, f"{self.name} probe ended badly\n{answers.log}"
+        """Create everything, talk to nobody. Again where Fast DDS aborts on an assertion of its own."""
+        everybody = tuple(participants)
+        for _ in range(3):
+            with self._running(domain, everybody) as run:
+                run.process.wait(LONGEST_SECONDS)
+                answers = run.answers()
+            if _ASSERTION_OF_FAST_DDS not in answers.log:
+                break
+        assert run.process.returncode == 0, f"{self.name} probe ended badly\n{answers.log}"
         return answers
 
     def talk(
