@@ -78,7 +78,9 @@ class StorageError(KeystoreError):
         """The error of the keystore that tells ``error``; ``doing`` is a phrase such as ``writing the keystore``."""
         place = f" {printable(str(error.filename))}" if error.filename else ""
         reason = error.strerror or error
-        return cls(f"{doing}{place}: {reason}; nothing was left half-written: mend this and run it again")
+        return cls(
+            f"{doing}{place}: {reason}; nothing visible was left half-written: mend this and run it again"
+        )
 
 
 def printable(text: str | PathLike[str]) -> str:
