@@ -34,9 +34,8 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
 from keystore.formats.governance import NoGovernanceRuleError
 from keystore.formats.policy import EnclavePolicy
-from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
-from keystore.steps.report import ProvisionReport
 
 if TYPE_CHECKING:
     from enclave_launch.runtime.zenoh_router import ZenohRouter
@@ -176,7 +175,7 @@ def check_router(plan: LaunchPlan, keystore: str) -> None:
     from enclave_launch.runtime.zenoh_router import find_router, missing_router
     from keystore.disk import layout
     from keystore.disk.zenoh_files import present_address
-    from keystore.formats.zenoh.address import RouterAddress
+    from keystore.formats.zenoh.configuration import RouterAddress
     from nodl.ament_index import search_prefixes
 
     if not on_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator, Mapping
 
 from enclave_launch.admission.middleware import Vendor
 from enclave_launch.boundary.named_tuple import NamedTuple
-from keystore.formats.guid_prefix import Half, guid_prefix
+from keystore.formats.subject import Half, guid_prefix
 
 
 class EnclaveProcess(NamedTuple):

@@ -18,26 +18,30 @@ from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import revoked_serials
 from keystore.disk.register_file import read_register
 from keystore.disk.share_files import read_shares
-from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.domains import HIGHEST_ID, Domains
 from keystore.formats.permissions import TopicSets
-from keystore.formats.permissions_change import grant_for
-from keystore.formats.permissions_read import Grant
+from keystore.formats.permissions_document import Grant, grant_for
 from keystore.formats.policy import Qualifier
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import subject_name
 from keystore.formats.validity import iso
-from keystore.formats.zenoh.address import RouterAddress
+from keystore.formats.zenoh.configuration import (
+    ROUTER_NAME,
+    RouterAddress,
+    Subject,
+    TlsFiles,
+    router_configuration,
+    session_configuration,
+)
 from keystore.formats.zenoh.grants import grants_of_topics
-from keystore.formats.zenoh.router import ROUTER_NAME, Subject, router_configuration
 from keystore.formats.zenoh.rules import access_rules
-from keystore.formats.zenoh.session import TlsFiles, session_configuration
 from keystore.formats.zenoh.types import types_of_shares
-from keystore.signing.key_pair import key_matches
+from keystore.signing.public_key import key_matches
 
 _WRITTEN_BY = "secure-keystore"
 

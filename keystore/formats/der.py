@@ -12,7 +12,7 @@ from datetime import datetime, timezone
 from typing import NamedTuple
 
 SEQUENCE, SET = 0x30, 0x31
-INTEGER, BIT_STRING, OCTET_STRING, NULL, OID = 0x02, 0x03, 0x04, 0x05, 0x06
+INTEGER, OCTET_STRING, NULL, OID, UTF8_STRING = 0x02, 0x04, 0x05, 0x06, 0x0C
 UTC_TIME, GENERALIZED_TIME = 0x17, 0x18
 BOOLEAN = 0x01
 

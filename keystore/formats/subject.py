@@ -1,4 +1,4 @@
-"""Enclave name -> subject of its certificate and grant, and the lint for borrowable subjects. Pure.
+"""Enclave name -> subject of its certificate and grant, what of it can be borrowed, where it sorts. Pure.
 
 Cyclone DDS compares subjects as bags: it cuts both names at ``, / |``, and a grant fits an identity when
 every piece of the identity occurs in the grant (access_control_utils.c, unchanged on master). With SROS2's
@@ -100,3 +100,38 @@ def cannot_be_told_apart(pairs: Iterable[tuple[str, str]], limit: int = 3) -> st
     listed = list(pairs)
     shown = ", ".join(f"{a} could use the permissions of {b}" for a, b in listed[:limit])
     return shown + (f" and {len(listed) - limit} more pairs" if len(listed) > limit else "")
+
+
+class Half(Enum):
+    """Of all GUID prefixes: of two participants the one with the smaller GUID begins the handshake. One subject in two
+    lies in each half."""
+
+    LOW = "low"
+    HIGH = "high"
+
+
+def guid_prefix(common_name: str) -> int:
+    """The first 48 bits of the GUID of every secured participant whose certificate has this subject.
+
+    DDS-Security 9.3.3 makes them from a hash of it, so they are known before anything runs (measured on both
+    implementations).
+    """
+    import hashlib  # loads libcrypto; few launches need it
+
+    digest = hashlib.sha256(_subject(common_name)).digest()
+    return (int.from_bytes(digest[:6], "big") >> 1) | 1 << 47
+
+
+def half_of(common_name: str) -> Half:
+    """In which half the GUID prefix lies that a participant with this certificate must have."""
+    return Half.HIGH if guid_prefix(common_name) & 1 << 46 else Half.LOW
+
+
+def _subject(common_name: str) -> bytes:
+    """DER of a name with this common name alone, as certificates of a keystore have it."""
+    from keystore.formats import der  # as hashlib: few launches need it
+
+    attribute = der.encode(
+        der.SEQUENCE, der.object_identifier("2.5.4.3"), der.encode(der.UTF8_STRING, common_name.encode())
+    )
+    return der.encode(der.SEQUENCE, der.encode(der.SET, attribute))

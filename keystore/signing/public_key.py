@@ -1,15 +1,18 @@
-"""Questions about public keys in DER: is this signature valid, which kind of key is it."""
+"""Questions about public keys in DER: is this signature valid, of which kind is it, is this its private key."""
 
 from __future__ import annotations
 
+import binascii
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
+from keystore.errors import SigningUnavailableError
 from keystore.formats import der
 from keystore.formats.certificate import CertificateFacts
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.types import PublicKeyTypes
+
 
 # Imported CAs may certify themselves with more than SHA-256.
 _ECDSA_SHA384 = der.encode(der.SEQUENCE, der.object_identifier("1.2.840.10045.4.3.3"))
@@ -87,3 +90,30 @@ def fingerprint(der_bytes: bytes) -> str:
     import hashlib
 
     return hashlib.sha256(der_bytes).hexdigest()
+
+
+def key_matches(key_pem: bytes, facts: CertificateFacts) -> bool:
+    """Whether the private key is that of the certificate. A launch asks it of every enclave.
+
+    Mostly the key's file carries the certificate's public point (PKCS#8 and SEC1 files of OpenSSL do).
+
+    Only when it does not, or for RSA, ``cryptography`` has to load the key.
+    """
+    point = facts.public_key[-65:]
+    try:
+        body = key_pem.split(b"-----", 4)[2]
+        if point[0] == 4 and point in binascii.a2b_base64(body):
+            return True
+    except (IndexError, binascii.Error):
+        pass
+    return _key_matches_slowly(key_pem, facts)
+
+
+def _key_matches_slowly(key_pem: bytes, facts: CertificateFacts) -> bool:
+    from keystore.signing.authority import spki
+    from keystore.signing.identity import public_half
+
+    try:
+        return spki(public_half(key_pem, "the enclave's key")) == facts.public_key
+    except SigningUnavailableError:
+        return False

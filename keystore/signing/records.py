@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import CertificateFacts
-from keystore.formats.permissions_change import grant_for, rules_text
-from keystore.formats.permissions_read import Grant
+from keystore.formats.permissions_document import Grant, grant_for, rules_text
 from keystore.formats.register import UNKNOWN, IssuedCertificate, SignedPermissions
 from keystore.formats.subject import subject_name
 from keystore.formats.validity import parse_moment

@@ -14,9 +14,9 @@ from typing import NamedTuple
 from keystore.disk import layout
 from keystore.disk.authorities import refuse_foreign_authorities
 from keystore.disk.crl_file import crl_problem, crl_validity
-from keystore.disk.governance_file import governance_domains, governance_stands
 from keystore.disk.register_file import needs_register, read_register
 from keystore.disk.safe_files import resolve_root
+from keystore.disk.signed_documents import governance_domains, governance_stands
 from keystore.disk.view import KeystoreView
 from keystore.errors import NotAKeystoreError, printable
 from keystore.formats.domains import Domains
@@ -27,8 +27,7 @@ from keystore.formats.role import Role
 from keystore.formats.shares import Share
 from keystore.formats.validity import Validity, iso, later, utc_now
 from keystore.steps.enclave_state import OTHER_PERMISSIONS, EnclaveState, PermissionsSource, Reissue, inspect
-from keystore.steps.options import ProvisionOptions
-from keystore.steps.report import EnclaveReport, ProvisionReport
+from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import EnclaveShare, kept_shares
 
 

@@ -32,7 +32,7 @@ from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.signer import FileSigner, open_signer
-from keystore.steps.governance_signing import write_governance
+from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 

@@ -25,7 +25,7 @@ from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
 from keystore.formats.validity import Validity
 from keystore.signing import smime
-from keystore.signing.key_pair import key_matches
+from keystore.signing.public_key import key_matches
 
 PermissionsSource = Callable[[str, Validity], "bytes | None"]
 """(subject name, validity of the certificate) -> the document it should have; None: keep what it has."""

@@ -15,7 +15,6 @@ from keystore.disk.view import KeystoreView
 from keystore.disk.zenoh_files import has_router
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import read_certificate
-from keystore.formats.guid_prefix import half_of
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.register import IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
@@ -24,6 +23,7 @@ from keystore.formats.subject import (
     borrowable,
     cannot_be_told_apart,
     common_name,
+    half_of,
     scheme_of,
     subject_name,
 )

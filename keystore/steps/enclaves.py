@@ -13,9 +13,8 @@ from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Q
 from keystore.formats.validity import Validity, utc_now
 from keystore.steps.comparison import WantedEnclave, asked_end, permissions_source, with_domains
 from keystore.steps.enclave_state import PermissionsSource
-from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about, provision
-from keystore.steps.report import ProvisionReport
 from keystore.steps.sharing import given_up
 
 

@@ -18,7 +18,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.archive import MAX_ARCHIVE, read_archive
 from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.trusted_documents import own_permissions_cas
+from keystore.disk.signed_documents import own_permissions_cas
 from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInputError, KeystoreError, StorageError, printable
 from keystore.formats.bundle import Manifest, parse_manifest

@@ -35,8 +35,8 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.subject import common_name
 from keystore.signing.authority import Curve, key_pem, new_key
 from keystore.signing.ca_access import CaAccess
+from keystore.signing.identity import new_request, request_key
 from keystore.signing.public_key import fingerprint
-from keystore.signing.requests import new_request, request_key
 from keystore.signing.signer import FileSigner, Signer, load_private_key, open_signer
 
 _BLOCK = re.compile(

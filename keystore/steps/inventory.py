@@ -1,19 +1,31 @@
-"""Every key and algorithm of a keystore: which certificate, of which kind, until when. Reads only, no private key."""
+"""What a keystore holds, as plain values for reports: every key and certificate, the governance, what is granted.
+
+Reads only, no private key; proves no signature (see ``verify``).
+"""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
+from enum import Enum
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
+from keystore.disk.signed_documents import signed_governance
 from keystore.disk.view import KeystoreView
 from keystore.errors import printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
+from keystore.formats.domains import Domains
+from keystore.formats.governance import DomainRule, TopicRule, parse_governance
+from keystore.formats.permissions_document import parse_permissions
+from keystore.formats.policy import Qualifier, Rule
 from keystore.formats.role import Role
 from keystore.formats.validity import iso
+from keystore.signing import smime
 from keystore.signing.public_key import fingerprint, key_kind
+from keystore.verification.governance import weaknesses
 
 
 class KeyEntry(NamedTuple):
@@ -96,3 +108,65 @@ _NAMES = {
     **{f"1.2.840.10045.4.3.{arc}": "ECDSA" for arc in (2, 3, 4)},
     **{f"1.2.840.113549.1.1.{arc}": "RSA PKCS#1 v1.5" for arc in (11, 12, 13)},
 }
+
+
+class GovernanceFacts(NamedTuple):
+    """``rules``: one for each set of domains, by the attribute names of DDS-Security."""
+
+    rules: list[dict[str, Any]]
+    weaknesses: tuple[str, ...]
+
+
+def governance_facts(keystore: Path | str) -> GovernanceFacts:
+    """Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read."""
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
+    return GovernanceFacts([_plain(rule) for rule in governance.domain_rules], tuple(weaknesses(governance)))
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.value
+    if isinstance(value, Domains):
+        return str(value)
+    if isinstance(value, tuple):
+        return [_plain(each) for each in value]
+    if isinstance(value, (DomainRule, TopicRule)):
+        return {field.name: _plain(getattr(value, field.name)) for field in dataclasses.fields(value)}
+    return value
+
+
+class Granted(NamedTuple):
+    """``allowed`` and ``denied``: rules with final names, sorted; ``topics``: DDS topics that no ROS rule explains."""
+
+    allowed: tuple[Rule, ...]
+    denied: tuple[Rule, ...]
+    topics: tuple[str, ...]
+
+
+def granted(keystore: Path | str) -> dict[str, Granted]:
+    """Enclave -> what its permissions say; an enclave without permissions is left out.
+
+    Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read.
+    """
+    view = KeystoreView(resolve_root(keystore))
+    view.require_complete()
+    found = {}
+    for enclave in view.enclaves():
+        place = f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"
+        signed = safe_files.read_if_there(view.root, place)
+        if signed is not None:
+            found[enclave] = _granted(smime.read(signed, place).document, place)
+    return found
+
+
+def _granted(document: bytes, place: str) -> Granted:
+    rules: set[Rule] = set()
+    topics: set[str] = set()
+    for grant in parse_permissions(document, place):
+        explained, rest = grant.ros_rules
+        rules.update(explained)
+        topics.update(rest)
+    allowed = sorted(rule for rule in rules if rule.qualifier is Qualifier.ALLOW)
+    return Granted(tuple(allowed), tuple(sorted(rules.difference(allowed))), tuple(sorted(topics)))

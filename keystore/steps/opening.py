@@ -11,10 +11,9 @@ from pathlib import Path
 
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.crl_file import crl_number, revoked_serials
-from keystore.disk.register_file import needs_register
+from keystore.disk.register_file import needs_register, superseded
+from keystore.disk.signed_documents import trusted_document
 from keystore.disk.store import Store
-from keystore.disk.superseded import superseded
-from keystore.disk.trusted_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats import certificate

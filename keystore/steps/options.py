@@ -1,19 +1,24 @@
-"""What a caller can choose when enclaves are provisioned. One type for launch, verbs and library users."""
+"""What a caller can choose when enclaves are provisioned, and what is told of it."""
+
+from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
+from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
-from keystore.formats.guid_prefix import Half
-from keystore.formats.validity import DEFAULT_BACKDATE
+from keystore.formats.subject import Half
+from keystore.formats.validity import DEFAULT_BACKDATE, Validity
 from keystore.signing.ca_access import CaAccess
 
 if TYPE_CHECKING:
     from keystore.formats.subject import SubjectScheme
     from keystore.steps.creation import CreateOptions
+
 
 Progress = Callable[[int, int], None]
 """Called with (enclaves done, enclaves to do)."""
@@ -31,12 +36,12 @@ class ProvisionOptions(NamedTuple):
 
     domains: Domains | None = None
     create: bool = True
-    creation: "CreateOptions | None" = None
+    creation: CreateOptions | None = None
     lifetime: timedelta | None = None
     valid_until: datetime | None = None
     backdate: timedelta = DEFAULT_BACKDATE
     renew_within: timedelta = timedelta(0)
-    subjects: "SubjectScheme | None" = None
+    subjects: SubjectScheme | None = None
     rmw: str | None = None
     allow_subject_overlap: bool = False
     access: CaAccess = CaAccess()
@@ -54,3 +59,34 @@ class ProvisionOptions(NamedTuple):
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})
     guid_halves: Mapping[str, Half] = MappingProxyType({})
     """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""
+
+
+class EnclaveReport(NamedTuple):
+    """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; or none. ``validity``: of
+    certificate and permissions, where they were found to be as wanted."""
+
+    enclave: str
+    actions: tuple[str, ...]
+    reasons: tuple[str, ...] = ()
+    validity: Validity | None = None
+
+
+class ProvisionReport(NamedTuple):
+    """What one provisioning did, enclave by enclave."""
+
+    keystore: Path
+    created: tuple[str, ...]
+    """What was done to the keystore itself, in words."""
+    enclaves: tuple[EnclaveReport, ...]
+    warnings: tuple[str, ...] = ()
+    ends: datetime | None = None
+    """When the first of all CAs, certificates and the CRL ends, where nothing had to be done."""
+
+    @property
+    def changed(self) -> bool:
+        return bool(self.created) or any(report.actions for report in self.enclaves)
+
+    @property
+    def validities(self) -> Mapping[str, Validity]:
+        """Of the enclaves that were found to be as wanted."""
+        return {report.enclave: report.validity for report in self.enclaves if report.validity is not None}

@@ -7,14 +7,11 @@ too; to sign it again, or to compare with it, would give back what was taken awa
 from __future__ import annotations
 
 from keystore.disk import layout, safe_files
-from keystore.disk.governance_file import governance_domains
-from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.signed_documents import governance_domains, trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats.permissions import permissions_document
-from keystore.formats.permissions_change import taken_away
-from keystore.formats.permissions_dates import redated
-from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.permissions_document import Grant, parse_permissions, redated, taken_away
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register, SignedPermissions
 from keystore.formats.role import Role

@@ -21,8 +21,7 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.validity import utc_now
 from keystore.steps.comparison import WantedEnclave, compare, wanted_enclave, with_domains
-from keystore.steps.options import ProvisionOptions
-from keystore.steps.report import ProvisionReport
+from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import refuse_running
 from keystore.verification.before_launch import exposures
 

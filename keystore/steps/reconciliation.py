@@ -11,7 +11,7 @@ from pathlib import Path
 from enclave_launch.boundary.dependencies import require
 from keystore.disk import store
 from keystore.disk.authorities import refuse_foreign_authorities
-from keystore.disk.governance_file import governance_domains
+from keystore.disk.signed_documents import governance_domains
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.formats.enclave_name import check_distinct
@@ -21,10 +21,9 @@ from keystore.steps.creation import CreateOptions, complete
 from keystore.steps.crl import publish_crl, restore_crl
 from keystore.steps.enclave_state import EnclaveState
 from keystore.steps.enclave_writing import EnclaveWriter
-from keystore.steps.governance_signing import renew_governance
+from keystore.steps.governance import renew_governance
 from keystore.steps.opening import opened_for_change
-from keystore.steps.options import Progress, ProvisionOptions
-from keystore.steps.report import EnclaveReport, ProvisionReport
+from keystore.steps.options import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import kept_shares
 from keystore.steps.signing_here import refuse_without_keys
 

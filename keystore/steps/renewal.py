@@ -38,13 +38,12 @@ from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.crl import restore_crl
 from keystore.steps.enclave_state import Reissue
 from keystore.steps.enclaves import keep
-from keystore.steps.governance_signing import mirror_governance
+from keystore.steps.governance import mirror_governance
 from keystore.steps.incoming_ca import install_incoming
 from keystore.steps.opening import opened_for_change
-from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about
 from keystore.steps.removal import revoke_replaced
-from keystore.steps.report import ProvisionReport
 
 DEFAULT_WITHIN = timedelta(days=30)
 

@@ -21,16 +21,15 @@ from keystore.formats.role import Role
 from keystore.formats.subject import common_name, names_enclave, subject_name
 from keystore.formats.validity import utc_now
 from keystore.signing.authority import Authority, pem_certificate
+from keystore.signing.identity import request_key
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
-from keystore.signing.requests import request_key
 from keystore.signing.smime import sign_document
 from keystore.steps.host_keys import Request
 from keystore.steps.opening import opened_for_change
-from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.past_permissions import kept_permissions
 from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.report import ProvisionReport
 
 
 @dataclass(frozen=True, slots=True)

@@ -24,8 +24,8 @@ from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
 from keystore.disk.copies import refresh_copies
-from keystore.disk.governance_file import governance_stands
 from keystore.disk.safe_files import resolve_root
+from keystore.disk.signed_documents import governance_stands
 from keystore.disk.store import Content, Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError
@@ -42,9 +42,8 @@ from keystore.steps.crl import drop_crl
 from keystore.steps.enclaves import keep
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
-from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about
-from keystore.steps.report import ProvisionReport
 from keystore.steps.zenoh_configuration import follow, options_of
 
 

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from keystore.disk import layout
-from keystore.disk.governance_file import governance_domains
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import LaunchHold, enclaves_with_shares, is_running, read_shares
+from keystore.disk.signed_documents import governance_domains
 from keystore.disk.store import PRIVATE_MODE, Batch, Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInputError, printable

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, SigningUnavailableError, printable
-from keystore.formats.permissions_change import grant_for, taken_away
+from keystore.formats.permissions_document import grant_for, taken_away
 from keystore.formats.role import Role
 from keystore.formats.subject import subject_name
 from keystore.signing import smime

@@ -36,8 +36,7 @@ from keystore.formats.certificate import read_der
 from keystore.formats.register import UNKNOWN, IssuedCertificate
 from keystore.formats.role import Role
 from keystore.formats.validity import DEFAULT_BACKDATE, Validity, later, utc_now
-from keystore.formats.zenoh.address import RouterAddress
-from keystore.formats.zenoh.router import ROUTER_NAME
+from keystore.formats.zenoh.configuration import ROUTER_NAME, RouterAddress
 from keystore.signing.authority import IdentityIssuer, key_pem, new_key, pem_certificate
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half

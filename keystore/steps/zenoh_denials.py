@@ -19,8 +19,8 @@ from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_patterns import can_meet
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
 from keystore.formats.policy_xml import policy_xml
-from keystore.formats.zenoh.address import RouterAddress
 from keystore.formats.zenoh.comparison import read_configuration
+from keystore.formats.zenoh.configuration import RouterAddress
 from keystore.formats.zenoh.meaning import Meaning, meaning, operation_of
 from keystore.formats.zenoh.trace import Dropped, RouterLog, TurnedAway
 

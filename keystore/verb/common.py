@@ -20,8 +20,7 @@ from keystore.formats.validity import parse_duration, parse_end, utc_now
 if TYPE_CHECKING:
     from keystore.formats.domains import Domains
     from keystore.signing.ca_access import CaAccess
-    from keystore.steps.options import ProvisionOptions
-    from keystore.steps.report import ProvisionReport
+    from keystore.steps.options import ProvisionOptions, ProvisionReport
 
 DEFAULT_LOCK_TIMEOUT = 30.0
 

@@ -23,7 +23,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Do it, and print what was done. Returns 0."""
     from keystore.formats.governance_yaml import load_governance_yaml
-    from keystore.steps.governance_setting import GovernanceOptions, set_governance
+    from keystore.steps.governance import GovernanceOptions, set_governance
 
     governance = load_governance_yaml(arguments.file)
     options = GovernanceOptions(access=common.access(arguments), lock_timeout=arguments.lock_timeout)

@@ -14,8 +14,7 @@ from typing import TYPE_CHECKING
 from keystore.verb import common
 
 if TYPE_CHECKING:
-    from keystore.steps.options import ProvisionOptions
-    from keystore.steps.report import ProvisionReport
+    from keystore.steps.options import ProvisionOptions, ProvisionReport
 
 _ROLES = ("identity", "permissions", "both")
 

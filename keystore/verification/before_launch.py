@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterator
 
 from keystore.disk import layout
-from keystore.disk.governance_file import governance_domains, signed_governance
+from keystore.disk.signed_documents import governance_domains, signed_governance
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
 from keystore.formats.governance import Governance, governance_document, parse_governance

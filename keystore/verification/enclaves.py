@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from keystore.disk import layout, safe_files
-from keystore.disk.governance_file import signed_governance
+from keystore.disk.signed_documents import signed_governance
 from keystore.disk.view import KeystoreView
 from keystore.errors import (
     InvalidInputError,
@@ -22,7 +22,7 @@ from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
 from keystore.formats.domains import Domains
 from keystore.formats.governance import parse_governance
-from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.permissions_document import Grant, parse_permissions
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.policy import Qualifier
 from keystore.formats.register import Register
@@ -38,8 +38,7 @@ from keystore.formats.subject import (
 from keystore.formats.validity import LATEST, Validity, iso, parse_moment
 from keystore.signing import smime
 from keystore.signing.authority import spki
-from keystore.signing.key_pair import key_matches
-from keystore.signing.public_key import issued_by, key_kind, signature_is_valid
+from keystore.signing.public_key import issued_by, key_kind, key_matches, signature_is_valid
 from keystore.signing.signer import FileSigner, load_private_key
 from keystore.verification import repair
 from keystore.verification.authorities import CYCLONE_KINDS

@@ -25,8 +25,8 @@ from keystore.disk.zenoh_files import (
 )
 from keystore.errors import KeystoreError
 from keystore.formats.certificate import read_certificate
-from keystore.formats.zenoh.address import RouterAddress
 from keystore.formats.zenoh.comparison import ZenohDifference, differences, read_configuration
+from keystore.formats.zenoh.configuration import RouterAddress
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 

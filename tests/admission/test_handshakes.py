@@ -12,8 +12,7 @@ from enclave_launch import provision
 from enclave_launch.admission.handshakes import EnclaveProcess, Pair, failing, halves, mixed_pairs
 from enclave_launch.admission.middleware import Vendor
 from enclave_launch.diagnostics import Code
-from keystore.formats.guid_prefix import Half, guid_prefix, half_of
-from keystore.formats.subject import common_name
+from keystore.formats.subject import Half, common_name, guid_prefix, half_of
 from keystore.verification import verify
 
 from .conftest import Plan

@@ -10,8 +10,7 @@ import pytest
 
 import keystore
 from keystore.formats.domains import Domains
-from keystore.formats.guid_prefix import Half, half_of
-from keystore.formats.subject import common_name
+from keystore.formats.subject import Half, common_name, half_of
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe
 from tests.dds.sros2_style import Grant

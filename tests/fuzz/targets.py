@@ -28,7 +28,7 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.governance import parse_governance
 from keystore.formats.governance_yaml import parse_governance_yaml
 from keystore.formats.hosts import parse_hosts
-from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy_xml import parse_policy
 from keystore.formats.register import parse_register
 from keystore.formats.shares import parse_shares

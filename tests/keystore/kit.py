@@ -11,9 +11,8 @@ from pathlib import Path
 
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.steps.creation import CreateOptions, create_keystore
-from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
-from keystore.steps.report import ProvisionReport
 
 NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
 DAY = timedelta(days=1)

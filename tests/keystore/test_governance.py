@@ -19,7 +19,7 @@ from keystore.formats.governance import (
     parse_governance,
 )
 from keystore.formats.governance_yaml import parse_governance_yaml
-from keystore.steps.governance_setting import GovernanceOptions, set_governance
+from keystore.steps.governance import GovernanceOptions, set_governance
 from keystore.steps.provisioning import provision
 from keystore.verification import Requirements, verify
 from tests.dds.sros2_style import GOVERNANCE

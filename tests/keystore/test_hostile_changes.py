@@ -485,7 +485,7 @@ def test_a_launch_says_what_is_exposed_though_nothing_is_to_be_done(
 
 
 def test_a_launch_says_where_its_governance_is_weak(present: Path, tmp_path: Path) -> None:
-    from keystore.steps.governance_setting import GovernanceOptions, set_governance
+    from keystore.steps.governance import GovernanceOptions, set_governance
     from keystore.steps.provisioning import provision
 
     root = copy_of(present, tmp_path)

@@ -9,7 +9,7 @@ import pytest
 
 from keystore.disk import layout
 from keystore.formats.certificate import read_pem
-from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import Policy
 from keystore.steps.bundle import export
 from keystore.steps.comparison import differences

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import dds_rules, permissions_document
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.permissions_names import dds_topics, full_name
 from keystore.formats.permissions_patterns import can_meet, covers
-from keystore.formats.permissions_read import parse_permissions
 from keystore.formats.permissions_size import (
     FAST_DDS_LIMIT_BYTES,
     expected_concern,

@@ -13,7 +13,7 @@ import pytest
 
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document
-from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.permissions_document import Grant, parse_permissions
 from keystore.formats.policy_xml import read_policy
 from keystore.formats.validity import Validity
 

@@ -6,11 +6,11 @@ import re
 
 import pytest
 
-from keystore.disk.governance_file import covers
+from keystore.disk.signed_documents import covers
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.permissions_names import ros_rules
-from keystore.formats.permissions_read import parse_permissions
 from keystore.formats.policy import Operation, Qualifier
 
 RULE = "<allow_rule><domains>{domains}</domains><publish><topics>{topics}</topics></publish></allow_rule>"

@@ -13,11 +13,11 @@ from pathlib import Path
 import pytest
 
 from keystore.disk import layout
-from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidEnclaveNameError, InvalidInputError, NotAKeystoreError, UnsafeKeystoreError
 from keystore.formats.domains import Domains
-from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme

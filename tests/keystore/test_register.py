@@ -18,7 +18,7 @@ from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeyst
 from keystore.formats.certificate import read_pem
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection
-from keystore.formats.permissions_read import Grant, parse_permissions
+from keystore.formats.permissions_document import Grant, parse_permissions
 from keystore.formats.register import (
     AuthorityState,
     IssuedCertificate,
@@ -30,7 +30,7 @@ from keystore.formats.register import (
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, common_name, generation_of, names_enclave
 from keystore.steps.enclaves import create_enclaves
-from keystore.steps.governance_setting import GovernanceOptions, set_governance
+from keystore.steps.governance import GovernanceOptions, set_governance
 from keystore.steps.provisioning import provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from keystore.disk import layout
-from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificates
-from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.role import Role
 from keystore.steps.creation import CreateOptions
 from keystore.steps.enclaves import create_enclave, list_enclaves

@@ -16,13 +16,13 @@ from keystore.disk.share_files import LaunchHold, is_running, read_shares
 from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_pem
 from keystore.formats.domains import Domains
-from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.steps.comparison import differences
 from keystore.steps.enclaves import drop_shares
+from keystore.steps.options import ProvisionReport
 from keystore.steps.provisioning import provision
 from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.report import ProvisionReport
 from keystore.steps.sharing import list_shares, shared_enclaves
 from keystore.verb import main
 from keystore.verification import verify

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from keystore.disk import layout
-from keystore.disk.trusted_documents import trusted_document
+from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.formats.permissions_read import parse_permissions
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.subject import SubjectScheme
 from keystore.steps.enclaves import create_enclave, list_enclaves
 from keystore.steps.provisioning import provision

@@ -14,7 +14,7 @@ from keystore.disk.share_files import LaunchHold
 from keystore.errors import InvalidInputError
 from keystore.formats.register import UNKNOWN
 from keystore.formats.validity import utc_now
-from keystore.formats.zenoh.address import RouterAddress
+from keystore.formats.zenoh.configuration import RouterAddress
 from keystore.steps.provisioning import provision
 from keystore.steps.rollover import Step
 from keystore.steps.zenoh_configuration import ZenohOptions, matching_enclaves, write_zenoh

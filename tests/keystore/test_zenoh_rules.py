@@ -8,6 +8,12 @@ import pytest
 
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore.formats.zenoh.configuration import (
+    Subject,
+    TlsFiles,
+    router_configuration,
+    session_configuration,
+)
 from keystore.formats.zenoh.grants import (
     Grants,
     Types,
@@ -24,9 +30,7 @@ from keystore.formats.zenoh.key_expressions import (
     type_chunk,
 )
 from keystore.formats.zenoh.meaning import meaning
-from keystore.formats.zenoh.router import Subject, router_configuration
 from keystore.formats.zenoh.rules import AccessRule, access_rules
-from keystore.formats.zenoh.session import TlsFiles, session_configuration
 from keystore.formats.zenoh.types import types_of_interface, united_types
 
 STRING = "std_msgs::msg::dds_::String_"

@@ -10,7 +10,7 @@ import pytest
 
 from enclave_launch.verb.secure_plan import main
 from keystore.steps.enforced import enforced
-from keystore.steps.granted import granted
+from keystore.steps.inventory import granted
 from tests.review.test_against_a_keystore import found, make, words
 
 LAUNCH = "services_actions.launch.xml"

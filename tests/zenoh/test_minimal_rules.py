@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from keystore.formats.domains import Domains
+from keystore.formats.zenoh.configuration import Subject, access_control
 from keystore.formats.zenoh.grants import Grants, Use
-from keystore.formats.zenoh.router import Subject, access_control
 from keystore.formats.zenoh.rules import AccessRule, access_rules
 from tests.zenoh import kit
 from tests.zenoh.conftest import keystore_of

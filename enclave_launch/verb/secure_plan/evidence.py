@@ -121,7 +121,7 @@ def _keys(keystore: Path) -> list[dict[str, Any]]:
 
 
 def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
-    from keystore.steps.defaults import governance_facts
+    from keystore.steps.inventory import governance_facts
     from keystore.verification import verify
 
     with keystore_errors():

@@ -32,7 +32,7 @@ def keystore_errors() -> Iterator[None]:
 def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
     """Enclave -> what its signed permissions allow."""
     from enclave_launch.review.signed import grants_of_rules
-    from keystore.steps.granted import granted
+    from keystore.steps.inventory import granted
 
     with keystore_errors():
         return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}

@@ -4,9 +4,8 @@
     key_expressions  ROS names and types -> key expressions             (rmw_zenoh docs/design.md)
     types            which types its launches know
     rules            grants -> the access-control rules of one enclave
-    router           all enclaves -> the file of ``rmw_zenohd``: it enforces
-    address          where the router is
-    session          the file of one enclave's processes: clients of that router
+    configuration    all enclaves -> the file of ``rmw_zenohd``, which enforces; the file of one enclave's processes,
+                     clients of that router; where the router is
     meaning          key expressions -> ROS words: the way back
     comparison       two files -> who may do what else, and which protection is gone
     trace            the router's log -> what it refused

@@ -1,12 +1,20 @@
-"""The governance in force: which domains it covers, whether it stands. Cheap: asked before a launch."""
+"""Documents that this keystore signed: the governance in force, and what may be signed again.
+
+Cheap, for it is asked before a launch: which domains the governance covers, whether it stands. What is about to be
+signed again must have been signed by us before: by the present permissions CA, by one of the trust bundle during a
+roll-over, or by a retired one.
+"""
 
 from __future__ import annotations
 
+import os
 import re
+from collections.abc import Iterator
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, printable
+from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.domains import Domains
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -49,3 +57,23 @@ def covers(outer: Domains, inner: Domains) -> bool:
     return all(
         any(low <= first and last <= high for low, high in outer.ranges) for first, last in inner.ranges
     )
+
+
+def trusted_document(view: KeystoreView, relative: str) -> bytes:
+    """The XML inside a ``.p7s``; raises DamagedKeystoreError when none of this keystore's CAs signed it."""
+    place = printable(view.root / relative)
+    signed = smime.read(safe_files.read(view.root, relative), place)
+    smime.check(signed, list(own_permissions_cas(view)), place)
+    return signed.document
+
+
+def own_permissions_cas(view: KeystoreView) -> Iterator[CertificateFacts]:
+    """The permissions CAs of this keystore: those in force, a shared one, and retired ones."""
+    yield from view.ca_bundle(Role.PERMISSIONS)
+    names = [layout.SHARED_CA_CERT]
+    if os.path.isdir(view.root / layout.RETIRED):
+        names += [f"{layout.RETIRED}/{name}" for name in sorted(os.listdir(view.root / layout.RETIRED))]
+    for name in names:
+        pem = safe_files.read_if_there(view.root, name)
+        if pem is not None and name.endswith(".cert.pem"):
+            yield from read_certificates(pem, printable(view.root / name))

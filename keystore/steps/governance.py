@@ -1,0 +1,104 @@
+"""The governance document of a keystore: signed, mirrored in plain text, replaced by another.
+
+It is signed again where its domains or signer changed; copies in enclaves are kept in step. Writes the keystore.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+
+from keystore.disk import layout, lock, safe_files
+from keystore.disk.copies import refresh_copies
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.signed_documents import covers, governance_stands, signed_governance, trusted_document
+from keystore.disk.store import Store
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystoreError, printable
+from keystore.formats.domains import Domains
+from keystore.formats.governance import Governance, governance_document, parse_governance
+from keystore.formats.role import Role
+from keystore.formats.validity import utc_now
+from keystore.signing.authority import Authority
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.smime import sign_document
+from keystore.steps.opening import opened_for_change
+
+
+def mirror_governance(opened: Store) -> bool:
+    """Rewrite ``governance.xml`` from the signed document if it differs. Returns whether it did."""
+    present = safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML)
+    document = trusted_document(KeystoreView(opened.root), layout.GOVERNANCE)
+    if present is None or present.replace(b"\r\n", b"\n") == document:
+        return False
+    with opened.batch() as batch:
+        batch.file(layout.GOVERNANCE_XML, document)
+    return True
+
+
+def write_governance(opened: Store, document: bytes, permissions_ca: Authority, now: datetime) -> None:
+    """Record, sign and publish it."""
+    signed = sign_document(document, permissions_ca, now)
+    with opened.batch() as batch:
+        batch.record(replace(opened.register, governance=document))
+        batch.file(layout.GOVERNANCE_XML, document)
+        batch.file(layout.GOVERNANCE, signed)
+
+
+def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
+    """Sign the governance again if it is not the one signed last, or its domains or signer no longer fit.
+
+    Returns whether it did.
+
+    Raises InvalidInputError when it has several rules and none for a domain: then a person must decide.
+    """
+    view = KeystoreView(opened.root)
+    if governance_stands(view, domains, opened.register):
+        return False
+    document = opened.register.governance or trusted_document(view, layout.GOVERNANCE)
+    governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
+    if not covers(governance.domains(), domains):
+        document = governance_document(governance.extended_to(domains))
+    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
+    return True
+
+
+@dataclass(frozen=True, slots=True)
+class GovernanceOptions:
+    """How ``set_governance`` signs, waits for the lock, and syncs to the disk."""
+
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+
+
+def set_governance(
+    keystore: Path | str, governance: Governance, *, options: GovernanceOptions | None = None
+) -> bool:
+    """Sign ``governance`` and put it in force; whether it differs from before.
+
+    It must be deployed to all participants at once: those with different protection kinds do not talk.
+    """
+    chosen = options or GovernanceOptions()
+    root = resolve_root(keystore)
+    KeystoreView(root).require_complete()
+    document = governance_document(governance)
+    now = utc_now()
+    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+        view = KeystoreView(root)
+        changed = not _stands(view, document) or opened.register.governance != document
+        if changed:
+            write_governance(opened, document, view.authority(Role.PERMISSIONS, chosen.access), now)
+        refresh_copies(opened)
+    return changed
+
+
+def _stands(view: KeystoreView, document: bytes) -> bool:
+    """Whether exactly ``document`` is in force; what cannot be read is not."""
+    try:
+        signed = signed_governance(view)
+    except DamagedKeystoreError:
+        return False
+    twin = safe_files.read_if_there(view.root, layout.GOVERNANCE_XML)
+    return signed.document == document == twin and governance_stands(view, None)
