@@ -16,6 +16,7 @@ from enclave_launch.boundary.words import counted, some_of
 from enclave_launch.runtime.deadline import Deadline
 from keystore.errors import KeystoreError
 from keystore.formats.validity import utc_now
+from keystore.steps.expiry import expires_soon
 
 if TYPE_CHECKING:
     from enclave_launch.secured import ProvisionedLaunch
@@ -135,8 +136,6 @@ def _all_notices(launch: ProvisionedLaunch, after: datetime) -> list[Notice]:
 
 
 def _ends(launch: ProvisionedLaunch) -> list[Expiry]:
-    from keystore.steps.expiry import expires_soon
-
     keystore = launch.settings.keystore
     enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]
     try:

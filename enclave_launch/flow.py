@@ -16,15 +16,22 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from enclave_launch.admission.handshakes import halves
 from enclave_launch.admission.middleware import middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.admission import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable
 from enclave_launch.errors import ManifestError
+from enclave_launch.evaluation.evaluate import evaluate
+from enclave_launch.evaluation.programs import missing_programs
+from enclave_launch.host.outcomes import Outcomes
+from enclave_launch.host.plan_host import PlanHost
+from enclave_launch.host.protocol import MISSING_PREFIX
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, mixed_enclaves, on_zenoh
 from enclave_launch.planner import Planner
 from enclave_launch.prefixes import ament_prefixes
+from nodl.ament_index import search_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.process import Evaluation
@@ -45,7 +52,6 @@ def resolve(
     refuse is in ``plan.problems``.
     """
     from enclave_launch.interfaces import InterfaceFinder
-    from nodl.ament_index import search_prefixes
 
     chosen = options or ResolveOptions()
     evaluated = evaluate_launch(launch_file, arguments, options=chosen)
@@ -93,10 +99,6 @@ def evaluate_launch(
 
     Raises ``LaunchFileError`` as ``resolve``.
     """
-    from enclave_launch.evaluation.evaluate import evaluate
-    from enclave_launch.host.outcomes import Outcomes
-    from enclave_launch.host.plan_host import PlanHost
-
     source = launch_source(launch_file, arguments, options=options)._replace(outcomes=Outcomes())
     with ament_prefixes(source.prefixes):
         evaluation = evaluate(
@@ -128,9 +130,6 @@ def launch_source(
 
 def _missing_programs(evaluation: Evaluation) -> list[Diagnostic]:
     """``run`` would refuse them. Placeholders of packages that are not installed have their own warning."""
-    from enclave_launch.evaluation.programs import missing_programs
-    from enclave_launch.host.protocol import MISSING_PREFIX
-
     placeholders = f"{MISSING_PREFIX}/"
     real = [item for item in evaluation.processes if not "".join(item.cmd[:1]).startswith(placeholders)]
     return [
@@ -148,7 +147,6 @@ def provision(
     while the result lives. Raises ``ManifestError`` for a plan with problems (nothing is written then) and
     ``ProvisionError``.
     """
-    from enclave_launch.admission.handshakes import halves
     from enclave_launch.secured import (
         ProvisionedLaunch,
         launch_owner,

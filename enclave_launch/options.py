@@ -17,6 +17,7 @@ from enclave_launch.host.protocol import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.policy.conditions import ALSO
+from keystore.errors import KeystoreError
 
 if TYPE_CHECKING:
     from enclave_launch.runtime.companion import LaunchCompanion
@@ -88,7 +89,6 @@ def _several(given: Any) -> tuple[Any, ...]:
 
 
 def _read_policy(path: Path) -> PolicyDocument:
-    from keystore.errors import KeystoreError
     from keystore.formats.policy_xml import read_policy
 
     try:

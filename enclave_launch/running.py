@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Union
 from enclave_launch.boundary.terminal import warn
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
+from enclave_launch.runtime.companion import Together
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
 from enclave_launch.runtime.live_launch import LiveLaunch, run_launch, run_launch_async
 from enclave_launch.runtime.run_events import Observer
@@ -149,7 +150,6 @@ def _companion(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
     companion = settings.companion or _recording(launch, settings)
     if companion is None or settings.watch is None:
         return companion or settings.watch
-    from enclave_launch.runtime.companion import Together
 
     return Together(companion, settings.watch)
 

@@ -7,6 +7,7 @@ what was provisioned (a few file reads) and hands out the arguments and variable
 from __future__ import annotations
 
 import os
+import socket
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -30,12 +31,20 @@ from enclave_launch.security_environment import (
     zenoh_environment,
 )
 from enclave_launch.served_domains import places, with_domains
+from keystore.disk import layout
 from keystore.disk.view import KeystoreView
+from keystore.disk.zenoh_files import present_address
 from keystore.errors import KeystoreError
 from keystore.formats.governance import NoGovernanceRuleError
 from keystore.formats.policy import EnclavePolicy
+from keystore.formats.role import Role
+from keystore.formats.zenoh.configuration import RouterAddress
+from keystore.formats.zenoh.types import types_text
+from keystore.steps.comparison import differences
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
+from keystore.steps.sharing import shared_enclaves
+from nodl.ament_index import search_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.runtime.zenoh_router import ZenohRouter
@@ -93,7 +102,6 @@ def provision_with_zenoh(
 ) -> tuple[ProvisionOptions, ProvisionReport, ZenohReport]:
     """As ``provision_policies``, and the configuration of what is on Zenoh. Gives the options that were used, too."""
     from enclave_launch.review.middlewares import zenoh_enclaves
-    from keystore.formats.zenoh.types import types_text
     from keystore.steps.zenoh_configuration import options_of, write_zenoh
 
     wanted = zenoh_enclaves(plan, os.environ)
@@ -116,8 +124,6 @@ def told_of_shares(plan: LaunchPlan, keystore: str) -> LaunchPlan:
 
     Raises ``ProvisionError`` for shares that cannot be read.
     """
-    from keystore.steps.sharing import shared_enclaves
-
     try:
         found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
     except KeystoreError as error:
@@ -128,10 +134,7 @@ def told_of_shares(plan: LaunchPlan, keystore: str) -> LaunchPlan:
 def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> ZenohRouter:
     """The router of a launch with processes on Zenoh; entering it starts or finds one."""
     from enclave_launch.runtime.zenoh_router import RouterPlace, ZenohRouter, find_router
-    from keystore.disk import layout
-    from keystore.formats.role import Role
     from keystore.steps.zenoh_configuration import router_differences
-    from nodl.ament_index import search_prefixes
 
     zenoh = launch.zenoh
     assert zenoh is not None, "asked only where processes are on Zenoh"
@@ -170,13 +173,7 @@ def _explained(
 
 def check_router(plan: LaunchPlan, keystore: str) -> None:
     """Before keys are made. Raises ``RuntimeFailure`` where no router is installed and nobody answers in its place."""
-    import socket
-
     from enclave_launch.runtime.zenoh_router import find_router, missing_router
-    from keystore.disk import layout
-    from keystore.disk.zenoh_files import present_address
-    from keystore.formats.zenoh.configuration import RouterAddress
-    from nodl.ament_index import search_prefixes
 
     if not on_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):
         return
@@ -292,8 +289,6 @@ class PlanProvider:
 
     def _check(self, policy: EnclavePolicy) -> None:
         """Nothing is repaired here: what changed since it was signed was changed by somebody else."""
-        from keystore.steps.comparison import differences
-
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = differences(keystore, policy, options=self._options)

@@ -8,6 +8,7 @@ link makes the enclave's directory of them. Quoting: systemd.syntax(7), systemd.
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Iterator, Mapping
 
 from enclave_launch.deployment.deployment import Deployment, File, one_line, runtime_names, source_of
@@ -242,6 +243,4 @@ def _specifiers(text: str) -> str:
 
 
 def _shell_word(text: str) -> str:
-    import shlex
-
     return shlex.quote(text)

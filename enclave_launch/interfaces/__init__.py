@@ -19,6 +19,7 @@ from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.errors import NoDLError
+from nodl.infer.cpp.reach import SourcesInReach
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.name_template import UnknownPart
 from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
@@ -168,8 +169,6 @@ class InterfaceFinder:
 
     @cached_property
     def _sources(self) -> SourcesInReach:
-        from nodl.infer.cpp.reach import SourcesInReach
-
         named = [str(folder) for folder in self._options.source_folders]
         named += [folder for folder in os.environ.get(SOURCE_VARIABLE, "").split(os.pathsep) if folder]
         return SourcesInReach(self._prefixes, named)

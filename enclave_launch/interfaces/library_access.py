@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.errors import UsageError
 from enclave_launch.options import ResolveOptions
+from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.ament_index import list_resources, package_version
 from nodl.node_interface import NodeInterface
@@ -106,7 +107,6 @@ class LibraryAccess:
         """A program that makes its node's name from its command line has it before launch's rules apply."""
         if interface.depends is None or not (interface.depends.node_name or interface.depends.random_name):
             return interface
-        from enclave_launch.policy.program_inputs import own_words
         from nodl.dependence import Situation
         from nodl.dependence.apply import own_name
 

@@ -15,7 +15,7 @@ from enclave_launch.recording.grants import WORDS, Need, PlannedGrants
 from enclave_launch.recording.recording import Recording, Unrecorded
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import RunEvent
-from keystore.formats.permissions_patterns import has_wildcard
+from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Rule
 from nodl.record.asked import EndpointRole, asked_endpoint, role_of
 from nodl.record.lines import EndpointMade, Line
@@ -125,8 +125,6 @@ def _by(who: str, line: EndpointMade) -> str:
 
 def _used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bool:
     if has_wildcard(rule.expression):
-        from keystore.formats.permissions_patterns import covers
-
         return any(
             e == enclave and operation is rule.operation and covers(rule.expression, name)
             for e, operation, name in used

@@ -6,6 +6,7 @@ that another version of this project builds its own.
 
 from __future__ import annotations
 
+import hashlib
 import os
 import platform
 import shutil
@@ -38,8 +39,6 @@ def _cache() -> Path:
 
 
 def _file_name() -> str:
-    import hashlib
-
     text = SOURCE.read_bytes() + " ".join(_FLAGS).encode()
     return f"recorder-{hashlib.sha256(text).hexdigest()[:16]}-{platform.machine()}.so"
 

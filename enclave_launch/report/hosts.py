@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from enclave_launch.deployment.placement import Placement, flows_between_hosts, in_restart_order
+from enclave_launch.deployment.yaml_text import yaml_text
 from enclave_launch.report.flows import step_text
 from enclave_launch.review.information_flow import FlowGraph
 
@@ -57,8 +58,6 @@ def hosts_document(placement: Placement, graph: FlowGraph) -> dict[str, object]:
 
 def enclaves_yaml(placement: Placement) -> str:
     """A hosts file that names enclaves only, for ``secure-keystore export --hosts``."""
-    from enclave_launch.deployment.yaml_text import yaml_text
-
     homes = placement.homes()
     return yaml_text({
         "version": 1,

@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import printable
+from enclave_launch.description.introspection import LaunchIntrospector
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.arguments import DeclareLaunchArgument
@@ -37,6 +38,4 @@ def _argument(argument: DeclareLaunchArgument) -> Iterator[str]:
 
 def description_text(description: LaunchDescription) -> str:
     """What ``-p`` prints: the description as a tree."""
-    from enclave_launch.description.introspection import LaunchIntrospector
-
     return LaunchIntrospector().format_launch_description(description) + "\n"

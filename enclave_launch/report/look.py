@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TextIO
 
@@ -104,7 +105,6 @@ def look_for(stream: TextIO, environment: Mapping[str, str], *, verbose: bool = 
     folder = os.path.join(os.getcwd(), "")
     if not stream.isatty():
         return Look(full=verbose, folder=folder)
-    import shutil
 
     plain = bool(environment.get("NO_COLOR")) or environment.get("TERM") == "dumb"
     return Look(shutil.get_terminal_size().columns, not plain, verbose, folder)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
+import yaml
+
 from enclave_launch.boundary.terminal import printable_lines
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.ros_rules.parameter_value import ParameterValue
@@ -11,8 +13,6 @@ from enclave_launch.ros_rules.parameter_value import ParameterValue
 
 def params_yaml(plan: LaunchPlan) -> str:
     """YAML that ``--params-file`` accepts: one section per node that has parameters, by final name where known."""
-    import yaml
-
     sections: dict[str, dict[str, dict[str, object]]] = {}
     for name, parameters in _named(plan):
         if parameters:

@@ -25,6 +25,8 @@ from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
 from enclave_launch.ros2.context import session_of
+from enclave_launch.ros_rules.namespaces import enclave_scope, push_enclave_scope
+from enclave_launch.security_environment import OVERRIDE
 
 ATTRIBUTE = "_enclave_launch_enclave"
 GRANT = "_enclave_launch_grant"
@@ -49,8 +51,6 @@ class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
         return cls, kwargs
 
     def execute(self, context: Any) -> None:
-        from enclave_launch.ros_rules.namespaces import push_enclave_scope
-
         push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.enclave))
 
 
@@ -62,8 +62,6 @@ def enclave_attribute(action: Any, context: Any) -> str | None:
 
 def scope_in_force(context: Any) -> str | None:
     """The enclave scope pushed last in ``context`` (absolute); ``None`` when nothing was pushed."""
-    from enclave_launch.ros_rules.namespaces import enclave_scope
-
     return enclave_scope(context.launch_configurations)
 
 
@@ -106,7 +104,6 @@ def _securing(prepare: Callable[..., None]) -> Callable[..., None]:
         session = session_of(context)
         if session is not None:
             from enclave_launch.ros2.observation import observe_executable
-            from enclave_launch.security_environment import OVERRIDE
 
             grant = getattr(action, GRANT, None) or session.enter(observe_executable(action, context))
             self.final_env.pop(OVERRIDE, None)  # rcl lets it win over --enclave
@@ -145,8 +142,6 @@ def _pushing_enclave_scope(execute: Callable[..., Any]) -> Callable[..., Any]:
     @functools.wraps(execute)
     def wrapped(self: Any, context: Any) -> Any:
         if session_of(context) is not None:  # else nobody asks for the scope
-            from enclave_launch.ros_rules.namespaces import push_enclave_scope
-
             enclave = enclave_attribute(self, context)
             namespace = perform_substitutions(context, self.namespace)
             push_enclave_scope(context.launch_configurations, enclave, namespace)

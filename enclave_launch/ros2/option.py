@@ -22,6 +22,7 @@ from ros2launch.option import OptionExtension
 
 from enclave_launch.boundary.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
+from enclave_launch.flow import resolve
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import (
     add_explain_option,
@@ -30,7 +31,8 @@ from enclave_launch.verb.options import (
     add_security_options,
     build_parser,
 )
-from enclave_launch.verb.secure_launch import only_looking, resolve_options, show_plan
+from enclave_launch.verb.secure_launch import only_looking, resolve_options, show_plan, start
+from enclave_launch.verb.target import LaunchTarget
 from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, check_needs_secure
 
 SECURE = "secure_enclaves"
@@ -90,8 +92,6 @@ def names_keystore(words: Sequence[str]) -> bool:
 
 def _looked_at(args: argparse.Namespace) -> int:
     """As ``secure-launch --dry-run`` and its like: the plan is printed, nothing starts. Gives the exit status."""
-    from enclave_launch.flow import resolve
-
     path, arguments = target_of(args)
     keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
     with stdout_is_for_the_plan():
@@ -101,9 +101,6 @@ def _looked_at(args: argparse.Namespace) -> int:
 
 def _launched(description: Any, args: argparse.Namespace) -> int:
     """As ``secure-launch --secure``: planned, signed and run by one engine. Gives the exit status."""
-    from enclave_launch.verb.secure_launch import start
-    from enclave_launch.verb.target import LaunchTarget
-
     if args.keystore is None:
         raise UsageError(
             "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE; for one that nobody keeps, "

@@ -14,6 +14,7 @@ import atexit
 import os
 import sys
 from collections.abc import Iterable
+from importlib.metadata import entry_points
 from typing import Any
 
 from launch import LaunchDescription
@@ -92,8 +93,6 @@ def _read_secrets(launch: ProvisionedLaunch) -> Iterable[str]:
 
 def check_installed() -> None:
     """launch_ros finds node extensions by entry point alone; without ours nodes would start unsecured."""
-    from importlib.metadata import entry_points
-
     found = [entry.value for entry in entry_points(group="launch_ros.node_action")]
     if not any(value.startswith(EXTENSION) for value in found):
         raise UsageError(

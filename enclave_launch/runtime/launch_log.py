@@ -7,6 +7,7 @@ included. Launch colours nothing by itself; escape codes in those two formats ar
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -109,7 +110,6 @@ class LaunchLog:
 def captured_logging(log: LaunchLog, ours: Callable[[], bool] = lambda: True) -> Iterator[None]:
     """Within the block, what launch files and launch's own actions log (``launch.logging.get_logger``, and Python's
     ``logging``) goes where the launch's own lines go, as far as it is ``ours`` and not another launch's."""
-    import logging
 
     class Forward(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
@@ -132,8 +132,6 @@ def captured_logging(log: LaunchLog, ours: Callable[[], bool] = lambda: True) ->
 
 @contextmanager
 def _root_level() -> Iterator[None]:
-    import logging
-
     root = logging.getLogger()
     before = root.level
     root.setLevel(logging.INFO)
@@ -160,7 +158,6 @@ def _format_from(override: str | None, default: Format) -> Format:
         return default
     if override == "default_with_timestamp":
         return _with_time
-    import logging
 
     formatter = logging.Formatter(override.encode("latin1", "replace").decode("unicode_escape"), style="{")
 

@@ -14,6 +14,7 @@ import asyncio
 import os
 import socket
 import sys
+import traceback
 from collections.abc import Sequence
 from contextlib import AsyncExitStack
 from datetime import datetime, timezone
@@ -306,8 +307,6 @@ class LiveLaunch:
         told = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, self._launch_file)
         message = f"Caught exception in launch (see debug for traceback): {told}"
         if self._options.debug:
-            import traceback
-
             self._say("DEBUG", "".join(traceback.format_exception(error)))
         self._say("ERROR", message)
         self._observe(LaunchFailed(message))

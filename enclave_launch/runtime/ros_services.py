@@ -10,6 +10,7 @@ ros_adapters.py.
 from __future__ import annotations
 
 import asyncio
+import importlib.util
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
@@ -31,8 +32,6 @@ ALTERNATIVE = (
 
 def rclpy_available() -> bool:
     """Whether ``rclpy`` can be found; it is not imported."""
-    import importlib.util
-
     return importlib.util.find_spec("rclpy") is not None
 
 

@@ -9,6 +9,7 @@ which the kernel empties at one word.
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import signal
 import time
@@ -80,7 +81,6 @@ def _subreaper() -> Iterator[None]:
     if libc is None:
         yield
         return
-    import ctypes
 
     before = ctypes.c_int()
     libc.prctl(PR_GET_CHILD_SUBREAPER, ctypes.byref(before), 0, 0, 0)

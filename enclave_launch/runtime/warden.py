@@ -32,6 +32,7 @@ from __future__ import annotations
 
 import array
 import contextlib
+import ctypes
 import errno
 import fcntl
 import marshal
@@ -72,7 +73,6 @@ def load_libc() -> Any:
     """A ``ctypes.CDLL``, before the first fork; None where there is no prctl."""
     if not sys.platform.startswith("linux"):
         return None
-    import ctypes
 
     return ctypes.CDLL(None)
 

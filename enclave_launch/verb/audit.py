@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import warn
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.flow import run
 from enclave_launch.recording.audit import Audit, audit_json, audit_text
 from enclave_launch.recording.learning import new_run
 from enclave_launch.recording.recording import Recording
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
 
 def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
     """The status of the launch; else 1 when the plan would refuse something, or not everything could be seen."""
-    from enclave_launch.flow import run
-
     warn(*plan.problems)
     audit = Audit(plan)
     recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])

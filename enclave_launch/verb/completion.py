@@ -11,6 +11,7 @@ import os
 from collections.abc import Iterable, Sequence
 
 from enclave_launch.boundary.command_line import complete_with, parsers
+from enclave_launch.errors import EnclaveLaunchError
 from nodl import ament_index
 
 
@@ -44,7 +45,6 @@ def _launch_files(package: str, prefixes: Sequence[str]) -> Iterable[str]:
 
 
 def _arguments(words: Sequence[str], prefixes: Sequence[str]) -> Iterable[str]:
-    from enclave_launch.errors import EnclaveLaunchError
     from enclave_launch.evaluation.evaluate import read_description
     from enclave_launch.host.plan_host import PlanHost
     from enclave_launch.host.protocol import HostOptions

@@ -20,7 +20,10 @@ from enclave_launch.recording.learning import (
     prepare_folder,
     write_manifests,
 )
+from enclave_launch.recording.markers import MarkerRun, questions
 from enclave_launch.recording.recording import Recording
+from keystore.errors import KeystoreError
+from keystore.formats.validity import parse_duration
 
 if TYPE_CHECKING:
     from enclave_launch.recording.markers import MarkerRun
@@ -33,9 +36,6 @@ Start = Callable[["LaunchCompanion"], int]
 
 def seconds(text: str | None) -> float | None:
     """``10s``, ``2m`` as seconds. Raises ``UsageError``."""
-    from keystore.errors import KeystoreError
-    from keystore.formats.validity import parse_duration
-
     if text is None:
         return None
     try:
@@ -57,8 +57,6 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
     _say(f"kept apart by: {isolation.value}")
     status = _record(target, options, folder, isolation, patience, start)
     if options.learn_parameters:
-        from enclave_launch.recording.markers import MarkerRun, questions
-
         asked = questions(folder)
         if asked:
             _say(f"a second run, with marker values for {asked.shown}")

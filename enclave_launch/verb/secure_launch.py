@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 import gc
 import os
+import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
 from enclave_launch.boundary.short_paths import short_paths
+from enclave_launch.boundary.suggestion import did_you_mean
 from enclave_launch.boundary.terminal import (
     printable,
     safe_output,
@@ -20,7 +22,13 @@ from enclave_launch.boundary.terminal import (
 )
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
-from enclave_launch.verb.usage import CommandLine, check_options, read_command_line, unsecured_notice
+from enclave_launch.verb.usage import (
+    PERMISSIVE_NOTICE,
+    CommandLine,
+    check_options,
+    read_command_line,
+    unsecured_notice,
+)
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -193,8 +201,6 @@ def _launch_prefix(options: argparse.Namespace) -> Mapping[str, str]:
 
 
 def _check_pattern(pattern: str | None) -> None:
-    import re
-
     try:
         re.compile(pattern or "")
     except re.error as error:
@@ -276,7 +282,6 @@ def _policy_text(plan: LaunchPlan) -> str:
 
 
 def _explained(plan: LaunchPlan, subject: str) -> str:
-    from enclave_launch.boundary.suggestion import did_you_mean
     from enclave_launch.report.explained import explainable, explained
 
     lines = explained(plan, subject)
@@ -311,8 +316,6 @@ def _launch(
     warn(*(() if options.quiet else plan.warnings))
     _check_before_keys_are_made(plan, keystore)
     if options.strategy == "Permissive":
-        from enclave_launch.verb.usage import PERMISSIVE_NOTICE
-
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
     if not options.quiet:

@@ -13,8 +13,10 @@ from enclave_launch.options import SecurityOptions
 from enclave_launch.secured import ProvisionedLaunch
 from keystore.errors import InvalidInputError, KeystoreError
 from keystore.formats.domains import Domains
+from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import later, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
+from keystore.steps.expiry import expires_soon
 from keystore.steps.options import ProvisionOptions
 
 _LISTED = 8
@@ -33,7 +35,6 @@ def security_options(options: argparse.Namespace) -> SecurityOptions:
 def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
     subjects, creation = None, None
     if options.compatible_subjects:
-        from keystore.formats.subject import SubjectScheme
         from keystore.steps.creation import CreateOptions  # much to import, and rarely needed
 
         subjects, creation = SubjectScheme.COMPATIBLE, CreateOptions(subjects=SubjectScheme.COMPATIBLE)
@@ -92,7 +93,6 @@ def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
     within, ends = parse_duration(margin), launch.report.ends
     if ends is not None and later(utc_now(), within) < ends:
         return
-    from keystore.steps.expiry import expires_soon
 
     keystore, known = launch.settings.keystore, launch.report.validities
     enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]

@@ -11,7 +11,10 @@ from enclave_launch.drift.compare import Security
 from enclave_launch.drift.expected import out_of_sight
 from enclave_launch.drift_watch import DriftWatch, WatchOptions
 from enclave_launch.errors import ProvisionError, UsageError
+from enclave_launch.flow import run
 from enclave_launch.report.plan_json import plan_document
+from keystore.errors import KeystoreError
+from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
 
 if TYPE_CHECKING:
     from enclave_launch.options import RunSettings
@@ -23,8 +26,6 @@ def watch_plain_launch(
     plan: LaunchPlan, options: argparse.Namespace, settings: Callable[[DriftWatch], RunSettings]
 ) -> int:
     """Of an unsecured launch. Gives its status; 1 for alarms. Raises ``UsageError`` for processes on Zenoh."""
-    from enclave_launch.flow import run
-
     watch = DriftWatch(_seen_document(plan), _options(options))
     return watch.status(run(plan, options=settings(watch)))
 
@@ -32,9 +33,6 @@ def watch_plain_launch(
 def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespace) -> DriftWatch:
     """With an enclave of its own in the launch's keystore. Raises ``ProvisionError`` where it cannot be made, and
     ``UsageError`` for processes on Zenoh."""
-    from keystore.errors import KeystoreError
-    from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
-
     document = _seen_document(launch.plan)
     root = launch.settings.keystore
     try:

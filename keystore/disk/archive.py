@@ -6,6 +6,7 @@ regular files are taken, by name, into memory; what is written from them is deci
 
 from __future__ import annotations
 
+import gzip
 import io
 import os
 import tarfile
@@ -43,7 +44,6 @@ def archive_bytes(files: Iterable[ExportedFile], *, compressed: bool = False) ->
             archive.addfile(entry, io.BytesIO(file.data))
     if not compressed:
         return buffer.getvalue()
-    import gzip
 
     return gzip.compress(buffer.getvalue(), mtime=0)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+
 from keystore.disk import layout
 from keystore.disk.view import KeystoreView
 from keystore.errors import UnsafeKeystoreError, printable
@@ -35,8 +37,6 @@ def refuse_foreign_authorities(view: KeystoreView, register: Register | None) ->
 
 def describe(ca: CertificateFacts) -> str:
     """Its name and the SHA-256 fingerprint that openssl and browsers show."""
-    import hashlib
-
     digest = hashlib.sha256(ca.der).hexdigest().upper()
     pairs = ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
     return f"{printable(ca.common_name or 'without a common name')}, SHA-256 {pairs}"

@@ -6,6 +6,7 @@ making, so that an interrupted ``create`` can be completed while a foreign direc
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from datetime import timedelta
 from typing import Any
@@ -27,8 +28,6 @@ class KeystoreSettings:
     lifetime: timedelta = DEFAULT_LIFETIME
 
     def to_json(self) -> bytes:
-        import json
-
         content = {
             "version": _VERSION,
             "subjects": self.subjects.value,
@@ -40,8 +39,6 @@ class KeystoreSettings:
     @classmethod
     def from_json(cls, text: bytes, place: str) -> KeystoreSettings:
         """Raises DamagedKeystoreError for anything but what ``to_json`` writes."""
-        import json
-
         try:
             content: Any = json.loads(text)
             if content["version"] != _VERSION:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.domains import Domains
+from keystore.formats.safe_xml import check_schema, parse_xml
 
 if TYPE_CHECKING:
     from lxml import etree
@@ -167,8 +168,6 @@ _TOPIC_LEAVES = (
 
 def parse_governance(document: bytes, where: str) -> Governance:
     """A governance document, ours or SROS2's, as values. Raises InvalidInputError with file:line."""
-    from keystore.formats.safe_xml import check_schema, parse_xml
-
     root = parse_xml(document, where)
     check_schema(root, "governance.xsd", where, "DDS governance document")
     return Governance(tuple(_read_rule(element) for element in root.iter("domain_rule")))

@@ -8,6 +8,7 @@ governance; with SROS2's single CA that is every enclave (CVE-2023-24010, CVE-20
 from __future__ import annotations
 
 import binascii
+import ipaddress
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -204,8 +205,6 @@ class IdentityIssuer:
 
 
 def _alternative_names(hosts: Sequence[str]) -> x509.SubjectAlternativeName:
-    import ipaddress
-
     from cryptography import x509
 
     names: list[x509.GeneralName] = []

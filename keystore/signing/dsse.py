@@ -10,6 +10,8 @@ import base64
 import json
 from typing import TYPE_CHECKING, Any
 
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+
 from keystore.signing.public_key import fingerprint
 from keystore.signing.signer import Signer
 
@@ -39,6 +41,4 @@ def envelope_text(content: dict[str, Any]) -> str:
 
 
 def _spki(key: PublicKeyTypes) -> bytes:
-    from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
-
     return key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)

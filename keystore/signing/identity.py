@@ -8,6 +8,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
+from cryptography import x509
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives import hashes, serialization
+
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.validity import Validity
 from keystore.signing.authority import (
@@ -81,9 +85,6 @@ class RequestedKey(NamedTuple):
 
 def new_request(common_name: str, signer: Signer) -> bytes:
     """A PEM request for the key of ``signer``, signed by it."""
-    from cryptography import x509
-    from cryptography.hazmat.primitives import hashes, serialization
-
     subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, common_name)])
     builder = x509.CertificateSigningRequestBuilder().subject_name(subject)
     made = builder.sign(signing_key(signer), hashes.SHA256())
@@ -92,9 +93,6 @@ def new_request(common_name: str, signer: Signer) -> bytes:
 
 def request_key(pem: bytes, place: str) -> RequestedKey:
     """The key that a request asks for; raises DamagedKeystoreError unless the request is signed by that very key."""
-    from cryptography import x509
-    from cryptography.exceptions import UnsupportedAlgorithm
-
     try:
         found = x509.load_pem_x509_csr(pem)
         if not found.is_signature_valid:

@@ -7,10 +7,15 @@ object; the module comes from ``module-path`` or ``PKCS11_MODULE_PATH``, the PIN
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
+
+from cryptography.hazmat.primitives.asymmetric import ec, rsa
+from cryptography.hazmat.primitives.asymmetric.utils import encode_dss_signature
+from cryptography.hazmat.primitives.serialization import load_der_public_key
 
 from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.signing.ca_access import Secret
@@ -88,10 +93,6 @@ class Pkcs11Signer:
 
 def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
     """Tokens return r and s side by side; X.509 and CMS want DER. Hashing here suits every token."""
-    import hashlib
-
-    from cryptography.hazmat.primitives.asymmetric.utils import encode_dss_signature
-
     raw = bytes(key.sign(hashlib.sha256(data).digest(), mechanism=pkcs11.Mechanism.ECDSA))
     half = len(raw) // 2
     return encode_dss_signature(int.from_bytes(raw[:half], "big"), int.from_bytes(raw[half:], "big"))
@@ -151,9 +152,6 @@ def _single(session: Any, kind: Any, wanted: Mapping[Any, Any], pkcs11: Any) -> 
 
 
 def _public_key(pkcs11: Any, key: Any) -> PublicKey:
-    from cryptography.hazmat.primitives.asymmetric import ec, rsa
-    from cryptography.hazmat.primitives.serialization import load_der_public_key
-
     if key.key_type == pkcs11.KeyType.RSA:
         from pkcs11.util.rsa import encode_rsa_public_key
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import binascii
+import hashlib
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
 from keystore.errors import SigningUnavailableError
 from keystore.formats import der
 from keystore.formats.certificate import CertificateFacts
+from keystore.signing.authority import spki
 
 if TYPE_CHECKING:
     from cryptography.hazmat.primitives.asymmetric.types import PublicKeyTypes
@@ -87,8 +89,6 @@ def issued_by(facts: CertificateFacts, ca: CertificateFacts) -> bool:
 
 def fingerprint(der_bytes: bytes) -> str:
     """SHA-256 in hex: of a certificate, a public key or a document, as the register names them."""
-    import hashlib
-
     return hashlib.sha256(der_bytes).hexdigest()
 
 
@@ -110,7 +110,6 @@ def key_matches(key_pem: bytes, facts: CertificateFacts) -> bool:
 
 
 def _key_matches_slowly(key_pem: bytes, facts: CertificateFacts) -> bool:
-    from keystore.signing.authority import spki
     from keystore.signing.identity import public_half
 
     try:

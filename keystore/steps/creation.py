@@ -31,6 +31,7 @@ from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validi
 from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.public_key import key_kind
 from keystore.signing.signer import FileSigner, open_signer
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
@@ -202,8 +203,6 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
 
 def authority_kind(made: Authority) -> str:
     """Algorithm and size of a CA's key, in words for a report."""
-    from keystore.signing.public_key import key_kind
-
     return key_kind(made.facts.public_key)
 
 

@@ -10,6 +10,8 @@ from collections.abc import Collection, Iterable
 from dataclasses import replace
 from datetime import datetime, timedelta
 
+from cryptography import x509
+
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.store import PRIVATE_MODE, Link, Store
@@ -29,8 +31,6 @@ _BACKDATE = timedelta(days=1)
 
 def can_revoke(view: KeystoreView) -> bool:
     """Whether participants would accept a CRL of the identity CA: its key usage has cRLSign, or is absent."""
-    from cryptography import x509
-
     ca = x509.load_der_x509_certificate(view.ca(Role.IDENTITY).der)
     try:
         return ca.extensions.get_extension_for_class(x509.KeyUsage).value.crl_sign

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, UnsafeKeystoreError, printable
+from keystore.errors import DamagedKeystoreError, SigningUnavailableError, UnsafeKeystoreError, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.der import DerError
@@ -25,7 +25,8 @@ from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
 from keystore.formats.validity import Validity
 from keystore.signing import smime
-from keystore.signing.public_key import key_matches
+from keystore.signing.authority import spki
+from keystore.signing.public_key import fingerprint, key_matches
 
 PermissionsSource = Callable[[str, Validity], "bytes | None"]
 """(subject name, validity of the certificate) -> the document it should have; None: keep what it has."""
@@ -237,10 +238,7 @@ def _record_problem(register: Register | None, enclave: str, serial: int) -> str
 def _key_is_ours(view: KeystoreView, register: Register, enclave: str, key_pem: bytes) -> bool:
     """Whether the key is that of the certificate in force, or of one by the present CA that is not revoked: only such
     a key is certified again. What an old CA issued says nothing: nobody revokes it."""
-    from keystore.errors import SigningUnavailableError
-    from keystore.signing.authority import spki
     from keystore.signing.identity import public_half
-    from keystore.signing.public_key import fingerprint
 
     try:
         present = fingerprint(spki(public_half(key_pem, "the enclave's key")))

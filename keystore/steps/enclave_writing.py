@@ -33,7 +33,7 @@ from keystore.signing.identity import Identity, certify, new_identity, public_ha
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.smime import sign_document
 from keystore.steps.crl import can_revoke, revocable
-from keystore.steps.enclave_state import EnclaveState, PermissionsSource, Reissue
+from keystore.steps.enclave_state import NEW, EnclaveState, PermissionsSource, Reissue
 from keystore.steps.past_permissions import kept_permissions, what_is_taken_away
 
 if TYPE_CHECKING:
@@ -276,6 +276,4 @@ class EnclaveWriter:
 
 
 def _is_new(state: EnclaveState) -> bool:
-    from keystore.steps.enclave_state import NEW
-
     return state.reasons == (NEW,)

@@ -31,9 +31,10 @@ from keystore.errors import (
     printable,
 )
 from keystore.formats.bundle import BundledEnclave
+from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.subject import common_name
-from keystore.signing.authority import Curve, key_pem, new_key
+from keystore.signing.authority import Curve, key_pem, new_key, spki
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import new_request, request_key
 from keystore.signing.public_key import fingerprint
@@ -184,9 +185,6 @@ def _private(folder: Path, name: str) -> bytes | None:
 
 def _belongs(name: str, data: bytes, public: Path, wanted: BundledEnclave) -> bool:
     """A key in a file is asked itself; of one in a token the request or certificate beside it tells."""
-    from keystore.formats.certificate import read_certificate
-    from keystore.signing.authority import spki
-
     if name == layout.KEY:
         try:
             key = FileSigner(load_private_key(data, None, name)).public_key()

@@ -16,7 +16,7 @@ from keystore.errors import InvalidInputError, printable
 from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Policy
-from keystore.formats.subject import Half
+from keystore.formats.subject import Half, guid_prefix
 from keystore.formats.tool_needs import FOLDER, TOOLS, tool_enclave_name, tool_policy, tool_targets
 from keystore.steps.enclaves import apply_policy
 from keystore.steps.options import ProvisionOptions, ProvisionReport
@@ -113,8 +113,6 @@ def _end(root: Path, enclave: str) -> datetime:
 def enclaves_by_guid(keystore: Path | str) -> dict[int, str]:
     """The first 48 bits of the GUIDs of its participants → enclave, for every enclave of the keystore. No key is
     read. Source: DDS-Security 9.3.3."""
-    from keystore.formats.subject import guid_prefix
-
     view = KeystoreView(resolve_root(keystore))
     view.require_complete()
     names = {enclave: view.common_name(enclave) for enclave in view.enclaves()}

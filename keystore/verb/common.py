@@ -15,7 +15,7 @@ from enclave_launch.boundary.progress import ProgressBar, wanted
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.boundary.words import counted
 from keystore.errors import InvalidInputError
-from keystore.formats.validity import parse_duration, parse_end, utc_now
+from keystore.formats.validity import DEFAULT_BACKDATE, parse_duration, parse_end, utc_now
 
 if TYPE_CHECKING:
     from keystore.formats.domains import Domains
@@ -149,8 +149,6 @@ class Span:
 
 def span(arguments: argparse.Namespace) -> Span:
     """From the arguments of ``add_validity``. Raises ``InvalidInputError``."""
-    from keystore.formats.validity import DEFAULT_BACKDATE
-
     text: str | None = arguments.valid_for
     backdate = parse_duration(arguments.backdate) if arguments.backdate else DEFAULT_BACKDATE
     if text is None:

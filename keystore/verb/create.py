@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from keystore.formats.validity import DEFAULT_LIFETIME, parse_end, utc_now
 from keystore.verb import common
 
 
@@ -48,7 +49,6 @@ def run(arguments: argparse.Namespace) -> int:
     from keystore.formats.governance_yaml import load_governance_yaml
     from keystore.formats.role import Role
     from keystore.formats.subject import SubjectScheme
-    from keystore.formats.validity import DEFAULT_LIFETIME, parse_end, utc_now
     from keystore.signing.authority import Curve
     from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
 

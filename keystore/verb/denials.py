@@ -15,6 +15,7 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from keystore.errors import InvalidInputError, printable
 from keystore.verb import common
 
 
@@ -43,8 +44,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _lines(logs: Iterable[Path]) -> Iterator[str]:
     """Raises ``InvalidInputError`` for a file that cannot be read."""
-    from keystore.errors import InvalidInputError, printable
-
     files = list(logs)
     if not files:
         yield from (line.decode(errors="replace") for line in sys.stdin.buffer)

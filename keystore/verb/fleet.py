@@ -13,7 +13,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.terminal import printable
+from keystore.formats.validity import iso, parse_duration
 from keystore.verb import common
+from keystore.verb.status import ENDED, SOON
 
 if TYPE_CHECKING:
     from keystore.steps.fleet import FleetReport, HostStatus
@@ -30,9 +32,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the table. Returns 1 when a host is not as it should be."""
-    from keystore.formats.validity import parse_duration
     from keystore.steps.fleet import fleet_status
-    from keystore.verb.status import ENDED, SOON
 
     report = fleet_status(
         arguments.places, keystore=arguments.keystore, within=parse_duration(arguments.within)
@@ -49,8 +49,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _print(report: FleetReport) -> None:
-    from keystore.formats.validity import iso
-
     for one in report.hosts:
         manifest = one.manifest
         print(
@@ -64,8 +62,6 @@ def _print(report: FleetReport) -> None:
 
 
 def _json(report: FleetReport) -> dict[str, Any]:
-    from keystore.formats.validity import iso
-
     return {
         "version": 1,
         "now": iso(report.now),
@@ -75,8 +71,6 @@ def _json(report: FleetReport) -> dict[str, Any]:
 
 
 def _host(one: HostStatus) -> dict[str, Any]:
-    from keystore.formats.validity import iso
-
     manifest = one.manifest
     return {
         "host": manifest.host,

@@ -11,6 +11,8 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from keystore.errors import InvalidInputError
+from keystore.formats.validity import parse_duration, parse_end, utc_now
 from keystore.verb import common
 
 if TYPE_CHECKING:
@@ -40,7 +42,6 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do it, and print what was done. Returns 0."""
-    from keystore.formats.validity import parse_end, utc_now
     from keystore.steps.creation import CreateOptions
 
     now = utc_now()
@@ -52,7 +53,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
-    from keystore.formats.validity import parse_duration
     from keystore.steps.renewal import RenewOptions, renew
 
     wanted = RenewOptions(
@@ -67,7 +67,6 @@ def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> Provisio
 
 
 def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
-    from keystore.errors import InvalidInputError
     from keystore.formats.role import Role
     from keystore.steps.rollover import Step, roll_over
 

@@ -11,6 +11,7 @@ import os
 import sys
 from pathlib import Path
 
+from keystore.errors import StorageError
 from keystore.verb import common
 
 
@@ -44,8 +45,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(output: Path, text: bytes) -> None:
-    from keystore.errors import StorageError
-
     aside = output.with_name(f".{output.name}.{os.getpid()}.partial")
     try:
         aside.write_bytes(text)

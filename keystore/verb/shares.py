@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 
+from keystore.errors import printable
 from keystore.verb import common
 
 
@@ -22,7 +23,6 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print which launch shares which enclave, or drop a launch. Returns 0."""
-    from keystore.errors import printable
     from keystore.steps.enclaves import drop_shares
     from keystore.steps.options import ProvisionOptions
     from keystore.steps.sharing import list_shares

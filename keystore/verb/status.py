@@ -9,6 +9,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.terminal import printable
+from keystore.formats.validity import iso, parse_duration
 from keystore.verb import common
 
 if TYPE_CHECKING:
@@ -31,7 +32,6 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what ends when. Returns 3 where something ends soon, 4 where it has ended."""
-    from keystore.formats.validity import parse_duration
     from keystore.steps.expiry import status
 
     report = status(arguments.keystore)
@@ -46,8 +46,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
-    from keystore.formats.validity import iso
-
     return {
         "version": 1,
         "keystore": str(report.keystore),
@@ -69,8 +67,6 @@ def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
 
 
 def _print(report: StatusReport, shown: tuple[Expiry, ...]) -> None:
-    from keystore.formats.validity import iso
-
     print(f"{len(report.enclaves)} enclaves in {printable(str(report.keystore))}")
     for one in shown:
         print(f"{iso(one.not_after)}  {_left(one, report.now):>14}  {printable(one.subject)}")

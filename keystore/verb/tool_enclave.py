@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import argparse
 
+from keystore.formats.tool_needs import TABLE
+from keystore.formats.validity import iso
 from keystore.verb import common
 
 
 def describe(parser: argparse.ArgumentParser) -> None:
     """Add the arguments of ``secure-keystore tool-enclave``."""
-    from keystore.formats.tool_needs import TABLE
-
     parser.usage = "secure-keystore tool-enclave KEYSTORE --for TOOL [TARGET ...] [options]"
     parser.formatter_class = argparse.RawDescriptionHelpFormatter
     parser.epilog = "tools:\n" + "".join(
@@ -33,7 +33,6 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Do it, and print what was done. Returns 0."""
-    from keystore.formats.validity import iso
     from keystore.steps.tool_enclaves import create_tool_enclave
 
     options = common.provision_options(arguments, domains=common.domains(arguments))

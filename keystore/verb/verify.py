@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.words import counted
+from keystore.errors import printable
 from keystore.verb import common
 
 if TYPE_CHECKING:
@@ -56,8 +57,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _print(report: VerifyReport) -> None:
-    from keystore.errors import printable
-
     for finding in report.findings:
         print(f"{finding.severity.value}: {printable(finding.place)}: {finding.message} [{finding.code}]")
         if finding.repair:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from keystore.disk import layout
+from keystore.disk.crl_file import revoked_serials
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, StorageError
@@ -72,8 +73,6 @@ def verify(
 def _findings(
     view: KeystoreView, access: CaAccess, now: datetime, required: Requirements
 ) -> Iterator[Finding]:
-    from keystore.disk.crl_file import revoked_serials
-
     yield from check_parents(view.root)
     yield from check_files(view.root)
     register, problems = load_register(view)

@@ -8,7 +8,7 @@ from datetime import datetime
 
 from keystore.disk import layout, safe_files
 from keystore.disk.authorities import describe
-from keystore.disk.crl_file import crl_validity
+from keystore.disk.crl_file import crl_validity, load_crl
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, SigningUnavailableError, UnsafeKeystoreError
 from keystore.formats.certificate import CertificateFacts
@@ -149,8 +149,6 @@ def check_governance(
 
 
 def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:
-    from keystore.disk.crl_file import load_crl
-
     try:
         load_crl(view)
         validity = crl_validity(view)

@@ -14,6 +14,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from nodl.errors import NoDLError
+from nodl.graph.json_form import graph_document
+from nodl.graph.observing import SOURCES, Where, observer
 
 if TYPE_CHECKING:
     from nodl.graph.observing import Observer
@@ -24,8 +26,6 @@ _LOOK = 0.2
 
 def main() -> int:
     """Exit status 0 when the reader has gone, 1 with a message where the domain cannot be observed."""
-    from nodl.graph.observing import SOURCES, Where, observer
-
     parser = argparse.ArgumentParser(prog="nodl.graph.follow")
     parser.add_argument("domain", type=int)
     parser.add_argument("--with", dest="source", choices=SOURCES, default="auto")
@@ -40,8 +40,6 @@ def main() -> int:
 
 
 def _follow(up: Observer) -> int:
-    from nodl.graph.json_form import graph_document
-
     told, last = -1, 0.0
     while not select.select([sys.stdin], [], [], _LOOK)[0]:
         changes = up.look()

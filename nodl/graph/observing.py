@@ -12,6 +12,7 @@ from typing import NamedTuple, Protocol
 from enclave_launch.boundary.environment import environment_with
 from nodl.graph.cyclone import CycloneObserver, ObserverError
 from nodl.graph.model import Graph
+from nodl.graph.rclpy_graph import RclpyObserver
 
 INTERVAL = 0.1  # seconds between two looks: clients that call once and leave are there for about that long
 SOURCES = ("auto", "cyclonedds", "rclpy")
@@ -64,8 +65,6 @@ def observer(where: Where, environment: Mapping[str, str]) -> Iterator[Observer]
     source = chosen_source(where.source)
     up: Observer
     if source == "rclpy":
-        from nodl.graph.rclpy_graph import RclpyObserver
-
         with environment_with(_ros_variables(where)):
             try:
                 up = RclpyObserver()

@@ -11,7 +11,10 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from nodl.ament_index import package_file_version
+from nodl.dependence import Situation
+from nodl.dependence.apply import applied
 from nodl.infer.packages import read_package
+from nodl.infer.system import infer_paths
 from nodl.library import Library, LibraryDocuments, fits
 from nodl.library.document import LibraryDocument
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
@@ -64,8 +67,6 @@ class LibraryVerdict(NamedTuple):
 
 def check(library: Library, folder: str) -> list[LibraryVerdict]:
     """One verdict for each document whose package is below ``folder``. Raises ``FileNotFoundError``."""
-    from nodl.infer.system import infer_paths
-
     if not os.path.isdir(folder):
         raise FileNotFoundError(2, "no such directory", folder)
     packages = dict(_packages(folder))
@@ -125,9 +126,6 @@ def _is_known(endpoint: Endpoint) -> bool:
 
 def _brought(interface: NodeInterface, library: Library) -> set[_Name]:
     """The names of the plugins, transports and further nodes of a start without parameters."""
-    from nodl.dependence import Situation
-    from nodl.dependence.apply import applied
-
     transports = frozenset(package for _, package, _ in library.transports())
     situation = Situation("rolling", interface.name or "node", "/", installed=transports)
     names: set[_Name] = set()

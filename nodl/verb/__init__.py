@@ -11,6 +11,7 @@ from importlib import import_module
 
 from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
 from enclave_launch.boundary.terminal import safe_output
+from nodl.errors import NoDLError
 
 VERBS = ("check_record", "convert", "infer", "library", "observe", "show", "validate")
 
@@ -22,8 +23,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _main(argv: Sequence[str] | None) -> int:
-    from nodl.errors import NoDLError
-
     parser = build_parser()
     complete(parser)
     arguments = parser.parse_args(argv)

@@ -10,6 +10,10 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from nodl.ament_index import search_prefixes
+from nodl.dependence import Situation
+from nodl.library import Library, LibraryDocuments
+from nodl.lookup import ManifestLookup
 from nodl.names import split_fqn
 from nodl.verb.options import add_prefix_argument
 
@@ -67,9 +71,6 @@ class Judgement(NamedTuple):
 
 def run(arguments: argparse.Namespace) -> int:
     """Print how descriptions and record differ. Returns 1 when they do, 2 for wrong usage."""
-    from nodl.ament_index import search_prefixes
-    from nodl.lookup import ManifestLookup
-
     nodes, complaints = _recorded(_files(arguments.records))
     if not nodes:
         print(
@@ -173,8 +174,6 @@ def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInRe
 def _of_library(
     node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], folders: tuple[str, ...]
 ) -> tuple[Sequence[NodeInterface], str]:
-    from nodl.library import Library
-
     hit = Library().find(node.package, node.plugin or node.executable, distro=node.distro)
     return ((), "the library has no document of it") if hit is None else ((hit.document.interface,), "")
 
@@ -182,9 +181,7 @@ def _of_library(
 def _at_this_start(node: AskedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
     """Descriptions that depend on parameters and words, as they are with those that the launch gave; with the further
     nodes that they bring."""
-    from nodl.dependence import Situation
     from nodl.dependence.apply import applied, own_name
-    from nodl.library import Library, LibraryDocuments
 
     namespace, name = split_fqn(node.fqn)
     situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)

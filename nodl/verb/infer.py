@@ -11,6 +11,10 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.boundary.words import counted
+from nodl.ament_index import PackageNotFoundError, package_prefix, search_prefixes
+from nodl.lookup import ManifestLookup
+from nodl.node_interface import Gap
+from nodl.source_ref import SourceRef
 from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
@@ -51,8 +55,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(args: argparse.Namespace) -> int:
     """0: nodes were found; 1: none; 2: a subject does not exist. Open questions go to standard error."""
-    from nodl.ament_index import search_prefixes
-
     try:
         system = _infer(args.subjects, search_prefixes(args.prefix))
     except LookupError as error:
@@ -97,7 +99,6 @@ def _tell_guesses(system: InferredSystem) -> None:
 def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
     """Each program of ``system`` beside its manifest. 1: a manifest lacks something, or none was found."""
     from nodl.infer.report.comparison import lacking, to_text
-    from nodl.lookup import ManifestLookup
 
     lookup = ManifestLookup(prefixes)
     programs: dict[tuple[str, str | None, str | None], list[NodeInterface]] = {}
@@ -187,11 +188,8 @@ def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
 
 
 def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
-    from nodl.ament_index import PackageNotFoundError, package_prefix
     from nodl.infer.executable import infer_executable
     from nodl.infer.system import InferredSystem
-    from nodl.node_interface import Gap
-    from nodl.source_ref import SourceRef
 
     try:
         folder = Path(package_prefix(package, prefixes), "lib", package)

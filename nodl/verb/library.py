@@ -10,6 +10,7 @@ from enclave_launch.boundary.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
 from nodl.library import SHIPPED, Hit, Library
 from nodl.library.document import LibraryDocument
+from nodl.library.index import write_index
 from nodl.verb.options import add_prefix_argument
 from nodl.verb.show import description_lines
 
@@ -137,7 +138,5 @@ def _table(arguments: argparse.Namespace) -> int:
 
 
 def _index(arguments: argparse.Namespace) -> int:
-    from nodl.library.index import write_index
-
     write_index(arguments.folder)
     return 0

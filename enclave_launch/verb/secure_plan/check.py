@@ -14,7 +14,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch import __version__
 from enclave_launch.boundary.terminal import json_text
+from enclave_launch.diagnostics import Code
 from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
 from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN
 from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
@@ -45,8 +47,6 @@ def _text(found: list[tuple[Told, str | None]], form: str) -> str:
     from enclave_launch.report.review_text import findings_document, findings_text
 
     if form == "sarif":
-        from enclave_launch import __version__
-        from enclave_launch.diagnostics import Code
         from enclave_launch.report.sarif import sarif_document
         from enclave_launch.review.checks import RULES
 

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.boundary.terminal import json_text, message
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan, read_saved
+from keystore.errors import KeystoreError
 
 if TYPE_CHECKING:
     from enclave_launch.drift.compare import Security
@@ -156,7 +157,6 @@ def _domain(options: argparse.Namespace, document: Any) -> int:
 
 def _security(options: argparse.Namespace) -> Security | None:
     from enclave_launch.drift.compare import Security
-    from keystore.errors import KeystoreError
 
     if options.keystore is None:
         if options.enclave is not None:

@@ -17,10 +17,13 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.files import read_bytes
+from enclave_launch.diagnostics import Code
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
 from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN, endings, keystore_errors
 from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from keystore.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from enclave_launch.report.evidence.documents import Examined
@@ -77,7 +80,6 @@ def _new_folder(folder: Path) -> Path:
 
 
 def _examine(options: argparse.Namespace) -> Examined:
-    from enclave_launch.diagnostics import Code
     from enclave_launch.report.contents import report_contents
     from enclave_launch.report.evidence.documents import Examined
     from enclave_launch.review.checks import RULES
@@ -99,7 +101,6 @@ def _examine(options: argparse.Namespace) -> Examined:
 
 def _moment(text: str | None) -> datetime:
     """``--at``, else ``SOURCE_DATE_EPOCH`` (reproducible-builds.org), else now."""
-    from keystore.errors import InvalidInputError
     from keystore.formats.validity import parse_moment, utc_now
 
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
@@ -150,8 +151,6 @@ def _bill_of_materials(file: Path) -> dict[str, Any]:
     """Its BOM-Link (CycloneDX specification, "BOM-Link") and hash. Raises ``UsageError`` for anything else."""
     import hashlib
 
-    from enclave_launch.boundary.files import read_bytes
-
     try:
         data = read_bytes(file)
         content = json.loads(data)
@@ -172,7 +171,6 @@ def _bill_of_materials(file: Path) -> dict[str, Any]:
 
 
 def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
-    from enclave_launch.boundary.files import read_bytes
     from enclave_launch.report.evidence.statement import PAYLOAD_TYPE
     from keystore.signing.ca_access import CaAccess, Secret
     from keystore.signing.dsse import envelope, envelope_text

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from keystore.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from keystore.formats.hosts import Hosts
@@ -61,7 +62,6 @@ def run(options: argparse.Namespace) -> int:
 
 def hosts_of(file: Path | None) -> Hosts:
     """Raises ``UsageError`` for a file that is not understood."""
-    from keystore.errors import InvalidInputError
     from keystore.formats.hosts import Hosts, load_hosts
 
     if file is None:

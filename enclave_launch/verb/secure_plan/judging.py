@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.files import read_text
+from enclave_launch.errors import UsageError
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
     endings,
@@ -63,8 +65,6 @@ def expectations(file: Path | None) -> Expectations:
     """Raises ``UsageError`` for a file that was named and is missing, and for content that is not understood."""
     import yaml
 
-    from enclave_launch.boundary.files import read_text
-    from enclave_launch.errors import UsageError
     from enclave_launch.review.expectations import Expectations, read_expectations
 
     if file is None:

@@ -7,6 +7,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.errors import ProvisionError
+from keystore.errors import KeystoreError
+
 if TYPE_CHECKING:
     from datetime import datetime
 
@@ -20,9 +23,6 @@ DEFAULT_MARGIN = "30d"
 @contextmanager
 def keystore_errors() -> Iterator[None]:
     """Raises ``ProvisionError`` in the place of a ``KeystoreError``."""
-    from enclave_launch.errors import ProvisionError
-    from keystore.errors import KeystoreError
-
     try:
         yield
     except KeystoreError as error:

@@ -12,6 +12,7 @@ from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import stdout_is_for_the_plan
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.options import add_evaluation_options, add_policy_options
+from nodl.ament_index import search_prefixes
 
 LARGEST_PLAN = 256 << 20  # bytes
 WORDS = "PLAN.json | PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
@@ -48,7 +49,6 @@ def plan_of(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, A
     from enclave_launch.report.plan_json import plan_document
     from enclave_launch.verb.secure_launch import resolve_options
     from enclave_launch.verb.target import find_target
-    from nodl.ament_index import search_prefixes
 
     target = find_target(words, search_prefixes(options.prefix))
     with stdout_is_for_the_plan():

@@ -19,6 +19,8 @@ from typing import Any, NamedTuple
 
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.secure_plan.plans import plan_of, read_saved
+from enclave_launch.verb.target import find_target
+from nodl.ament_index import search_prefixes
 
 _REVISION_AND_PATH = re.compile(r"(?P<revision>[^:=]+):(?P<path>(?:[^=].*)?)")
 _OPTIONS_WITH_PATHS = ("prefix", "nodl", "library", "source", "policy")
@@ -57,9 +59,6 @@ def plan_before(word: str, words: Sequence[str], options: argparse.Namespace) ->
 
 
 def _plan_of_words(revision: str, words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    from enclave_launch.verb.target import find_target
-    from nodl.ament_index import search_prefixes
-
     if len(words) == 1 and words[0].endswith(".json"):
         file = Path(os.path.realpath(words[0]))
         with checkout(revision, file.parent) as old:
