@@ -22,7 +22,6 @@ from ros2launch.option import OptionExtension
 
 from enclave_launch.boundary.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
-from enclave_launch.flow import resolve
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import (
     add_explain_option,
@@ -92,6 +91,8 @@ def names_keystore(words: Sequence[str]) -> bool:
 
 def _looked_at(args: argparse.Namespace) -> int:
     """As ``secure-launch --dry-run`` and its like: the plan is printed, nothing starts. Gives the exit status."""
+    from enclave_launch.flow import resolve  # half of all our modules: a plain `ros2 launch` does without
+
     path, arguments = target_of(args)
     keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
     with stdout_is_for_the_plan():
