@@ -5,6 +5,7 @@ A property is about values, never about how fast a busy machine makes them.
 
 from __future__ import annotations
 
+import signal
 from pathlib import Path
 
 import pytest
@@ -25,6 +26,16 @@ THOROUGH = (
     "policy/test_components.py",
 )
 """Tables in these folders that take more than three seconds each: together half of the time."""
+
+
+def pytest_configure() -> None:
+    """Under nohup, or in the background of a script, signals are ignored, and what a test starts would inherit that.
+
+    A handler that does nothing keeps the tests running likewise, and exec puts the default in its place.
+    """
+    for number in (signal.SIGHUP, signal.SIGINT, signal.SIGQUIT, signal.SIGTERM, signal.SIGUSR1, signal.SIGUSR2):
+        if signal.getsignal(number) is signal.SIG_IGN:
+            signal.signal(number, lambda *_: None)
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:

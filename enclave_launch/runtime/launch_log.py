@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from enclave_launch.boundary.terminal import printable, printable_lines
+from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
 
@@ -34,6 +35,8 @@ class LaunchLog:
     """Sinks of one run. ``directory`` is where launch.log and the processes' own logs are.
 
     ``limit``: bytes after which a log file is begun anew, ``None`` for never.
+
+    :raises RuntimeFailure: a format in ``environment`` that cannot be used.
     """
 
     def __init__(
@@ -54,8 +57,8 @@ class LaunchLog:
         self.launch_file = self._file_sink("launch.log")
         self.debug = debug
         self._files: dict[str, FileSink] = {"launch.log": self.launch_file}
-        self._on_screen = _format_from(environment.get("OVERRIDE_LAUNCH_SCREEN_FORMAT"), _plain)
-        self._in_file = _format_from(environment.get("OVERRIDE_LAUNCH_LOG_FORMAT"), _with_time)
+        self._on_screen = _format_from(environment, "OVERRIDE_LAUNCH_SCREEN_FORMAT", _plain)
+        self._in_file = _format_from(environment, "OVERRIDE_LAUNCH_LOG_FORMAT", _with_time)
 
     def log(self, level: Level, name: str, message: str) -> None:
         if LEVELS[level] < LEVELS["INFO"] and not self.debug:
@@ -152,18 +155,28 @@ def _with_time(level: Level, name: str, message: str) -> str:
     return f"{time.time():.7f} [{level}] [{name}]: {message}"
 
 
-def _format_from(override: str | None, default: Format) -> Format:
+def _format_from(environment: Mapping[str, str], variable: str, default: Format) -> Format:
     """``{``-style format over the attributes of a ``logging.LogRecord``, or one of launch's two aliases."""
+    override = environment.get(variable)
     if not override or override == "default":
         return default
     if override == "default_with_timestamp":
         return _with_time
+    try:
+        render = _format_of_records(override)
+        render("INFO", "launch", "tried before it is needed")
+    except (ValueError, AttributeError, TypeError) as error:
+        raise RuntimeFailure(
+            f"{variable}={override!r} cannot be used: {error}; it is a format over the fields of a log record, "
+            "such as '[{levelname}] [{name}]: {message}'"
+        ) from error
+    return render
 
-    formatter = logging.Formatter(override.encode("latin1", "replace").decode("unicode_escape"), style="{")
+
+def _format_of_records(text: str) -> Format:
+    formatter = logging.Formatter(text.encode("latin1", "replace").decode("unicode_escape"), style="{")
 
     def render(level: Level, name: str, message: str) -> str:
-        record = logging.LogRecord(name, LEVELS[level], "", 0, message.replace("%", "%%"), None, None)
-        record.msg = message
-        return formatter.format(record)
+        return formatter.format(logging.LogRecord(name, LEVELS[level], "", 0, message, None, None))
 
     return render

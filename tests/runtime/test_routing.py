@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from enclave_launch.errors import RuntimeFailure
 from enclave_launch.ros_rules.output import OutputSetting, output_routes
 from enclave_launch.runtime.launch_log import LaunchLog, Writers
 from enclave_launch.runtime.routing import (
@@ -161,6 +162,18 @@ def test_formats_can_be_overridden_as_in_launch(tmp_path: Path) -> None:
         "launch.log": "launch: 50 % done\n",
         "screen": "\x1b[1mERROR\x1b[0m launch|50 % done\n",
     }
+
+
+@pytest.mark.parametrize(
+    "text", ["{levelname", "{nothing}", "%(message)s", "{levelno:>q}", "{message.x}", r"\x{message}"]
+)
+@pytest.mark.parametrize("variable", ["OVERRIDE_LAUNCH_SCREEN_FORMAT", "OVERRIDE_LAUNCH_LOG_FORMAT"])
+def test_a_format_that_cannot_be_used_is_refused_before_anything_starts(
+    variable: str, text: str, tmp_path: Path
+) -> None:
+    with pytest.raises(RuntimeFailure) as refused:
+        Outputs(tmp_path, {variable: text})
+    assert str(refused.value).startswith(f"{variable}={text!r} cannot be used: ")
 
 
 def test_debug_lines_with_debug(tmp_path: Path) -> None:
