@@ -16,7 +16,7 @@ FREE_EXPANSION = 10_000  # values that aliases may stand for in any document, an
 EXPANSION_FACTOR = 20  # how many times its written values a document may stand for beyond that
 
 SafeLoader: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-_EventParser: Any = getattr(yaml, "CLoader", yaml.Loader)
+EventParser: Any = getattr(yaml, "CLoader", yaml.Loader)
 
 
 class RefusedYaml(yaml.YAMLError):
@@ -41,7 +41,7 @@ def refuse_deep_nesting(text: str | bytes) -> None:
         return
     depth = 0
     try:
-        for event in yaml.parse(text, Loader=_EventParser):
+        for event in yaml.parse(text, Loader=EventParser):
             if isinstance(event, yaml.CollectionStartEvent):
                 depth += 1
                 if depth > MAX_NESTING:

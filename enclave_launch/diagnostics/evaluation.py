@@ -85,7 +85,7 @@ def parameters_unknown(process: str, path: str, why: str, place: SourceLocation)
     """Names that follow from the parameters in ``path`` are then gaps."""
     text = f"the parameters that {process} would read from {path} are not known: {why}"
     return Diagnostic(
-        Code.PARAMETERS_UNKNOWN, process, text, place, "rcl would not start the node with it: mend the file"
+        Code.PARAMETERS_UNKNOWN, process, text, place, "rcl would not start the node with it: mend it"
     )
 
 

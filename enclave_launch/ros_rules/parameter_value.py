@@ -1,5 +1,62 @@
-"""The values that a ROS 2 parameter can have (``rcl_interfaces/msg/ParameterValue``)."""
+"""The values that a ROS 2 parameter can have (``rcl_interfaces/msg/ParameterValue``), and which of them a plain YAML
+scalar is for rcl. Pure."""
 
 from __future__ import annotations
 
-ParameterValue = bool | int | float | str | bytes | tuple[bool | int | float | str | bytes, ...]
+import math
+import re
+
+Scalar = bool | int | float | str
+ParameterValue = Scalar | bytes | tuple[Scalar | bytes, ...]
+
+_BOOLEANS = {
+    **dict.fromkeys(("Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"), True),
+    **dict.fromkeys(("N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"), False),
+}
+# strtoll with base 0 and strtod; the blanks they skip are those of ASCII
+_INTEGER = re.compile(r"\s*[+-]?(?:0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)", re.ASCII)
+_DOUBLE = re.compile(
+    r"\s*[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?|nan)",
+    re.IGNORECASE | re.ASCII,
+)
+_NAMED_DOUBLE = re.compile(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
+_MOST_DIGITS = 25  # of a number in 64 bits, in whichever base
+_KINDS: tuple[type, ...] = (bool, int, float, str)
+
+
+def type_slot(value: ParameterValue) -> int:
+    """Position in rcl's order of types: scalars, bytes, then arrays; readers take the first that is there."""
+    if isinstance(value, tuple):
+        return 10 + (_KINDS.index(type(value[0])) if value and type(value[0]) in _KINDS else 9)
+    return 5 if isinstance(value, bytes) else _KINDS.index(type(value))
+
+
+def plain_scalar(text: str) -> Scalar:
+    """A plain YAML scalar by the rules of rcl's parser (``parse.c``, ``get_value``), which are not YAML 1.1's."""
+    if text in _BOOLEANS:
+        return _BOOLEANS[text]
+    number = _strtoll(text) if _INTEGER.fullmatch(text) else None
+    return _strtod(text) if number is None else number
+
+
+def _strtoll(text: str) -> int | None:
+    """``None`` outside of 64 bits."""
+    digits = text.strip().lstrip("+-")
+    base = 16 if digits[:2] in ("0x", "0X") else 8 if digits.startswith("0") else 10
+    if len(digits) > _MOST_DIGITS:
+        return None
+    number = int(digits, base) * (-1 if "-" in text else 1)
+    return number if -(2**63) <= number < 2**63 else None
+
+
+def _strtod(text: str) -> float | str:
+    """Text stays what does not fit into a double: ``1e999``, ``1e-999``."""
+    if named := _NAMED_DOUBLE.fullmatch(text):
+        return float("".join(part for part in named.groups() if part))
+    if not _DOUBLE.fullmatch(text):
+        return text
+    number = float(text)
+    if "n" in text.lower():  # inf, nan
+        return number
+    has_digits = any(digit in "123456789" for digit in text.lower().partition("e")[0])
+    return number if 0 < abs(number) < math.inf or not has_digits else text

@@ -1,8 +1,7 @@
 """The parameters that a node ends up with, merged from its command line as rcl merges them.
 
 Sources in, values out; reads the parameter files that the command line names. Rules from ros2/rcl
-``rcl_yaml_param_parser`` (``parse.c``: what a YAML scalar is) and ``rcl/arguments.c``, ``rclcpp``
-``parameter_map.cpp`` (how sections apply):
+``rcl/arguments.c``, ``rclcpp`` ``parameter_map.cpp`` (how sections apply); what a file says has ``parameter_file``:
 
 - all sources are merged first, section by section, in the order in which sections first appear;
 - a section applies when its name matches the fully qualified name: ``*`` is one token, ``**`` any number;
@@ -17,18 +16,20 @@ import os
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeVar
 
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.named_tuple import NamedTuple
-from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.ros_rules.parameter_value import ParameterValue, plain_scalar, type_slot
 from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 
 Section = Mapping[str, ParameterValue]
+Read = TypeVar("Read")
 
 
 class UnreadableParameters(Exception):
-    """A parameter file of which nothing is known: rcl would refuse to start the node, or it is only there later."""
+    """A parameter file, or ``-p``, of which nothing is known: rcl would refuse to start the node, or it is only there
+    later."""
 
     def __init__(self, path: str, why: str) -> None:
         self.path, self.why = path, why
@@ -45,19 +46,7 @@ class ResolvedParameters(NamedTuple):
 Generated = Callable[[str], Mapping[str, Section] | None]
 
 EVERY_NODE = "/**"
-_BOOLEANS = {
-    **dict.fromkeys(("Y", "y", "yes", "Yes", "YES", "true", "True", "TRUE", "on", "On", "ON"), True),
-    **dict.fromkeys(("N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"), False),
-}
-# strtoll with base 0 and strtod; the blanks they skip are those of ASCII
-_INTEGER = re.compile(r"\s*[+-]?(?:0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)", re.ASCII)
-_DOUBLE = re.compile(
-    r"\s*[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?|nan)",
-    re.IGNORECASE | re.ASCII,
-)
-_NAMED_DOUBLE = re.compile(r"([+-]?)\.(inf|Inf|INF|nan|NaN|NAN)")
-_PLAIN = re.compile(r"[A-Za-z0-9_./+-]+")  # no YAML syntax in it
-_KINDS: tuple[type, ...] = (bool, int, float, str)
+_PLAIN = re.compile(r"[A-Za-z0-9_./+-]*[A-Za-z0-9][A-Za-z0-9_./+-]*")  # no YAML syntax in it
 
 
 def resolve_parameters(
@@ -83,7 +72,7 @@ def resolve_parameters(
                 continue
             slots = sections.setdefault(section, {})
             for name, value in values.items():
-                slots.setdefault(name, {})[_slot(value)] = value
+                slots.setdefault(name, {})[type_slot(value)] = value
     resolved: dict[str, ParameterValue] = {}
     for parameters in sections.values():
         resolved.update({name: slots[min(slots)] for name, slots in parameters.items()})
@@ -94,17 +83,10 @@ def _sections_of(
     source: ParameterFileArgument | ParameterRule, generated: Generated, directory: str
 ) -> Mapping[str, Section]:
     if isinstance(source, ParameterRule):
-        value = _parse_value(source.value)
+        value = _value_of_rule(source)
         return {source.node or EVERY_NODE: {source.name: value}} if value is not None else {}
     known = generated(source.path)
     return _read_file(os.path.join(directory, source.path)) if known is None else known
-
-
-def _slot(value: ParameterValue) -> int:
-    """Position in rcl's order of types: scalars, bytes, then arrays."""
-    if isinstance(value, tuple):
-        return 10 + (_KINDS.index(type(value[0])) if value and type(value[0]) in _KINDS else 9)
-    return 5 if isinstance(value, bytes) else _KINDS.index(type(value))
 
 
 def section_applies(section: str, fqn_tokens: Sequence[str | None]) -> bool:
@@ -136,27 +118,21 @@ def as_rcl_reads(value: Any) -> ParameterValue:
         return tuple(as_rcl_reads(item) for item in value)  # type: ignore[misc]  # items are scalars
     if not isinstance(value, str):
         return value  # type: ignore[no-any-return]
-    typed = _scalar(value)
+    typed = plain_scalar(value)
     if isinstance(typed, str):
         return value
     from yaml import safe_load
 
-    return typed if typed is not None and isinstance(safe_load(value), str) else value
+    return typed if isinstance(safe_load(value), str) else value
 
 
-def _parse_value(text: str) -> ParameterValue | None:
-    """The value of ``-p``. ``None`` for what rcl refuses: nothing, mappings, errors."""
-    if _PLAIN.fullmatch(text):
-        return _scalar(text)
-    import yaml
+def _value_of_rule(rule: ParameterRule) -> ParameterValue | None:
+    """``None`` where rcl takes the rule and no value comes of it. Raises ``UnreadableParameters``."""
+    if _PLAIN.fullmatch(rule.value):
+        return plain_scalar(rule.value)
+    from enclave_launch.ros_rules.parameter_file import value_of_text
 
-    from enclave_launch.boundary.yaml_nodes import compose
-
-    try:
-        node = compose(text)
-    except yaml.YAMLError:
-        return None
-    return _value(node)
+    return _read(f"-p {rule.name}:={rule.value}", rule.value, value_of_text)
 
 
 @lru_cache(maxsize=256)
@@ -169,24 +145,23 @@ def _read_cached(path: str, _modified: int, _size: int) -> Mapping[str, Section]
 
 
 def parameters_of_text(text: str, path: str) -> Mapping[str, Section]:
-    """The sections of the parameter file ``path``. Raises ``UnreadableParameters`` where it is no YAML."""
+    """The sections of the parameter file ``path``. Raises ``UnreadableParameters`` for what rcl refuses."""
+    from enclave_launch.ros_rules.parameter_file import sections_of_text
+
+    return _read(path, text, sections_of_text)
+
+
+def _read(what: str, text: str, read: Callable[[str], Read]) -> Read:
     import yaml
 
+    from enclave_launch.ros_rules.parameter_file import RefusedParameters
+
     try:
-        return _sections_of_text(text)
+        return read(text)
+    except RefusedParameters as error:
+        raise UnreadableParameters(what, str(error)) from error
     except yaml.YAMLError as error:
-        raise UnreadableParameters(path, f"not YAML: {' '.join(str(error).split())}") from error
-
-
-@lru_cache(maxsize=256)
-def _sections_of_text(text: str) -> Mapping[str, Section]:
-    from enclave_launch.boundary.yaml_nodes import compose
-
-    document = compose(text)
-    sections: dict[str, dict[str, ParameterValue]] = {}
-    if document is not None:
-        _collect_sections(document, (), sections)
-    return sections
+        raise UnreadableParameters(what, f"not YAML: {' '.join(str(error).split())}") from error
 
 
 def _read_file(path: str) -> Mapping[str, Section]:
@@ -195,61 +170,3 @@ def _read_file(path: str) -> Mapping[str, Section]:
     except OSError as error:
         raise UnreadableParameters(path, str(error)) from error
     return _read_cached(os.path.abspath(path), status.st_mtime_ns, status.st_size)
-
-
-def _collect_sections(
-    node: Any, path: tuple[str, ...], sections: dict[str, dict[str, ParameterValue]]
-) -> None:
-    if node.id != "mapping":
-        return
-    for key, value in node.value:
-        if key.value == "ros__parameters":
-            _collect_parameters(value, "", sections.setdefault("/".join(path), {}))
-        else:
-            _collect_sections(value, (*path, key.value), sections)
-
-
-def _collect_parameters(node: Any, prefix: str, parameters: dict[str, ParameterValue]) -> None:
-    if node.id != "mapping":
-        return
-    for key, item in node.value:
-        name = f"{prefix}{key.value}"
-        if item.id == "mapping":
-            _collect_parameters(item, f"{name}.", parameters)
-        else:
-            value = _value(item)
-            if value is not None:
-                parameters[name] = value
-
-
-def _value(node: Any) -> ParameterValue | None:
-    if node is None or node.id == "mapping":
-        return None
-    if node.id == "scalar":
-        return str(node.value) if node.style else _scalar(node.value)  # a plain scalar has no style
-    items = [_value(item) for item in node.value]
-    if any(item is None or isinstance(item, tuple) for item in items):
-        return None
-    return tuple(items)  # type: ignore[arg-type]  # scalars only, checked above
-
-
-def _scalar(text: str) -> bool | int | float | str | None:
-    """A plain YAML scalar by rcl's rules, which are not YAML 1.1's. ``None`` for no value at all."""
-    if text in _BOOLEANS:
-        return _BOOLEANS[text]
-    if not text:
-        return None
-    if _INTEGER.fullmatch(text):
-        number = _strtoll(text.strip())
-        return number if -(2**63) <= number < 2**63 else float(number)
-    named = _NAMED_DOUBLE.fullmatch(text)
-    if named:
-        return float(named[1] + named[2])
-    return float(text) if _DOUBLE.fullmatch(text) else text
-
-
-def _strtoll(text: str) -> int:
-    digits = text.lstrip("+-")
-    base = 16 if digits[:2] in ("0x", "0X") else 8 if digits.startswith("0") else 10
-    number = int(digits, base)
-    return -number if text.startswith("-") else number

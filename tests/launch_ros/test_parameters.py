@@ -97,14 +97,71 @@ def test_scalars_by_rcls_rules(text: str, value: object) -> None:
     assert (found, type(found)) == (value, type(value))
 
 
-@pytest.mark.parametrize("text", ["", "{a: 1}", "[", "[[1]]", "a: b"])
-def test_what_rcl_refuses_has_no_value(text: str) -> None:
-    assert resolve_parameters(["n"], [ParameterRule("p", text)]).values == {}
+@pytest.mark.parametrize("text", ["", "{a: 1}", "[", "a: b", "*a", "[1, x]", "-", "---"])
+def test_a_rule_that_rcl_refuses_is_never_nothing(text: str) -> None:
+    found = resolve_parameters(["n"], [ParameterRule("p", text), ParameterRule("q", "1")])
+    ((what, why),) = found.unread
+    assert (found.values, what) == ({"q": 1}, f"-p p:={text}")
+    assert why
 
 
-@pytest.mark.parametrize("text", ["", "- 1", "a: [", "just text", "\x00", "/**: {ros__parameters: 3}"])
-def test_files_that_are_no_parameter_files(tmp_path: Path, text: str) -> None:
-    assert resolved(tmp_path, "--params-file a.yaml", a=text) == {}
+def test_a_rule_that_is_a_comment_gives_no_value() -> None:
+    assert resolve_parameters(["n"], [ParameterRule("p", "# nothing")]) == ({}, ())
+
+
+# What rcl_parse_yaml_file (jazzy) says of each, with what is left of the message of a refusal in our words.
+FILES: dict[str, object] = {
+    "": {},
+    "# a comment": {},
+    "just text": {},
+    "/**: {}": {},
+    "/**: {ros__parameters: {}}": {},
+    "/n: {ros__parameters: {a: 1}}\n---\n/n: {ros__parameters: {b: 2}}": {"a": 1, "b": 2},
+    "/n: {ros__parameters: {a: 1, a: x}}": {"a": 1},
+    "/n: {ros__parameters: {a: &x 1}}": {"a": 1},
+    "/n: {ros__parameters: {a: !!str 1, b: !!int x}}": {"a": "1", "b": "x"},
+    "/n:\n  ros__parameters:\n    a: >-\n      1": {"a": 1},
+    "/n: {ros__parameters: {a: 1e999, b: 1e-999, c: 0e9}}": {"a": "1e999", "b": "1e-999", "c": 0.0},
+    f"/n: {{ros__parameters: {{a: {'9' * 5000}}}}}": {"a": "9" * 5000},
+    "/n: {ros__parameters: {a: [{b: 1}]}}": {"a.b": (1,)},
+    "/n: {ros__parameters: {a: [1, {b: 2}]}}": {"a.b": (1, 2)},
+    "/n: {ros__parameters: {a: {b: 1}, a.b: 2}}": {"a.b": 2},
+    "/n: {ros__parameters: {a: 1}}\nb: {}": {"a": 1},
+    "- 1": "a list cannot be a key",
+    "---": "a key is empty",
+    "a: 1": "a value stands before ros__parameters",
+    "/**:": "a value stands before ros__parameters",
+    "/**: {ros__parameters: 3}": "a value stands before ros__parameters",
+    "/n: {ros__parameters: {a: 1}}\nb: {c: 2}": "a value stands before ros__parameters",
+    "a: [1]": "a value stands before ros__parameters",
+    "ros__parameters: {a: 1}": "no node is named before ros__parameters",
+    "/n: {ros__parameters: {a: }}": "a parameter has no value",
+    "/n: {ros__parameters: {a: [1, x]}}": "the items of a list must be of one type",
+    "/n: {ros__parameters: {a: [1, 2.0]}}": "the items of a list must be of one type",
+    "/n: {ros__parameters: {a: [1, {b: x}]}}": "the items of a list must be of one type",
+    "/n: {ros__parameters: {a: &x 1, b: *x}}": "rcl does not take aliases",
+    '/n: {ros__parameters: {"": 1}}': "a key is empty",
+    "/n: {ros__parameters: {? [a] : 1}}": "a list cannot be a key",
+    "? [a]\n: {ros__parameters: {a: 1}}": "a list cannot be a key",
+    "/n: {ros__parameters: {a: 1}, m: {ros__parameters: {b: 1}}}": "a parameter or a node must be named first",
+    "a b: {ros__parameters: {x: 1}}": "names no node",
+    "1n: {ros__parameters: {x: 1}}": "names no node",
+    "/: {ros__parameters: {x: 1}}": "names no node",
+    "//n: {ros__parameters: {x: 1}}": "names no node",
+    "/n*: {ros__parameters: {x: 1}}": "names no node",
+    "/a-b/n: {ros__parameters: {x: 1}}": "names no node",
+}
+
+
+@pytest.mark.parametrize("text", FILES, ids=lambda text: text[:60])
+def test_a_file_is_read_or_refused_as_by_rcl(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.yaml").write_text(text)
+    found = resolve_parameters(["n"], [ParameterFileArgument("a.yaml")], directory=str(tmp_path))
+    if isinstance(FILES[text], dict):
+        assert found == (FILES[text], ())
+    else:
+        ((_, why),) = found.unread
+        assert str(FILES[text]) in why and why.startswith("line ")
 
 
 @pytest.mark.parametrize("text", ["a: [", "\x00", None])

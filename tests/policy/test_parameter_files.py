@@ -88,6 +88,25 @@ def test_a_file_without_permission_to_substitute_stays_as_it_is(launch: Launch) 
     assert published(plan) == {"/plain"}
 
 
+@pytest.mark.parametrize("way", ["from", "substituted"])
+@pytest.mark.parametrize(
+    ("content", "refused"),
+    [
+        ("/**: {ros__parameters: {topic: t, l: [t, 1]}}", True),
+        ("/**: {ros__parameters: {topic: t, l: [t, u]}}", False),
+        ("topic: t", True),
+        ("{}", False),
+        ("/**: {ros__parameters: {topic: }}", True),
+    ],
+)
+def test_a_file_with_which_no_node_would_start_stops_a_secured_start(
+    content: str, refused: bool, way: str, launch: Launch
+) -> None:
+    substituted = ' allow_substs="true"' if way == "substituted" else ""
+    plan = launch(XML.format(f'<param from="DIR/q.yaml"{substituted}/>'), q=content)
+    assert [problem.code for problem in plan.problems] == [Code.PARAMETERS_UNKNOWN] * refused
+
+
 @pytest.mark.parametrize("content", ["topic: [", None])
 def test_a_file_that_cannot_be_read_stops_a_secured_start(
     content: str | None, launch: Launch, tmp_path: Path

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import os
 import pathlib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.parameters import yaml_text
@@ -32,7 +33,7 @@ class NodeParameters:
 
     def __init__(self, own: Parameters):
         self.__own = own
-        self.__written: dict[str, Mapping[str, Section]] = {}  # content of generated files
+        self.__written: dict[str, Callable[[], Mapping[str, Section]]] = {}  # content of generated files
 
     def write(self, context: LaunchContext, section: str) -> list[str]:
         """Words to append to the command line. ``section`` is the node's full name, or ``/**``."""
@@ -53,7 +54,7 @@ class NodeParameters:
         """A file of the user's, or one that was made from such a file by substitutions."""
         text = context.host.parameter_file(path)
         if text is not None:
-            self.__written[path] = parameters_of_text(text, path)
+            self.__written[path] = partial(parameters_of_text, text, path)
         elif not os.path.isfile(path):
             context.host.warn(parameter_file_missing(path))
             return ()
@@ -64,7 +65,7 @@ class NodeParameters:
         write = yaml_text.quoted_parameter_file if quoted else yaml_text.parameter_file
         path = context.host.write_parameter_file(write(section, values))
         read = _as_written if quoted else as_rcl_reads
-        self.__written[path] = {section: {name: read(value) for name, value in values.items()}}
+        self.__written[path] = lambda: {section: {name: read(value) for name, value in values.items()}}
         return path
 
     def resolve(
@@ -74,7 +75,10 @@ class NodeParameters:
         directory: str | None,
     ) -> ResolvedParameters:
         """What the node sees after rcl has merged everything on its command line."""
-        return resolve_parameters(name_tokens, sources, self.__written.get, directory)
+        written = self.__written
+        return resolve_parameters(
+            name_tokens, sources, lambda path: written[path]() if path in written else None, directory
+        )
 
     def written_files(self, context: LaunchContext) -> dict[str, str]:
         """Path to text of the files that were generated for this node."""

@@ -1,0 +1,284 @@
+"""Parameter files and values of ``-p`` as rcl reads them: libyaml's events in, sections of parameters out. Pure.
+
+rcl takes less than YAML has, and in places something else: several documents are one file; aliases are refused, so are
+a value before ``ros__parameters``, a parameter without a value, a list of two types. No node starts that is given what
+rcl refuses. Rules of ros2/rcl ``rcl_yaml_param_parser`` (``parse.c``, ``namespace.c``).
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import lru_cache
+
+import yaml
+
+from enclave_launch.boundary.yaml_nodes import EventParser, refuse_deep_nesting
+from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
+
+Section = Mapping[str, ParameterValue]
+
+_PARAMETERS_KEY = "ros__parameters"  # a key that begins so counts, too
+_TEXT_TAG = "tag:yaml.org,2002:str"
+_NAMESPACE_TOKEN = re.compile(r"\*{1,2}|[A-Za-z_][A-Za-z0-9_]{0,243}")
+_NODE_NAME = re.compile(r"\*{1,2}|[A-Za-z_][A-Za-z0-9_]{0,254}")
+
+
+class RefusedParameters(ValueError):
+    """What rcl's initialisation fails with, in our words and with the line."""
+
+
+@lru_cache(maxsize=256)
+def sections_of_text(text: str) -> Mapping[str, Section]:
+    """Parameters by section name, later ones over earlier ones.
+
+    Raises ``RefusedParameters``, and ``yaml.YAMLError`` for what is not YAML.
+    """
+    refuse_deep_nesting(text)
+    reader = _FileReader()
+    for event in yaml.parse(text, Loader=EventParser):
+        reader.take(event)
+    return reader.sections()
+
+
+def value_of_text(text: str) -> ParameterValue | None:
+    """The value of ``-p NAME:=text``; ``None`` for a comment alone. Raises as ``sections_of_text``."""
+    if not text:
+        raise RefusedParameters("there is no value")
+    values, reader = _Values(), _ValueReader()
+    for event in yaml.parse(text, Loader=EventParser):
+        if isinstance(event, (yaml.AliasEvent, yaml.MappingStartEvent)):
+            raise RefusedParameters("it must be a value or a list, not a mapping or an alias")
+        reader.take(event, values)
+    return values.first
+
+
+class _Values:
+    """What one parameter was given: a slot for each type, of which readers take the first."""
+
+    def __init__(self) -> None:
+        self._slots: dict[int, Scalar | list[Scalar]] = {}
+
+    @property
+    def first(self) -> ParameterValue | None:
+        if not self._slots:
+            return None
+        value = self._slots[min(self._slots)]
+        return tuple(value) if isinstance(value, list) else value
+
+    def put(self, value: Scalar) -> None:
+        self._slots[type_slot(value)] = value
+
+    def begin_list(self, items: list[Scalar]) -> None:
+        self._slots[type_slot(tuple(items))] = items
+
+    def append(self, item: Scalar) -> bool:
+        """False where this parameter has no list of that type."""
+        items = self._slots.get(type_slot((item,)))
+        if isinstance(items, list):
+            items.append(item)
+        return isinstance(items, list)
+
+
+class _ValueReader:
+    """Scalars and lists. A list within a list replaces what is there, as in rcl."""
+
+    def __init__(self) -> None:
+        self.in_list = False
+        self._type: type | None = None  # of the items so far
+
+    def take(self, event: yaml.Event, values: _Values) -> None:
+        if isinstance(event, yaml.SequenceStartEvent):
+            self.in_list, self._type = True, None
+        elif isinstance(event, yaml.SequenceEndEvent):
+            if self.in_list and self._type is None:
+                values.begin_list([])
+            self.in_list = False
+        elif isinstance(event, yaml.ScalarEvent):
+            value = _scalar_of(event)
+            if self.in_list:
+                self._take_item(value, values, event)
+            else:
+                values.put(value)
+
+    def _take_item(self, item: Scalar, values: _Values, event: yaml.Event) -> None:
+        if self._type is None:
+            self._type = type(item)
+            values.begin_list([item])
+        elif self._type is not type(item) or not values.append(item):
+            raise _refused(event, "the items of a list must be of one type")
+
+
+class _Path:
+    """Names joined by a separator, and how many were added. A name may hold the separator: it is given up in pieces."""
+
+    def __init__(self, separator: str) -> None:
+        self._separator = separator
+        self.text = ""
+        self.count = 0
+
+    def add(self, name: str) -> None:
+        joined = not self.count or self.text.endswith(self._separator)
+        self.text = (self.text if self.count else "") + ("" if joined else self._separator) + name
+        self.count += 1
+
+    def drop(self) -> None:
+        if self.count > 1:
+            before, found, _ = self.text.rpartition(self._separator)
+            self.text = before if found else self.text
+        self.count = max(0, self.count - 1)
+
+
+class _Section:
+    """The parameters of one section in their order."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+        self.values: list[_Values] = []
+        self._index: dict[str, int] = {}
+
+    def find(self, name: str) -> int:
+        """Where ``name`` stands; it is added where it does not."""
+        if name not in self._index:
+            self._index[name] = len(self.names)
+            self.names.append(name)
+            self.values.append(_Values())
+        return self._index[name]
+
+    def rename(self, at: int, name: str) -> None:
+        self._index.pop(self.names[at], None)
+        self.names[at] = name
+        self._index.setdefault(name, at)
+
+    def read(self) -> Section:
+        found = ((name, values.first) for name, values in zip(self.names, self.values, strict=True))
+        return {name: value for name, value in found if value is not None}
+
+
+class _FileReader:
+    """The events of one file, in their order. A key at the level of parameters is a group once a mapping follows it."""
+
+    def __init__(self) -> None:
+        self._sections: dict[str, _Section] = {}
+        self._section = _Section()  # in turn
+        self._at = 0  # the parameter that was named last
+        self._node, self._group = _Path("/"), _Path(".")
+        self._below_parameters_key = False
+        self._depth = 0
+        self._key_is_next = True
+        self._mapping_began = False
+        self._values = _ValueReader()
+
+    def sections(self) -> Mapping[str, Section]:
+        return {name: section.read() for name, section in self._sections.items()}
+
+    def take(self, event: yaml.Event) -> None:
+        """Raises ``RefusedParameters``."""
+        if isinstance(event, yaml.ScalarEvent):
+            (self._take_key if self._key_is_next else self._take_value)(event)
+        elif isinstance(event, yaml.SequenceStartEvent):
+            if self._key_is_next:
+                raise _refused(event, "a list cannot be a key")
+            if not self._below_parameters_key:
+                raise _too_early(event)
+            self._values.take(event, self._current)
+        elif isinstance(event, yaml.SequenceEndEvent):
+            self._values.take(event, self._current)
+            self._key_is_next = True
+        elif isinstance(event, yaml.MappingStartEvent):
+            self._begin_mapping()
+        elif isinstance(event, yaml.MappingEndEvent):
+            self._end_mapping()
+        elif isinstance(event, yaml.AliasEvent):
+            raise _refused(event, "rcl does not take aliases")
+
+    @property
+    def _current(self) -> _Values:
+        values = self._section.values
+        return values[self._at] if values else _Values()
+
+    def _begin_mapping(self) -> None:
+        self._depth += 1
+        self._key_is_next = True
+        of_parameters = self._below_parameters_key and self._depth == self._node.count + 3
+        self._mapping_began = not of_parameters
+
+    def _end_mapping(self) -> None:
+        if not self._below_parameters_key:
+            if self._depth == self._node.count + 1:
+                self._node.drop()
+        elif self._group.count:
+            self._group.drop()
+        else:
+            self._below_parameters_key = False
+        self._depth -= 1
+
+    def _take_key(self, event: yaml.ScalarEvent) -> None:
+        if not event.value:
+            raise _refused(event, "a key is empty")
+        if self._below_parameters_key:
+            self._name_parameter(event)
+        elif event.value.startswith(_PARAMETERS_KEY):
+            self._begin_section(event)
+        else:
+            self._node.add(event.value)
+        self._key_is_next = False
+
+    def _begin_section(self, event: yaml.ScalarEvent) -> None:
+        if not self._node.count:
+            raise _refused(event, f"no node is named before {_PARAMETERS_KEY}")
+        name = self._node.text
+        if why := _why_no_section(name):
+            raise _refused(event, f"{name!r} names no node: {why}")
+        self._section = self._sections.setdefault(name, _Section())
+        self._node.drop()
+        self._below_parameters_key = True
+
+    def _name_parameter(self, event: yaml.ScalarEvent) -> None:
+        if self._mapping_began:
+            if self._at >= len(self._section.names):
+                raise _refused(event, "a mapping stands where a parameter or a node must be named first")
+            self._group.text, self._group.count = self._section.names[self._at], self._group.count + 1
+            self._mapping_began = False
+        if not self._group.count:
+            self._at = self._section.find(event.value)
+            return
+        self._at = self._section.find(self._group.text)
+        self._section.rename(self._at, f"{self._group.text}.{event.value}")
+
+    def _take_value(self, event: yaml.ScalarEvent) -> None:
+        if not self._below_parameters_key or not self._section.names:
+            raise _too_early(event)
+        self._values.take(event, self._current)
+        self._key_is_next = not self._values.in_list
+
+
+def _scalar_of(event: yaml.ScalarEvent) -> Scalar:
+    quoted = event.style in ("'", '"')
+    if not quoted and not event.value:
+        raise _refused(event, "a parameter has no value")
+    if quoted or event.tag == _TEXT_TAG:
+        return str(event.value)
+    return plain_scalar(event.value)
+
+
+def _why_no_section(name: str) -> str:
+    """Empty where the name is one that rcl takes: tokens of a full name, or wildcards for them."""
+    if name.endswith("/"):
+        return "the name of the node is empty"
+    namespace, _, node = name.rpartition("/")
+    tokens = namespace.removeprefix("/").split("/") if namespace.strip("/") else []
+    if "//" in name:
+        return "it contains '//'"
+    if not _NODE_NAME.fullmatch(node) or not all(map(_NAMESPACE_TOKEN.fullmatch, tokens)):
+        return "a token is letters, digits and '_', without a digit in front, or '*' or '**'"
+    return ""
+
+
+def _too_early(event: yaml.Event) -> RefusedParameters:
+    return _refused(event, f"a value stands before {_PARAMETERS_KEY}")
+
+
+def _refused(event: yaml.Event, why: str) -> RefusedParameters:
+    line = event.start_mark.line + 1 if event.start_mark else "?"
+    return RefusedParameters(f"line {line}: {why}")
