@@ -23,16 +23,34 @@ class RefusedYaml(yaml.YAMLError):
     """Well-formed, but made to exhaust memory, time or the stack."""
 
 
-def compose(text: str | bytes, loader: Any = None) -> Any:
-    """The root node of the one document in ``text``; ``None`` when there is none.
+class _Untyped(SafeLoader):  # type: ignore[misc]
+    """Asks no rule of YAML 1.1 which type a value has, which would take as long as the reading itself."""
+
+    def resolve(self, kind: type, value: str, implicit: object) -> str:
+        return ""
+
+    def descend_resolver(self, node: object, index: object) -> None:
+        pass
+
+    def ascend_resolver(self) -> None:
+        pass
+
+
+def compose(text: str | bytes) -> Any:
+    """The root node of the one document in ``text``, its nodes without tags; ``None`` when there is none.
 
     Raises ``yaml.YAMLError``; ``RefusedYaml`` is one.
     """
     refuse_deep_nesting(text)
-    root = yaml.compose(text, Loader=loader or SafeLoader)
-    if root is not None:
+    root = yaml.compose(text, Loader=_Untyped)
+    if root is not None and may_have_aliases(text):
         refuse_many_aliases(root)
     return root
+
+
+def may_have_aliases(text: str | bytes) -> bool:
+    """Whether the marks of an anchor and of an alias are in ``text``."""
+    return ("&" in text and "*" in text) if isinstance(text, str) else (b"&" in text and b"*" in text)
 
 
 def refuse_deep_nesting(text: str | bytes) -> None:

@@ -37,9 +37,9 @@ _LEARNT = (  # class attributes that change when somebody teaches a loader or du
 _MAX_KEPT = 2**20  # characters of a text that is kept with its values
 
 # Text that both emitters write alike, folded lines included: printable ASCII without line breaks.
-_SIMPLE_TEXT = re.compile(r"[ -~]*", re.ASCII)
-_MAX_TEXT = 1_000
-_MAX_KEY = 100  # a key of 128 characters has a form of its own
+_is_simple_text = re.compile(r"[ -~]{0,1000}").fullmatch
+_is_simple_key = re.compile(r"[ -~]{1,100}").fullmatch  # a key of 128 characters has a form of its own
+_SCALARS = {bool, int, float, type(None)}
 _MAX_DEPTH = 10
 _OPTIONS = {bool, type(None)}  # types of what is said of the style
 
@@ -73,7 +73,8 @@ class _OnImport:
             run = spec.loader.exec_module
 
             def exec_module(module: ModuleType) -> None:
-                run(module)
+                with _large_pattern_compiled_when_used():
+                    run(module)
                 self._stack.enter_context(accelerated(module))
 
             spec.loader.exec_module = exec_module  # type: ignore[method-assign]
@@ -82,6 +83,34 @@ class _OnImport:
     def withdraw(self) -> None:
         if self in sys.meta_path:
             sys.meta_path.remove(self)
+
+
+@contextmanager
+def _large_pattern_compiled_when_used() -> Iterator[None]:
+    """The pattern of what may not stand in YAML names nearly all characters there are: to compile it takes a third of
+    PyYAML's import, and only the scanner in Python searches with it (``bench/resolve.py``)."""
+    compile_now = re.compile
+
+    def compile_later(pattern: Any, flags: Any = 0) -> Any:
+        large = isinstance(pattern, str) and pattern[-2:-1] == chr(sys.maxunicode)
+        return _Later(pattern) if large else compile_now(pattern, flags)
+
+    re.compile = compile_later
+    try:
+        yield
+    finally:
+        re.compile = compile_now
+
+
+class _Later:
+    """A pattern that is compiled when it is asked for anything."""
+
+    def __init__(self, text: str) -> None:
+        self._text = text
+
+    def __getattr__(self, name: str) -> Any:
+        found = vars(self)[name] = getattr(re.compile(vars(self)["_text"]), name)
+        return found
 
 
 @contextmanager
@@ -194,7 +223,19 @@ def _written(
     packed: bytes, write: Callable[..., str], dumper: Any, given: tuple[tuple[str, Any], ...]
 ) -> str:
     """The text of packed values; equal values are written once."""
-    return write(marshal.loads(packed), None, dumper, **dict(given))
+    text = write(marshal.loads(packed), None, dumper, **dict(given))
+    if len(_texts_written) == 64:
+        _texts_written.clear()
+    _texts_written.add(text)
+    return text
+
+
+_texts_written: set[str] = set()
+
+
+def was_written(text: str) -> bool:
+    """Whether ``text`` is just what ``yaml.dump`` wrote here, and therefore well-formed."""
+    return text in _texts_written
 
 
 def _plain_options(given: dict[str, Any]) -> bool:
@@ -203,20 +244,20 @@ def _plain_options(given: dict[str, Any]) -> bool:
 
 
 def _is_simple(value: Any, depth: int, inside: set[int]) -> bool:
-    """Plain values that both emitters write alike, nowhere shared and not too deep."""
-    kind = type(value)
-    if kind in (bool, int, float) or value is None:
-        return True
-    if kind is str:
-        return _is_simple_text(value, _MAX_TEXT)
-    if kind not in (list, dict) or depth > _MAX_DEPTH or id(value) in inside:
+    """A list or dict of plain values that both emitters write alike, nowhere shared and not too deep."""
+    if depth > _MAX_DEPTH or id(value) in inside:
         return False
     inside.add(id(value))
-    if kind is list:
-        return all(_is_simple(item, depth + 1, inside) for item in value)
-    keys = all(type(key) is str and key and _is_simple_text(key, _MAX_KEY) for key in value)
-    return keys and all(_is_simple(item, depth + 1, inside) for item in value.values())
-
-
-def _is_simple_text(text: str, limit: int) -> bool:
-    return len(text) <= limit and _SIMPLE_TEXT.fullmatch(text) is not None
+    if type(value) is dict:
+        for key in value:
+            if type(key) is not str or not _is_simple_key(key):
+                return False
+        value = value.values()
+    for item in value:
+        kind = type(item)
+        if kind is str:
+            if not _is_simple_text(item):
+                return False
+        elif kind not in _SCALARS and not (kind in (list, dict) and _is_simple(item, depth + 1, inside)):
+            return False
+    return True

@@ -17,6 +17,7 @@ from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.yaml_nodes import (
     RefusedYaml,
     SafeLoader,
+    may_have_aliases,
     refuse_deep_nesting,
     refuse_many_aliases,
 )
@@ -68,7 +69,7 @@ def _load(text: str, base: Any) -> YamlDocument:
         node = loader.get_single_node()
         if node is None:
             return YamlDocument(None, {})
-        if "*" in text and "&" in text:
+        if may_have_aliases(text):
             refuse_many_aliases(node)
         return YamlDocument(loader.construct_document(node), loader.lines)
     finally:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import subprocess
 import sys
 from collections.abc import Callable
@@ -96,6 +97,8 @@ def test_values_are_written_the_same(options: dict[str, Any], tree: Any) -> None
         if plainly[0] == "gives":
             assert yaml.dump(tree, into, **options) is None
             assert repr(into.getvalue()) == plainly[1]
+            if fast_yaml.was_written(into.getvalue()):
+                assert yaml.load(into.getvalue(), yaml.CSafeLoader) == tree
 
 
 def test_nesting_that_ends_the_stack_of_libyaml_is_pyyamls_error() -> None:
@@ -150,6 +153,28 @@ def test_a_later_import_gets_it_too() -> None:
     )
     run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert run.stdout.split("\n")[0] == "_Load function {'a': 1}"
+
+
+def test_what_may_not_stand_in_yaml_is_refused_though_its_pattern_is_compiled_late() -> None:
+    program = (
+        "from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files\n"
+        "with libyaml_for_launch_files():\n"
+        "    import re, yaml\n"
+        "compiled = isinstance(yaml.reader.Reader.NON_PRINTABLE, re.Pattern)\n"
+        "for text in ('a: 1 \\u00e9\\U0001f600', 'a: \\x01'):\n"
+        "    try:\n"
+        "        print(compiled, yaml.safe_load(text))\n"
+        "    except yaml.reader.ReaderError as error:\n"
+        "        print(str(error).splitlines()[0])\n"
+    )
+    run = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, check=True, encoding="utf-8",
+        env={**os.environ, "PYTHONIOENCODING": "utf-8"},
+    )  # fmt: skip
+    assert run.stdout.splitlines() == [
+        "False {'a': '1 é😀'}",
+        "unacceptable character #x0001: special characters are not allowed",
+    ]
 
 
 def test_parameter_files_of_nav2s_size_go_the_fast_way(tmp_path: Path) -> None:

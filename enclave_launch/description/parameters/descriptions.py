@@ -147,12 +147,14 @@ def _substituted(context: LaunchContext, path: Path) -> Path:
     import yaml
 
     from enclave_launch.description.parameters import yaml_text
+    from enclave_launch.frontend.fast_yaml import was_written
 
     if context.host.allow_missing_packages and not path.is_file():
         return path  # told where it is used
     text = perform_substitutions(context, parse_substitution(read_text(path)))
     try:
-        yaml_text.load_shared(text)
+        if not was_written(text):
+            yaml_text.load_shared(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
     return Path(context.host.write_parameter_file(text))
