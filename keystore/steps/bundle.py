@@ -17,9 +17,8 @@ from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import ExportedFile, archive_bytes, parents
-from keystore.disk.safe_files import resolve_root
 from keystore.disk.versions import write_new
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
 from keystore.formats.validity import utc_now
 from keystore.verification import Finding, Severity, verify
@@ -50,8 +49,7 @@ def export(
     for whatever ``verify`` calls an error of these enclaves or of the keystore, and for exposures unless they are
     accepted.
     """
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     names = matching(view.enclaves(), list(patterns))
     refuse_unfit(view, names, now or utc_now(), accept_exposures)
     _refuse_without_key(view, names)

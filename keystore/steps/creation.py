@@ -10,12 +10,12 @@ import os
 import shlex
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import timedelta
 from pathlib import Path
 
 from enclave_launch.boundary.dependencies import require
 from enclave_launch.boundary.files import read_bytes
-from keystore.disk import layout, lock, safe_files, store
+from keystore.disk import layout, safe_files, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.settings import KeystoreSettings
 from keystore.disk.store import Store
@@ -35,7 +35,7 @@ from keystore.signing.public_key import key_kind
 from keystore.signing.signer import FileSigner, open_signer
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
-from keystore.steps.opening import opened_for_change
+from keystore.steps.opening import ChangeOptions, opened_for_change
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +48,7 @@ class ImportedCa:
 
 
 @dataclass(frozen=True, slots=True)
-class CreateOptions:
+class CreateOptions(ChangeOptions):
     """``ca_lifetime``, ``lifetime`` (of enclaves) start at ``now``; ``names`` are the CAs' common names."""
 
     domains: Domains = field(default_factory=lambda: Domains.single(0))
@@ -62,10 +62,6 @@ class CreateOptions:
     imported: Mapping[Role, ImportedCa] = field(default_factory=dict)
     encrypt_ca_keys: bool = False
     """Encrypt new CA keys with ``access.passphrase``."""
-    access: CaAccess = field(default_factory=CaAccess)
-    lock_timeout: float = lock.DEFAULT_TIMEOUT
-    durable: bool = True
-    now: datetime | None = None
 
     @property
     def settings(self) -> KeystoreSettings:
@@ -93,7 +89,7 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
     refuse_unusable(chosen)
     store.create_root(root)
     now = chosen.now or utc_now()
-    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    with opened_for_change(root, now, chosen) as opened:
         return complete(opened, chosen)
 
 

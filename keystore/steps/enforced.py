@@ -10,7 +10,7 @@ from pathlib import Path
 
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.disk.zenoh_files import session_file, zenoh_enclaves
 from keystore.formats.permissions_names import add_dds_topics, ros_rules
 from keystore.formats.policy import Operation, Rule
@@ -38,8 +38,7 @@ def enforced(keystore: Path | str) -> dict[str, frozenset[Rule]]:
 
     Raises NotAKeystoreError, and InvalidInputError for a file that cannot be read.
     """
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     read = _read(view, layout.ZENOH_ROUTER)
     everybody = read.admitted.get(EVERYBODY, frozenset())
     return {

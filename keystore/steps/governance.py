@@ -5,16 +5,15 @@ It is signed again where its domains or signer changed; copies in enclaves are k
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
-from keystore.disk import layout, lock, safe_files
+from keystore.disk import layout, safe_files
 from keystore.disk.copies import refresh_copies
-from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import covers, governance_stands, signed_governance, trusted_document
 from keystore.disk.store import Store
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
@@ -23,7 +22,7 @@ from keystore.formats.validity import utc_now
 from keystore.signing.authority import Authority
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.smime import sign_document
-from keystore.steps.opening import opened_for_change
+from keystore.steps.opening import ChangeOptions, opened_for_change
 
 
 def mirror_governance(opened: Store) -> bool:
@@ -65,12 +64,8 @@ def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: dat
 
 
 @dataclass(frozen=True, slots=True)
-class GovernanceOptions:
-    """How ``set_governance`` signs, waits for the lock, and syncs to the disk."""
-
-    access: CaAccess = field(default_factory=CaAccess)
-    lock_timeout: float = lock.DEFAULT_TIMEOUT
-    durable: bool = True
+class GovernanceOptions(ChangeOptions):
+    """How ``set_governance`` signs."""
 
 
 def set_governance(
@@ -81,11 +76,10 @@ def set_governance(
     It must be deployed to all participants at once: those with different protection kinds do not talk.
     """
     chosen = options or GovernanceOptions()
-    root = resolve_root(keystore)
-    KeystoreView(root).require_complete()
+    root = complete_keystore(keystore).root
     document = governance_document(governance)
-    now = utc_now()
-    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    now = chosen.now or utc_now()
+    with opened_for_change(root, now, chosen) as opened:
         view = KeystoreView(root)
         changed = not _stands(view, document) or opened.register.governance != document
         if changed:

@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from keystore.disk import layout, lock, safe_files, store
+from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import ExportedFile, archive_bytes
 from keystore.disk.crl_file import crl_number, crl_validity
-from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.versions import write_new
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import InvalidInputError, StorageError, printable
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest
 from keystore.formats.certificate import read_certificate
@@ -27,26 +26,21 @@ from keystore.formats.hosts import Hosts, refuse_host_name
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
-from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
 from keystore.signing.records import permissions_record
 from keystore.signing.smime import sign_document
 from keystore.steps.bundle import matching, refuse_unfit
-from keystore.steps.opening import opened_for_change
+from keystore.steps.opening import ChangeOptions, opened_for_change
 
 SUFFIX = ".bundle"
 
 
 @dataclass(frozen=True, slots=True)
-class BundleOptions:
+class BundleOptions(ChangeOptions):
     """``accept_shared``: enclaves that live on several hosts, whose keys are then on all of them."""
 
     accept_exposures: bool = False
     accept_shared: bool = False
-    access: CaAccess = field(default_factory=CaAccess)
-    lock_timeout: float = lock.DEFAULT_TIMEOUT
-    durable: bool = True
-    now: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,16 +75,15 @@ def export_hosts(
     what ``verify`` calls an error of these enclaves, SigningUnavailableError without the permissions CA's key.
     """
     chosen = options or BundleOptions()
-    root, now = resolve_root(keystore), chosen.now or utc_now()
-    view = KeystoreView(root)
-    view.require_complete()
+    view = complete_keystore(keystore)
+    root, now = view.root, chosen.now or utc_now()
     names = {host: _enclaves_of(host, view, list(patterns)) for host, patterns in assigned.items()}
     if not chosen.accept_shared:
         _refuse_shared(names)
     refuse_unfit(
         view, sorted({one for listed in names.values() for one in listed}), now, chosen.accept_exposures
     )
-    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    with opened_for_change(root, now, chosen) as opened:
         return tuple(
             _export(opened, Path(output), host, listed, chosen, now) for host, listed in names.items()
         )

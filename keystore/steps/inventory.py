@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 from cryptography import x509
 
 from keystore.disk import layout, safe_files
-from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import signed_governance
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.domains import Domains
@@ -51,8 +50,7 @@ def inventory(keystore: Path | str) -> tuple[KeyEntry, ...]:
 
     Raises NotAKeystoreError and DamagedKeystoreError.
     """
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     return (*_authorities(view), *_enclaves(view))
 
 
@@ -119,8 +117,7 @@ class GovernanceFacts(NamedTuple):
 
 def governance_facts(keystore: Path | str) -> GovernanceFacts:
     """Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read."""
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
     return GovernanceFacts([_plain(rule) for rule in governance.domain_rules], tuple(weaknesses(governance)))
 
@@ -150,8 +147,7 @@ def granted(keystore: Path | str) -> dict[str, Granted]:
 
     Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read.
     """
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     found = {}
     for enclave in view.enclaves():
         place = f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.crl_file import crl_number, revoked_serials
@@ -22,16 +23,32 @@ from keystore.formats.der import DerError
 from keystore.formats.register import UNKNOWN, AuthorityState, IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
 from keystore.formats.subject import common_name
+from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
+
+if TYPE_CHECKING:
+    from keystore.steps.options import ProvisionOptions
+    from keystore.steps.zenoh_configuration import ZenohOptions
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChangeOptions:
+    """How a keystore is changed. ``lock_timeout``: seconds to wait for the lock. ``durable``: wait until it is on the
+    disk. ``now``: None for the clock's."""
+
+    access: CaAccess = field(default_factory=CaAccess)
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
+    durable: bool = True
+    now: datetime | None = None
 
 
 @contextmanager
 def opened_for_change(
-    root: Path, now: datetime, *, timeout: float = lock.DEFAULT_TIMEOUT, durable: bool = True
+    root: Path, now: datetime, options: ChangeOptions | ProvisionOptions | ZenohOptions
 ) -> Iterator[Store]:
     """As ``store.opened``; a complete keystore without a register gets one made from what stands in it."""
-    with store.opened(root, timeout=timeout, durable=durable) as opened:
+    with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
         if needs_register(KeystoreView(root)):
             take_over(opened, now)
         elif opened.has_register:

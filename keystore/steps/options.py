@@ -9,6 +9,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.named_tuple import NamedTuple
+from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
 from keystore.formats.subject import Half
@@ -22,8 +23,6 @@ if TYPE_CHECKING:
 
 Progress = Callable[[int, int], None]
 """Called with (enclaves done, enclaves to do)."""
-
-DEFAULT_LOCK_TIMEOUT = 30.0
 
 
 class ProvisionOptions(NamedTuple):
@@ -45,7 +44,7 @@ class ProvisionOptions(NamedTuple):
     rmw: str | None = None
     allow_subject_overlap: bool = False
     access: CaAccess = CaAccess()
-    lock_timeout: float = DEFAULT_LOCK_TIMEOUT
+    lock_timeout: float = DEFAULT_TIMEOUT
     durable: bool = True
     progress: Progress | None = None
     now: datetime | None = None

@@ -84,7 +84,7 @@ def _record_shares(opened: Store, wanted: Mapping[str, WantedEnclave]) -> None:
 def _locked(root: Path, options: ProvisionOptions, now: datetime) -> Iterator[Store]:
     if options.create:
         store.create_root(root)
-    with opened_for_change(root, now, timeout=options.lock_timeout, durable=options.durable) as opened:
+    with opened_for_change(root, now, options) as opened:
         yield opened
 
 

@@ -13,21 +13,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
-from keystore.disk import layout, lock
-from keystore.disk.safe_files import resolve_root
+from keystore.disk import layout
 from keystore.disk.store import Store
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
 from keystore.steps.crl import publish_crl, refuse_without_crl_sign, restore_crl, revocable, revoke
-from keystore.steps.opening import opened_for_change
+from keystore.steps.opening import ChangeOptions, opened_for_change
 from keystore.steps.zenoh_configuration import ZenohOptions, follow
 
 # The key first, so that nothing usable remains; the certificate last, so that a repeated run can revoke it.
@@ -39,14 +38,10 @@ _DELETE_ORDER = (
 
 
 @dataclass(frozen=True, slots=True)
-class RemoveOptions:
+class RemoveOptions(ChangeOptions):
     """``revoke`` False only deletes: copies of the enclave elsewhere stay valid until they expire."""
 
     revoke: bool = True
-    access: CaAccess = field(default_factory=CaAccess)
-    lock_timeout: float = lock.DEFAULT_TIMEOUT
-    durable: bool = True
-    now: datetime | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +66,8 @@ def remove(
     chosen = options or RemoveOptions()
     now = chosen.now or utc_now()
     wanted = sorted({validate_enclave_name(name) for name in names})
-    root = resolve_root(keystore)
-    KeystoreView(root).require_complete()
-    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    root = complete_keystore(keystore).root
+    with opened_for_change(root, now, chosen) as opened:
         view = KeystoreView(root)
         lost = {one.enclave for one in revocable(view, opened.register, wanted)}
         view.require_enclaves(set(wanted) - lost)

@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 import stat
 from collections.abc import Iterable
-from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -20,9 +19,8 @@ from keystore.disk import layout, safe_files
 from keystore.disk.authorities import describe, foreign_authorities
 from keystore.disk.copies import refresh_copies
 from keystore.disk.register_file import read_register
-from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.disk.zenoh_files import has_router, zenoh_enclaves
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
@@ -69,13 +67,13 @@ def renew(
     Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA keys.
     """
     chosen = options or RenewOptions()
-    root = resolve_root(keystore)
-    KeystoreView(root).require_complete()
+    view = complete_keystore(keystore)
+    root = view.root
     provisioning = chosen.provisioning._replace(create=False)
     now = provisioning.now or utc_now()
     named = None if enclaves is None else sorted({validate_enclave_name(name) for name in enclaves})
-    KeystoreView(root).require_enclaves(named or ())
-    with _opened(root, provisioning, now) as opened:
+    view.require_enclaves(named or ())
+    with opened_for_change(root, now, provisioning) as opened:
         install_incoming(opened)
         repaired = [*opened.notes, *_repair_keystore(opened, chosen, now)]
         repaired += restore_crl(opened, provisioning.access, now, chosen.within)
@@ -86,7 +84,7 @@ def renew(
     due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
     report = bring_about(root, wanted, with_domains(root, due))
     if chosen.revoke_old:
-        with _opened(root, provisioning, now) as opened:
+        with opened_for_change(root, now, provisioning) as opened:
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
             count = revoke_replaced(opened, changed, provisioning.access, now)
         repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
@@ -112,10 +110,6 @@ def _with_names_of_their_own(
     }
     again = bring_about(root, wanted, with_domains(root, options)) if wanted else None
     return report if again is None else again._replace(enclaves=(*report.enclaves, *again.enclaves))
-
-
-def _opened(root: Path, options: ProvisionOptions, now: datetime) -> AbstractContextManager[Store]:
-    return opened_for_change(root, now, timeout=options.lock_timeout, durable=options.durable)
 
 
 def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: RenewOptions) -> WantedEnclave:

@@ -11,9 +11,8 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout
-from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import PRIVATE_MODE, Batch, Content, Link
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.register import Register
@@ -49,13 +48,10 @@ def sign_requests(
     Raises InvalidInputError for an enclave that does not exist and a key that is another's, SigningUnavailableError.
     """
     chosen = options or SigningOptions()
-    root, listed = resolve_root(keystore), list(requests)
-    KeystoreView(root).require_complete()
+    root, listed = complete_keystore(keystore).root, list(requests)
     provisioning = chosen.provisioning
     now = provisioning.now or utc_now()
-    with opened_for_change(
-        root, now, timeout=provisioning.lock_timeout, durable=provisioning.durable
-    ) as opened:
+    with opened_for_change(root, now, provisioning) as opened:
         view = KeystoreView(root)
         for one in listed:
             _refuse_unfit(view, opened.register, one)
@@ -84,9 +80,8 @@ def accept_certificates(
     one that is not valid now; SigningUnavailableError without the permissions CA's key.
     """
     chosen = options or ProvisionOptions()
-    root, now = resolve_root(keystore), chosen.now or utc_now()
-    KeystoreView(root).require_complete()
-    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    root, now = complete_keystore(keystore).root, chosen.now or utc_now()
+    with opened_for_change(root, now, chosen) as opened:
         view = KeystoreView(root)
         by_key = {
             fingerprint(one.public_key): one for one in read_certificates(issued, "the issued certificates")

@@ -24,10 +24,9 @@ from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
 from keystore.disk.copies import refresh_copies
-from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import governance_stands
 from keystore.disk.store import Content, Store
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate, read_pem
 from keystore.formats.der import DerError
@@ -70,10 +69,9 @@ def roll_over(
     order.
     """
     chosen = (options or ProvisionOptions())._replace(create=False)
-    root = resolve_root(keystore)
-    KeystoreView(root).require_complete()
+    root = complete_keystore(keystore).root
     now = chosen.now or utc_now()
-    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    with opened_for_change(root, now, chosen) as opened:
         install_incoming(opened)
         for role in roles:
             _forget_installed(opened, role)

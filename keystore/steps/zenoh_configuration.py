@@ -16,10 +16,10 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
-from keystore.disk import layout, safe_files
+from keystore.disk import layout, lock, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import PRIVATE_MODE, PUBLIC_MODE, Store
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.disk.zenoh_files import (
     RouterFile,
     has_router,
@@ -42,7 +42,7 @@ from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half
 from keystore.signing.records import certificate_record
 from keystore.steps.opening import opened_for_change
-from keystore.steps.options import DEFAULT_LOCK_TIMEOUT, ProvisionOptions
+from keystore.steps.options import ProvisionOptions
 
 
 class ZenohOptions(NamedTuple):
@@ -50,7 +50,7 @@ class ZenohOptions(NamedTuple):
 
     router: str | None = None
     access: CaAccess = CaAccess()
-    lock_timeout: float = DEFAULT_LOCK_TIMEOUT
+    lock_timeout: float = lock.DEFAULT_TIMEOUT
     durable: bool = True
     renew_within: timedelta = timedelta(0)
     now: datetime | None = None
@@ -77,25 +77,22 @@ def write_zenoh(
     Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA key.
     """
     chosen = options or ZenohOptions()
-    root = resolve_root(keystore)
-    view = KeystoreView(root)
-    view.require_complete()
+    view = complete_keystore(keystore)
     asked = set(enclaves)
     view.require_enclaves(asked)
     names = sorted({*asked, *zenoh_enclaves(view)})
     address = _address(view, chosen)
     if (found := _as_wanted(view, names, address, chosen)) is not None:
-        return ZenohReport(root, address, (), found.served, found.gaps, restart=False)
+        return ZenohReport(view.root, address, (), found.served, found.gaps, restart=False)
     now = chosen.now or utc_now()
-    with opened_for_change(root, now, timeout=chosen.lock_timeout, durable=chosen.durable) as opened:
+    with opened_for_change(view.root, now, chosen) as opened:
         return _write(opened, names, address, chosen, now)
 
 
 def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> list[str]:
     """Those that match one of ``patterns`` (``/robot1/*``); without patterns all, but none more where some are on Zenoh
     already. Raises InvalidInputError for a pattern that none matches."""
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     names = view.enclaves()
     if patterns is None:
         return [] if has_router(view) else names

@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.register_file import read_register
-from keystore.disk.safe_files import resolve_root
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.disk.zenoh_files import present_address, router_file, zenoh_enclaves
 from keystore.errors import KeystoreError
 from keystore.formats.certificate import read_certificate
@@ -50,8 +49,7 @@ class RouterLogExplainer:
     """Explains a log line by line, each refusal once. ``keystore``: of the router that writes it."""
 
     def __init__(self, keystore: Path | str) -> None:
-        self._view = KeystoreView(resolve_root(keystore))
-        self._view.require_complete()
+        self._view = complete_keystore(keystore)
         self._log = RouterLog()
         self._told: set[tuple[str, ...]] = set()
         self._enclaves = dict(_names(self._view))

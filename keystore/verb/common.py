@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.boundary.progress import ProgressBar, wanted
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.boundary.words import counted
+from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import DEFAULT_BACKDATE, parse_duration, parse_end, utc_now
 
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from keystore.formats.domains import Domains
     from keystore.signing.ca_access import CaAccess
     from keystore.steps.options import ProvisionOptions, ProvisionReport
-
-DEFAULT_LOCK_TIMEOUT = 30.0
 
 
 def add_keystore(parser: argparse.ArgumentParser) -> None:
@@ -52,7 +51,7 @@ def add_signing(parser: argparse.ArgumentParser) -> None:
 def add_lock(parser: argparse.ArgumentParser) -> None:
     """How long to wait for others that change the keystore."""
     parser.add_argument(
-        "--lock-timeout", metavar="SECONDS", type=_seconds, default=DEFAULT_LOCK_TIMEOUT,
+        "--lock-timeout", metavar="SECONDS", type=_seconds, default=DEFAULT_TIMEOUT,
         help="how long to wait for another run (30)",
     )  # fmt: skip
 

@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout
 from keystore.disk.crl_file import revoked_serials
-from keystore.disk.safe_files import resolve_root
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import KeystoreError, StorageError
 from keystore.formats.governance import Governance
 from keystore.formats.validity import utc_now
@@ -59,8 +58,7 @@ def verify(
     required: Requirements | None = None,
 ) -> VerifyReport:
     """Check everything; raises NotAKeystoreError only when there is nothing to check."""
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     order = list(Severity)
     try:
         found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))

@@ -12,8 +12,7 @@ from itertools import islice
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.disk.safe_files import resolve_root
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.disk.zenoh_files import (
     has_router,
     identity_problem,
@@ -36,8 +35,7 @@ _TOLD = 40
 
 def check_zenoh_files(keystore: Path | str, now: datetime) -> tuple[Finding, ...]:
     """``check_zenoh`` by itself. Raises NotAKeystoreError where there is nothing to check."""
-    view = KeystoreView(resolve_root(keystore))
-    view.require_complete()
+    view = complete_keystore(keystore)
     return tuple(check_zenoh(view, now))
 
 
