@@ -44,6 +44,13 @@ class XmlElement:
     def __len__(self) -> int:
         return len(self.children)
 
+    def iter(self, tag: str = "") -> Iterator[XmlElement]:
+        """Itself and all elements in it, in the order of the text; with ``tag`` those alone."""
+        if tag in ("", self.tag):
+            yield self
+        for child in self.children:
+            yield from child.iter(tag)
+
     def get(self, name: str, default: str = "") -> str:
         """The value of an attribute."""
         return self.attrib.get(name, default)

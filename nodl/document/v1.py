@@ -11,7 +11,6 @@ from collections.abc import Iterable
 
 from enclave_launch.boundary.xml_tree import XmlElement
 from nodl.document.manifest_node import ManifestNode
-from nodl.document.xml_text import parse_xml
 from nodl.errors import (
     InvalidElementError,
     InvalidNodeChildError,
@@ -29,6 +28,7 @@ from nodl.names import (
 )
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 from nodl.source_ref import SourceRef
+from nodl.xml_text import parse_xml
 
 VERSION = 1
 

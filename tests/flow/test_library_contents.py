@@ -98,6 +98,10 @@ def test_a_behavior_tree_says_what_bt_navigator_calls(launch: Launch, tmp_path: 
     assert allowed(plan, "call_actions") == ["/navigate_to_pose", "/turn"] and not plan.problems
     tree.write_text(TREE.format("turn", "<MyNode/>"))
     assert "node 'MyNode' of the behavior tree uses is not known" in problems(launch(node))
+    tree.write_text("<root>\n</tree>")
+    assert f"the behavior tree cannot be read: {tree}:2: not well-formed XML: mismatched tag" in problems(
+        launch(node)
+    )
 
 
 TWIST_MUX = '<node pkg="twist_mux" exec="twist_mux" name="twist_mux"><param from="{}"/></node>'

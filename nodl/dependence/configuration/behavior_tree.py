@@ -7,15 +7,17 @@ tables is a gap unless it belongs to BehaviorTree.CPP itself.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from xml.etree import ElementTree
 
+from enclave_launch.boundary.files import read_bytes
+from enclave_launch.boundary.xml_tree import XmlElement
 from nodl.dependence.configuration import Configured
+from nodl.errors import InvalidXMLError
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, shown, validate_written_name
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
+from nodl.xml_text import parse_xml
 
 _MAX_BYTES = 1_000_000
 
@@ -86,10 +88,8 @@ def of_tree(file: str) -> Configured:
     """What the tree in ``file`` uses."""
     place = SourceRef(file)
     try:
-        if os.path.getsize(file) > _MAX_BYTES:
-            return Configured(gaps=(Gap(place, "the behavior tree is too large to be read"),))
-        root = ElementTree.parse(file).getroot()
-    except (OSError, ElementTree.ParseError) as error:
+        root = parse_xml(read_bytes(file, _MAX_BYTES), file)
+    except (OSError, InvalidXMLError) as error:
         return Configured(gaps=(Gap(place, f"the behavior tree cannot be read: {error}"),))
     found = list(dict.fromkeys(_used(root, place)))
     return Configured(
@@ -98,27 +98,21 @@ def of_tree(file: str) -> Configured:
     )
 
 
-def _used(root: ElementTree.Element, place: SourceRef) -> Iterator[Endpoint | Gap]:
-    models = {child for model in root.iter("TreeNodesModel") for child in model.iter()}
+def _used(root: XmlElement, place: SourceRef) -> Iterator[Endpoint | Gap]:
+    models = {part for model in root.iter("TreeNodesModel") for part in model.iter()}
     for element in root.iter():
         if element not in models:
             yield from _of_node(element, place)
 
 
-def _of_node(element: ElementTree.Element, place: SourceRef) -> Iterator[Endpoint | Gap]:
-    tag = (
-        element.get("ID", element.tag)
-        if element.tag in ("Action", "Condition", "Decorator", "Control")
-        else element.tag
-    )
+def _of_node(element: XmlElement, place: SourceRef) -> Iterator[Endpoint | Gap]:
+    tag = element.get("ID", element.tag) if element.tag in _MODELS else element.tag
     if tag in _ACTIONS or tag in _CANCELS:
         name, type_name = _ACTIONS[_CANCELS.get(tag, tag)]
         chosen = element.get("server_name") or name
         yield _named(EndpointKind.ACTION_CLIENT, chosen, f"nav2_msgs/action/{type_name}", tag, place)
     elif tag in _SERVICES:
-        yield _named(
-            EndpointKind.SERVICE_CLIENT, element.get("service_name") or "", _SERVICES[tag], tag, place
-        )
+        yield _named(EndpointKind.SERVICE_CLIENT, element.get("service_name"), _SERVICES[tag], tag, place)
     elif tag in _TOPICS:
         port, default, type_name = _TOPICS[tag]
         yield _named(EndpointKind.SUBSCRIPTION, element.get(port) or default, type_name, tag, place)
@@ -127,7 +121,7 @@ def _of_node(element: ElementTree.Element, place: SourceRef) -> Iterator[Endpoin
     elif tag == "GoalUpdater":
         yield Gap(place, "the topics of the node GoalUpdater are parameters that are not looked at")
     elif tag not in _SILENT:
-        yield Gap(place, f"what the node {shown(str(tag))} of the behavior tree uses is not known")
+        yield Gap(place, f"what the node {shown(tag)} of the behavior tree uses is not known")
 
 
 def _named(kind: EndpointKind, name: str, type_name: str, tag: str, place: SourceRef) -> Endpoint | Gap:

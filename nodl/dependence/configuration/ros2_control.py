@@ -6,11 +6,11 @@ small letters, ``/`` as ``_``.
 
 from __future__ import annotations
 
-from xml.etree import ElementTree
-
 from nodl.dependence.configuration import Configured
+from nodl.errors import InvalidXMLError
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
+from nodl.xml_text import parse_xml
 
 
 def of_robot_description(text: str, place: SourceRef) -> Configured:
@@ -21,9 +21,9 @@ def of_robot_description(text: str, place: SourceRef) -> Configured:
         )
         return Configured(gaps=(Gap(place, why),))
     try:
-        root = ElementTree.fromstring(text)
-    except (ElementTree.ParseError, ValueError) as error:
+        root = parse_xml(text, "robot_description")
+    except InvalidXMLError as error:
         why = f"the robot_description, which names the nodes of the hardware components, cannot be read: {error}"
         return Configured(gaps=(Gap(place, why),))
-    names = (element.get("name", "").lower().replace("/", "_") for element in root.iter("ros2_control"))
+    names = (element.get("name").lower().replace("/", "_") for element in root.iter("ros2_control"))
     return Configured(nodes=tuple(dict.fromkeys(name for name in names if name)))

@@ -1,4 +1,4 @@
-"""XML text -> elements with line numbers and their text. Pure; for NoDL v1.
+"""XML text -> elements with line numbers and their text. Pure; for NoDL v1, robot descriptions and behavior trees.
 
 Nothing outside the document is ever read, and nothing in it can grow: a DOCTYPE, where entities would be
 declared, is refused.
@@ -16,8 +16,8 @@ from nodl.source_ref import SourceRef
 MAX_BYTES = 4_000_000
 
 
-def parse_xml(text: bytes, file: str) -> XmlElement:
-    """Bytes -> root element. Raises ``InvalidXMLError`` with file:line."""
+def parse_xml(text: bytes | str, file: str) -> XmlElement:
+    """Text, or bytes in the encoding that they declare -> root element. Raises ``InvalidXMLError`` with file:line."""
     if len(text) > MAX_BYTES:
         raise InvalidXMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
     parser = expat.ParserCreate(namespace_separator="}")
