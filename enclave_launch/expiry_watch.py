@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.boundary.words import counted, some_of
-from enclave_launch.runtime.deadline import Deadline
+from enclave_launch.runtime.run_options import Deadline
 from keystore.errors import KeystoreError
 from keystore.formats.validity import utc_now
 from keystore.steps.expiry import expires_soon

@@ -21,7 +21,7 @@ from keystore.errors import KeystoreError
 
 if TYPE_CHECKING:
     from enclave_launch.runtime.companion import LaunchCompanion
-    from enclave_launch.runtime.deadline import Deadline
+    from enclave_launch.runtime.run_options import Deadline
     from keystore.formats.policy_xml import PolicyDocument
     from keystore.steps.options import ProvisionOptions
 

@@ -12,9 +12,15 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from enclave_launch.admission import AdmissionOptions
-from enclave_launch.admission.handshakes import EnclaveProcess, Pair, mixed_pairs
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
-from enclave_launch.admission.middleware import ZENOH, middleware_of, vendor_of
+from enclave_launch.admission.middleware import (
+    ZENOH,
+    EnclaveProcess,
+    Pair,
+    middleware_of,
+    mixed_pairs,
+    vendor_of,
+)
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import (
     Diagnostic,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from enclave_launch.admission.handshakes import failing
+from enclave_launch.admission.middleware import failing
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.admission import domains_shared, handshake_fails
 from enclave_launch.diagnostics.enclaves import (

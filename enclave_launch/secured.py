@@ -13,8 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.admission.handshakes import failing
-from enclave_launch.admission.middleware import ZENOH, middleware_of
+from enclave_launch.admission.middleware import ZENOH, failing, middleware_of
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.admission import handshake_fails
 from enclave_launch.diagnostics.enclaves import enclave_of_several_launches

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
-from enclave_launch.admission.domains import covers, domain_of
+from enclave_launch.admission.domains import domain_of
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.admission import domain_not_served
 from enclave_launch.errors import ManifestError
@@ -43,7 +43,7 @@ def with_domains(
 def not_served(plan: LaunchPlan, domains: Domains) -> Iterator[Diagnostic]:
     """Each process with an enclave whose domain is not among ``domains``."""
     for item in plan.processes:
-        if item.enclave is not None and not covers(domains, item.domain):
+        if item.enclave is not None and not domains.covers(Domains.single(item.domain)):
             process = item.process
             yield domain_not_served(process.process_name, item.domain, str(domains), process.location)
 
@@ -53,7 +53,7 @@ def places(plan: LaunchPlan, domains: Domains) -> str:
     asking = (
         f"{item.process.process_name} at {item.process.location} is in domain {item.domain}"
         for item in plan.processes
-        if item.enclave is not None and covers(domains, item.domain)
+        if item.enclave is not None and domains.covers(Domains.single(item.domain))
     )
     return "; ".join(asking)
 

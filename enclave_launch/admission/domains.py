@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from enclave_launch.errors import UsageError
 from keystore.errors import printable
-from keystore.formats.domains import HIGHEST_ID, Domains
+from keystore.formats.domains import HIGHEST_ID
 
 DOMAIN = "ROS_DOMAIN_ID"
 
@@ -21,8 +21,3 @@ def domain_of(environment: Mapping[str, str]) -> int:
     if re.fullmatch("[0-9]{1,3}", text) is None or int(text) > HIGHEST_ID:
         raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
     return int(text)
-
-
-def covers(domains: Domains, domain: int) -> bool:
-    """Whether ``domain`` is in one of the ranges."""
-    return any(first <= domain <= last for first, last in domains.ranges)

@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NoReturn
 
 from enclave_launch.boundary.dependencies import missing_dependency
-from enclave_launch.boundary.suggestion import did_you_mean
+from enclave_launch.boundary.words import did_you_mean
 
 _INVALID_CHOICE = re.compile(r"^(.*invalid choice: '([^']*)') \(choose from .*\)$", re.DOTALL)
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from enclave_launch.boundary.suggestion import did_you_mean
 from enclave_launch.boundary.terminal import quoted
+from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 

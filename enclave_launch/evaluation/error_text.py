@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import cast
 
 from enclave_launch.boundary.dependencies import missing_dependency
-from enclave_launch.boundary.suggestion import did_you_mean
+from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.description.conditions import InvalidConditionExpressionError
 from enclave_launch.description.markup.expose import action_parse_methods, substitution_parse_methods

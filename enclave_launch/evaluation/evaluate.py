@@ -171,7 +171,7 @@ def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
 
 def _unknown_arguments(arguments: Arguments, looked_at: Collection[str]) -> Iterator[Diagnostic]:
     """``ros2 launch`` passes over a mistyped argument without a word."""
-    from enclave_launch.boundary.suggestion import did_you_mean
+    from enclave_launch.boundary.words import did_you_mean
     from enclave_launch.diagnostics.evaluation import argument_unknown
 
     for name, _ in arguments:

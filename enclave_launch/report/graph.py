@@ -201,3 +201,14 @@ def _channels(reasons: Mapping[_Key, list[UseReason]]) -> tuple[Channel, ...]:
             reason.type for reason in why if reason.type
         )
     return tuple(sorted(Channel(kind, name, tuple(sorted(found))) for (kind, name), found in types.items()))
+
+
+def evidence_text(reason: UseReason) -> str:
+    """``talker.nodl.xml:4; written chatter; remapped by chatter:=conversation at f.launch.xml:7``."""
+    parts = [reason.place]
+    if reason.written:
+        parts.append(f"written {reason.written}")
+    parts += [f"remapped by {rule}" for rule in reason.remapped_by]
+    if reason.note:
+        parts.append(reason.note)
+    return "; ".join(parts)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from enclave_launch.deployment.placement import Placement, flows_between_hosts, in_restart_order
 from enclave_launch.deployment.yaml_text import yaml_text
-from enclave_launch.report.flows import step_text
+from enclave_launch.report.review_text import step_text
 from enclave_launch.review.information_flow import FlowGraph
 
 

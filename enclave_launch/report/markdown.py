@@ -11,9 +11,8 @@ from collections.abc import Iterable, Iterator
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.diagrams import mermaid
-from enclave_launch.report.flows import step_text
-from enclave_launch.report.graph import ChannelUse, EnclaveGraph
-from enclave_launch.report.reasons import evidence_text
+from enclave_launch.report.graph import ChannelUse, EnclaveGraph, evidence_text
+from enclave_launch.report.review_text import step_text
 
 _SPECIAL = re.compile(r"([\\`*_{}\[\]<>#|~&])")
 MOST_DRAWN = 60

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from types import MappingProxyType
 from typing import NamedTuple, TextIO
 
 from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.runtime.companion import LaunchCompanion
-from enclave_launch.runtime.deadline import Deadline
 
 
 class RunOptions(NamedTuple):
@@ -34,3 +34,14 @@ class RunOptions(NamedTuple):
     companion: LaunchCompanion | None = None
     host_options: HostOptions = HostOptions()
     outcomes: Outcomes | None = None
+
+
+class Deadline:
+    """A moment at which a launch is ended in order, to be started anew by whoever set it.
+
+    ``reached`` once the launch was ended because of it, and for nothing else."""
+
+    def __init__(self, at: datetime, reason: str) -> None:
+        self.at = at
+        self.reason = reason
+        self.reached = False

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
 from enclave_launch.boundary.short_paths import short_paths
-from enclave_launch.boundary.suggestion import did_you_mean
 from enclave_launch.boundary.terminal import (
     printable,
     safe_output,
@@ -20,6 +19,7 @@ from enclave_launch.boundary.terminal import (
     warn,
     write_coloured,
 )
+from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.verb.options import build_parser
 from enclave_launch.verb.usage import (
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from enclave_launch.options import ResolveOptions, RunSettings
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.runtime.companion import LaunchCompanion
-    from enclave_launch.runtime.deadline import Deadline
+    from enclave_launch.runtime.run_options import Deadline
     from enclave_launch.secured import ProvisionedLaunch
     from enclave_launch.verb.target import LaunchTarget
 

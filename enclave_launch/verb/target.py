@@ -10,7 +10,7 @@ import os
 from collections.abc import Sequence
 
 from enclave_launch.boundary.named_tuple import NamedTuple
-from enclave_launch.boundary.suggestion import did_you_mean
+from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.errors import UsageError
 from enclave_launch.evaluation import evaluate
 from nodl import ament_index

@@ -49,14 +49,7 @@ def governance_stands(view: KeystoreView, domains: Domains | None, register: Reg
         return False
     if register is not None and register.governance and signed.document != register.governance:
         return False
-    return domains is None or covers(_listed_domains(signed, view), domains)
-
-
-def covers(outer: Domains, inner: Domains) -> bool:
-    """Whether ``outer`` has every domain of ``inner``."""
-    return all(
-        any(low <= first and last <= high for low, high in outer.ranges) for first, last in inner.ranges
-    )
+    return domains is None or _listed_domains(signed, view).covers(domains)
 
 
 def trusted_document(view: KeystoreView, relative: str) -> bytes:

@@ -60,6 +60,12 @@ class Domains(_Ranges):
             ranges.append((int(match[1]), int(match[2] or match[1])))
         return cls(tuple(ranges))
 
+    def covers(self, other: Domains) -> bool:
+        """Whether every domain of ``other`` is among these."""
+        return all(
+            any(low <= first and last <= high for low, high in self.ranges) for first, last in other.ranges
+        )
+
     def __str__(self) -> str:
         return ",".join(_text(first, last) for first, last in self.ranges)
 

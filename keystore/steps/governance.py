@@ -11,7 +11,7 @@ from pathlib import Path
 
 from keystore.disk import layout, safe_files
 from keystore.disk.copies import refresh_copies
-from keystore.disk.signed_documents import covers, governance_stands, signed_governance, trusted_document
+from keystore.disk.signed_documents import governance_stands, signed_governance, trusted_document
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, complete_keystore
 from keystore.errors import DamagedKeystoreError, printable
@@ -57,7 +57,7 @@ def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: dat
         return False
     document = opened.register.governance or trusted_document(view, layout.GOVERNANCE)
     governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
-    if not covers(governance.domains(), domains):
+    if not governance.domains().covers(domains):
         document = governance_document(governance.extended_to(domains))
     write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
     return True

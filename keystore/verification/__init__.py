@@ -21,11 +21,10 @@ from keystore.signing.ca_access import CaAccess
 from keystore.verification import repair
 from keystore.verification.authorities import check_authorities
 from keystore.verification.enclaves import check_enclaves
-from keystore.verification.files import check_files
+from keystore.verification.files import check_files, check_parents
 from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
 from keystore.verification.issued import check_anchors, check_published, load_register
-from keystore.verification.surroundings import check_parents
 from keystore.verification.zenoh import check_zenoh
 
 

@@ -15,8 +15,8 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
 from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.role import Role
+from keystore.verification.files import check_parents
 from keystore.verification.governance import weaknesses
-from keystore.verification.surroundings import check_parents
 
 
 def exposures(view: KeystoreView) -> Iterator[str]:

@@ -9,8 +9,7 @@ import pytest
 from cryptography import x509
 
 from enclave_launch import provision
-from enclave_launch.admission.handshakes import EnclaveProcess, Pair, failing, halves, mixed_pairs
-from enclave_launch.admission.middleware import Vendor
+from enclave_launch.admission.middleware import EnclaveProcess, Pair, Vendor, failing, halves, mixed_pairs
 from enclave_launch.diagnostics import Code
 from keystore.formats.subject import Half, common_name, guid_prefix, half_of
 from keystore.verification import verify

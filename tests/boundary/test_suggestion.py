@@ -3,7 +3,7 @@
 import pytest
 
 from enclave_launch.boundary.command_line import CommandParser
-from enclave_launch.boundary.suggestion import did_you_mean
+from enclave_launch.boundary.words import did_you_mean
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,6 @@ import re
 
 import pytest
 
-from keystore.disk.signed_documents import covers
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
@@ -108,4 +107,4 @@ def test_domain_lists_that_are_refused(text: str) -> None:
 def test_domains_as_text_and_what_they_cover() -> None:
     domains = Domains.parse("9,0-3")
     assert str(domains) == "0-3,9"
-    assert covers(domains, Domains.parse("1-2,9")) and not covers(domains, Domains.single(5))
+    assert domains.covers(Domains.parse("1-2,9")) and not domains.covers(Domains.single(5))

@@ -9,8 +9,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.verb.secure_plan import main
-from keystore.steps.enforced import enforced
-from keystore.steps.inventory import granted
+from keystore.steps.inventory import enforced, granted
 from tests.review.test_against_a_keystore import found, make, words
 
 LAUNCH = "services_actions.launch.xml"

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from enclave_launch.boundary.terminal import printable
-from enclave_launch.report.graph import EnclaveGraph
-from enclave_launch.report.reasons import evidence_text
+from enclave_launch.report.graph import EnclaveGraph, evidence_text
 
 
 class Row(NamedTuple):

@@ -8,8 +8,7 @@ from __future__ import annotations
 from typing import Any
 
 from enclave_launch.boundary.terminal import printable
-from enclave_launch.report.graph import OUTWARD, ChannelUse, EnclaveGraph
-from enclave_launch.report.reasons import evidence_text
+from enclave_launch.report.graph import OUTWARD, ChannelUse, EnclaveGraph, evidence_text
 
 
 def graph_data(graph: EnclaveGraph) -> dict[str, Any]:

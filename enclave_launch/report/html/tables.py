@@ -6,10 +6,9 @@ from collections.abc import Iterable, Iterator
 
 from enclave_launch.boundary.words import counted
 from enclave_launch.report.contents import Influence, ReportContents
-from enclave_launch.report.flows import step_text
-from enclave_launch.report.graph import ChannelUse, EnclaveGraph
+from enclave_launch.report.graph import ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.html.markup import row, table, text
-from enclave_launch.report.reasons import evidence_text
+from enclave_launch.report.review_text import step_text
 from enclave_launch.review.checks.keystore import Ending
 from enclave_launch.review.document import Told
 

@@ -106,7 +106,7 @@ def _files(options: argparse.Namespace) -> tuple[FileChange, ...]:
         return ()
     from enclave_launch.review.changes import FileChange
     from enclave_launch.verb.secure_plan.keystores import keystore_errors
-    from keystore.steps.enforced import files_changed
+    from keystore.steps.inventory import files_changed
 
     with keystore_errors():
         found = files_changed(options.before, options.words[0])

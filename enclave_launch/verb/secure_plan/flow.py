@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Print who can influence whom. Returns 0."""
-    from enclave_launch.report.flows import paths_text, reach_text
+    from enclave_launch.report.review_text import paths_text, reach_text
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.review.information_flow import flow_graph, shortest_paths
 

@@ -41,7 +41,7 @@ def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
 def enforced_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
     """Enclave -> what the configuration of the keystore's Zenoh router allows; empty without one."""
     from enclave_launch.review.signed import grants_of_rules
-    from keystore.steps.enforced import enforced
+    from keystore.steps.inventory import enforced
 
     with keystore_errors():
         return {enclave: grants_of_rules(rules) for enclave, rules in enforced(keystore).items()}
