@@ -234,9 +234,7 @@ class ProcessTree:
         """
         loop = asyncio.get_running_loop()
         argv, environment, cwd = spec.encoded()
-        stdin, stdin_ours = os.pipe()
-        os.set_blocking(stdin_ours, False)
-        opened = [_open_output(spec.emulate_tty) for _ in range(2)]
+        stdin, stdin_ours, opened = _open_streams(spec.emulate_tty)
         names: tuple[Stream, Stream] = ("stdout", "stderr")
         pumps = tuple(
             OutputPump(ours, partial(on_output, name), loop, waits_for.get(name, frozenset()))
@@ -317,6 +315,22 @@ class ProcessTree:
         self._survivors.end()
         if self.lost is not None and not self.lost.done():
             self.lost.set_result(None)
+
+
+def _open_streams(emulate_tty: bool) -> tuple[int, int, list[tuple[int, int]]]:
+    """The child's end of its standard input and ours, and both ends of its two outputs. All or none of them."""
+    with contextlib.ExitStack() as opened:
+        stdin, ours = _kept(opened, os.pipe())
+        outputs = [_kept(opened, _open_output(emulate_tty)) for _ in range(2)]
+        opened.pop_all()
+    os.set_blocking(ours, False)
+    return stdin, ours, outputs
+
+
+def _kept(opened: contextlib.ExitStack, pair: tuple[int, int]) -> tuple[int, int]:
+    for descriptor in pair:
+        opened.callback(os.close, descriptor)
+    return pair
 
 
 def _open_output(emulate_tty: bool) -> tuple[int, int]:

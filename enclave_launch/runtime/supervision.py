@@ -12,6 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections.abc import Awaitable, Callable, Mapping
+from errno import EMFILE, ENFILE
 from signal import SIGINT, SIGKILL, SIGTERM, Signals
 from typing import NamedTuple, Protocol
 
@@ -30,6 +31,13 @@ def pause_after(short_lives: int) -> float:
     """Seconds to wait before the next start after so many lives below ``SHORT_LIFE`` in a row."""
     over = short_lives - TOLERATED
     return 0.0 if over <= 0 else min(LONGEST_PAUSE, 0.1 * 2.0 ** min(over - 1, 10))
+
+
+def _remedy(error: OSError) -> str:
+    """For what is lacking for one more process, not in it."""
+    if error.errno in (EMFILE, ENFILE):
+        return "; each process takes three descriptors of the launcher: raise its limit (ulimit -Hn)"
+    return ""
 
 
 class LifeRules(NamedTuple):
@@ -146,7 +154,8 @@ class SupervisedProcess:
                 return None
             child = await self._tree.spawn(spec, self._watcher.on_output, self._watcher.waits_for)
         except OSError as error:
-            self._log("ERROR", f"cannot start process: {error.strerror}: {error.filename!r}")
+            what = f": {error.filename!r}" if error.filename is not None else ""
+            self._log("ERROR", f"cannot start process: {error.strerror}{what}{_remedy(error)}")
             return None
         self._child = child
         self._log("INFO", f"process started with pid [{child.pid}]")

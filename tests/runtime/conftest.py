@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import resource
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -26,6 +27,12 @@ def eventually(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
             return True
         time.sleep(0.01)
     return condition()
+
+
+def require_descriptors(count: int) -> None:
+    """Skips where this machine's limit is lower than what a test of many processes takes, whatever runs them."""
+    if resource.getrlimit(resource.RLIMIT_NOFILE)[1] < count:
+        pytest.skip(f"needs {count} descriptors (ulimit -Hn)")
 
 
 def descriptors() -> int:

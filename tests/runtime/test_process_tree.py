@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import resource
 import signal
 import subprocess
 import sys
@@ -16,7 +17,7 @@ import pytest
 from enclave_launch.runtime.process_tree import Child, ProcessSpec, ProcessTree, Stream
 from enclave_launch.runtime.survivors import own_cgroup
 from enclave_launch.runtime.warden import children_by_parent
-from tests.runtime.conftest import alive, descriptors, eventually, read_pid
+from tests.runtime.conftest import alive, descriptors, eventually, read_pid, require_descriptors
 
 Body = Callable[[ProcessTree], Awaitable[None]]
 
@@ -243,7 +244,28 @@ def test_sweep_ends_what_a_child_left_in_its_session(tmp_path: Path) -> None:
     in_tree(body)
 
 
+@pytest.mark.parametrize("spare", range(6))
+def test_a_start_for_which_descriptors_are_lacking_keeps_none(spare: int) -> None:
+    async def body(tree: ProcessTree) -> None:
+        assert (await finished(tree, shell("true")))[0] == 0
+        limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+        before, next_free = descriptors(), os.dup(0)
+        os.close(next_free)
+        try:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (next_free + spare, limits[1]))
+            with pytest.raises(OSError, match="Too many open files"):
+                await tree.spawn(shell("true"), Recorder())
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, limits)
+        assert descriptors() == before
+        assert (await finished(tree, shell("true")))[0] == 0
+
+    in_tree(body)
+
+
 def test_two_hundred_processes_leave_no_descriptor_and_no_zombie() -> None:
+    require_descriptors(1000)
+
     async def batch(tree: ProcessTree, count: int) -> None:
         children: list[Child] = [await tree.spawn(shell("echo x"), Recorder()) for _ in range(count)]
         for child in children:

@@ -37,7 +37,7 @@ class Outputs:
     def close(self) -> dict[str, str]:
         """What is where; times in launch.log are shown as T."""
         self.log.close()
-        found = {path.name: path.read_text() for path in sorted(self.directory.iterdir())}
+        found = {path.name: path.read_text(encoding="utf-8") for path in sorted(self.directory.iterdir())}
         if self.stream.getvalue():
             found["screen"] = self.stream.getvalue()
         return {name: re.sub(r"(?m)^\d+\.\d{7}", "T", text) for name, text in found.items()}

@@ -18,7 +18,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.runtime.conftest import alive, eventually, read_pid
+from tests.runtime.conftest import alive, eventually, read_pid, require_descriptors
 
 PROGRAM = """
 import sys
@@ -397,12 +397,31 @@ def test_emulate_tty_and_cwd_and_environment(tmp_path: Path) -> None:
 
 
 def test_two_hundred_processes_in_one_launch(tmp_path: Path) -> None:
+    require_descriptors(1000)
     status, lines = finished(tmp_path, '*[sh(f"echo {n}") for n in range(200)]')
     assert status == 0
     assert sum("process has finished cleanly" in line for line in lines) == 200
     assert sorted(int(line.split()[-1]) for line in lines if re.match(r"\[a-\d+\] \d+$", line)) == list(
         range(200)
     )
+
+
+def test_processes_for_which_descriptors_are_lacking_are_told_and_the_others_run(tmp_path: Path) -> None:
+    prelude = """
+        import resource
+        def narrow(context):
+            resource.setrlimit(resource.RLIMIT_NOFILE, (60, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+    """
+    actions = """
+        OpaqueFunction(function=narrow),
+        *[sh("read line", name=f"p{n}", output="log") for n in range(30)],
+        TimerAction(period=1.0, actions=[Shutdown()]),
+    """
+    status, lines = finished(tmp_path, actions, prelude=prelude)
+    assert status == 1
+    told = [line for line in lines if "cannot start process: Too many open files; each" in line]
+    started = [line for line in lines if "process started" in line]
+    assert told and started and len(told) + len(started) == 30
 
 
 def test_two_hundred_respawns_leak_neither_descriptors_nor_memory_nor_handlers(tmp_path: Path) -> None:
