@@ -55,8 +55,7 @@ class RunningNode(NamedTuple):
     @property
     def fixed_name(self) -> str:
         """The name, less what the program makes up at each start, for which ``*`` stands."""
-        own = self.name == self.interface.name
-        return self.name.removesuffix(RANDOM_ENDING) if own else self.name
+        return self.name.removesuffix(RANDOM_ENDING)  # no rule of a launch file can hold a "*"
 
 
 def node_of_process(

@@ -6,6 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from nodl.names import MAX_NAME_LENGTH, InvalidNameError
 from nodl.remap import (
     InvalidRemapRuleError,
     NodeNames,
@@ -14,6 +15,9 @@ from nodl.remap import (
     parse_rule,
     parse_rules,
 )
+
+SERVICES = ("send_goal", "cancel_goal", "get_result")  # rcl_action names.c
+TOPICS = ("feedback", "status")
 
 
 def rules(*texts: str, local: tuple[str, ...] = ()) -> RemapRules:
@@ -86,6 +90,25 @@ def test_a_bad_rule_is_told_with_its_place() -> None:
         parse_rule("a__b:=c", "demo.launch.xml:7")
 
 
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("*:=a", "'*' uses a pattern, which rcl has not implemented"),
+        ("a:=b*", "the replacement 'b*' uses a pattern"),
+        (r"a:=\1", "uses a pattern"),
+        ("a:=b__c", "contains '__'"),
+        ("__ns:=a", "the namespace (it must be absolute) 'a' is not a valid name"),
+        ("__node:=", "the node name is empty"),
+        ("1:=b", "the name to match '1' is not a valid name"),
+        ("a", "must have the form FROM:=TO"),
+    ],
+)
+def test_what_is_wrong_with_a_rule_is_said(text: str, why: str) -> None:
+    with pytest.raises(InvalidRemapRuleError) as refused:
+        parse_rule(text)
+    assert why in str(refused.value)
+
+
 # name in code, rule, topic, service; for node /ns/n
 MATCHES = [
     ("a", "a:=b", "/ns/b", "/ns/b"),
@@ -122,6 +145,26 @@ def test_local_rules_come_before_those_of_the_process() -> None:
     assert names.topic("b").name == "/global"
 
 
+def test_local_name_and_namespace_come_before_those_of_the_process() -> None:
+    both = rules("__node:=global", "__ns:=/global", local=("__node:=own", "__ns:=/own"))
+    assert (both.node_name("n").name, both.namespace("/", "n").name) == ("own", "/own")
+    other = rules("__node:=global", "__ns:=/global", local=("other:__node:=own", "other:__ns:=/own"))
+    assert (other.node_name("n").name, other.namespace("/", "n").name) == ("global", "/global")
+
+
+def test_the_rules_for_names_are_those_that_are_for_no_node() -> None:
+    chosen = rules("__ns:=/a", "a:=b", local=("__node:=m", "rostopic://c:=d"))
+    assert [rule.text for rule in chosen.names] == ["rostopic://c:=d", "a:=b"]
+
+
+@pytest.mark.parametrize("rule", ["rostopic://a:=b", "rosservice://a:=b"])
+def test_a_rule_of_one_kind_is_a_rule(rule: str) -> None:
+    names = NodeNames("n", "/", rules(rule))
+    assert names.has_rules
+    assert [found and found.text for found in map(names.rule_matching, ("/a", "/b"))] == [rule, None]
+    assert not NodeNames("n", "/", rules("__ns:=/a")).has_rules
+
+
 def test_node_name_and_namespace_take_the_first_rule_that_applies() -> None:
     chosen = rules("other:__node:=x", "__node:=y", "__node:=z", "y:__ns:=/new", "n:__ns:=/old")
     assert chosen.node_name("n").name == "y"
@@ -153,6 +196,36 @@ def test_parts_of_an_action_are_remapped_one_by_one() -> None:
     }
     assert parts.services["send_goal"].name == "/go"
     assert parts.services["get_result"].name == "/fib/_action/get_result"
+
+
+@pytest.mark.parametrize("part", [f"fib/_action/{part}" for part in (*SERVICES, *TOPICS)])
+def test_each_part_of_an_action_is_found(part: str) -> None:
+    parts = NodeNames("n", "/", rules(f"{part}:=elsewhere", "other:=x")).action_parts("/fib")
+    assert parts is not None
+    moved = [name for name, found in {**parts.services, **parts.topics}.items() if found.rules]
+    assert moved == [part.rpartition("/")[2]]
+    assert [rule.replacement for rule in parts.rules] == ["elsewhere"]
+
+
+def test_a_rule_for_parts_of_another_action_moves_nothing() -> None:
+    assert NodeNames("n", "/", rules("other/_action/feedback:=news", "a:=b")).action_parts("/fib") is None
+
+
+def test_an_action_moves_as_a_whole_where_all_five_parts_do() -> None:
+    every = [f"fib/_action/{part}:=/new/_action/{part}" for part in (*SERVICES, *TOPICS)]
+    whole = NodeNames("n", "/", rules(*every)).action_parts("/fib")
+    assert whole is not None and whole.moved_together == "/new"
+    for missing in range(5):
+        apart = NodeNames("n", "/", rules(*every[:missing], *every[missing + 1 :])).action_parts("/fib")
+        assert apart is not None and apart.moved_together is None
+
+
+def test_an_action_whose_longest_part_is_too_long_is_refused() -> None:
+    names = NodeNames("n", "/")
+    longest = "/" + "a" * (MAX_NAME_LENGTH - len("//_action/cancel_goal"))
+    assert names.action_parts(longest) is None
+    with pytest.raises(InvalidNameError):
+        names.action_parts(longest + "a")
 
 
 words = st.from_regex(r"[a-z]{1,4}", fullmatch=True)
