@@ -17,6 +17,7 @@ from keystore.formats.policy_xml import parse_policy, policy_xml
 from keystore.formats.validity import Validity
 from nodl.builtin_interfaces import DISTROS, TABLE, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
+from nodl.names import MAX_NAME_LENGTH
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 
@@ -89,6 +90,25 @@ def test_built_in_interfaces_are_remapped_too(node: NodeMaker) -> None:
     found = derive(node(remap=("/rosout:=/logs", "~/get_parameters:=ask")))
     assert {"publish /logs", "reply /ask"} <= everything(found)
     assert not {"publish /rosout", "reply /talker/get_parameters"} & everything(found)
+
+
+@pytest.mark.parametrize(
+    ("rule", "moved", "stays"),
+    [
+        ("rostopic://a:=b", {"publish /b", "subscribe /b"}, {"reply /a", "request /a"}),
+        ("rosservice://a:=b", {"reply /b", "request /b"}, {"publish /a", "subscribe /a"}),
+        ("a:=b", {"publish /b", "subscribe /b", "reply /b", "request /b"}, set()),
+    ],
+)
+def test_a_rule_of_one_kind_moves_names_of_that_kind(
+    rule: str, moved: set[str], stays: set[str], node: NodeMaker
+) -> None:
+    assert declared(derive(node("pub a", "sub a", "serve a", "call a", remap=(rule,)))) == moved | stays
+
+
+def test_built_in_topics_and_services_obey_rules_of_their_kind(node: NodeMaker) -> None:
+    rules = ("rosservice:///rosout:=/logs", "rostopic://~/get_parameters:=ask")
+    assert everything(derive(node(remap=rules))) == everything(derive(node()))
 
 
 def test_rules_of_a_component_come_before_those_of_its_process(node: NodeMaker) -> None:
@@ -210,6 +230,32 @@ def test_interfaces_that_a_manifest_repeats_are_not_doubled(node: NodeMaker) -> 
 # -- what is not known, and what must not be ---------------------------------------------------------
 
 
+EVENTS = {
+    "serve": {"publish /a/_service_event"},
+    "call": {"publish /a/_service_event"},
+    "action": {
+        f"publish /a/_action/{part}/_service_event" for part in ("send_goal", "cancel_goal", "get_result")
+    },
+}
+
+
+@pytest.mark.parametrize("kind", EVENTS)
+def test_what_is_introspected_publishes_its_calls(kind: str, node: NodeMaker) -> None:
+    (found,) = node(f"{kind} a").interface.endpoints
+    silent, told = (derive(node(found._replace(introspected=each))) for each in (False, True))
+    assert declared(told) - declared(silent) == EVENTS[kind]
+    for rule, (reason, *_) in told.reasons["/"].items():
+        if rule.expression.endswith("/_service_event"):
+            assert reason.note == "the service's calls are published (introspection)"
+
+
+def test_a_name_as_long_as_dds_takes_is_granted_and_a_longer_one_is_not(node: NodeMaker) -> None:
+    room = MAX_NAME_LENGTH - len("//set_parameters_atomically")
+    fits, too_long = derive(node(name="n" * room)), derive(node(name="n" * (room + 1)))
+    assert fits.problems == () and any("set_parameters_atomically" in name for name in everything(fits))
+    assert len(too_long.problems) == 1
+
+
 def endpoint(*parts: str | ParameterPart | UnknownPart, certainty: Certainty = Certainty.EXACT) -> Endpoint:
     return Endpoint(
         EndpointKind.PUBLISHER, NameTemplate(parts), "x/msg/Y", SourceRef("talker.py", 12), certainty
@@ -241,6 +287,20 @@ def test_what_is_known_of_quality_follows_the_names_but_not_against_parameters_t
     assert quality(**{"qos_overrides./blather.publisher_main.depth": 9}) == {"reliability": "RELIABLE"}
     assert quality(**{"qos_overrides./chatter.publisher.depth": 9}) == dict(known), "the name before the rule"
     assert quality(**{"qos_overrides./blather.subscription.depth": 9}) == dict(known), "of the other end"
+
+
+@pytest.mark.parametrize(
+    ("certainty", "note"),
+    [(Certainty.EXACT, ""), (Certainty.FROM_DEFAULT, "from a default value in the source")],
+)
+def test_a_reason_says_where_a_name_comes_from(certainty: Certainty, note: str, node: NodeMaker) -> None:
+    plain = endpoint("chatter", certainty=certainty)
+    said = plain._replace(note="as its file says")
+    for one, expected in ((plain, note), (said, "as its file says")):
+        (reasons,) = (
+            r for rule, r in derive(node(one)).reasons["/"].items() if rule.expression == "/chatter"
+        )
+        assert reasons[0].note == expected
 
 
 def test_names_from_a_list_parameter_are_one_for_each_element(node: NodeMaker) -> None:

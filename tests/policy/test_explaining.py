@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.policy import PolicyOptions, RunningNode, derive_policy
+from enclave_launch.policy.derivation import allowed_names
 from enclave_launch.policy.explanation import explain
 from enclave_launch.policy.launcher import LAUNCHER_ENCLAVE, launcher_node
 from enclave_launch.policy.sharing import gains_by_sharing
@@ -134,6 +135,22 @@ def test_a_denial_takes_a_permission_away_and_says_who_will_miss_it(node: NodeMa
     assert "  DENY publish /a" in explain(derived, "/a")
 
 
+def test_lists_for_people_name_what_is_allowed_and_nothing_that_is_denied(node: NodeMaker) -> None:
+    kinds = ("pub a", "sub b", "serve c", "call d", "action e", "goal f")
+    options = PolicyOptions(policy_file=document('<topics publish="DENY"><topic>denied</topic></topics>'))
+    derived = derive_policy([node(*kinds)], distro="humble", options=options)
+    listed = allowed_names(derived.policy.enclaves[0])
+    assert {key: [name for name in names if len(name) == 2] for key, names in listed.items()} == {
+        "publish": ["/a"],
+        "subscribe": ["/b"],
+        "serve_services": ["/c"],
+        "call_services": ["/d"],
+        "serve_actions": ["/e"],
+        "call_actions": ["/f"],
+    }
+    assert not any("/denied" in names for names in listed.values())
+
+
 def test_enclaves_that_this_launch_does_not_use_are_left_out(node: NodeMaker) -> None:
     body = '<topics publish="ALLOW"><topic>x</topic></topics>'
     options = PolicyOptions(policy_file=document(body, enclave="/other"))
@@ -205,6 +222,20 @@ def test_the_launcher_gets_exactly_its_calls_and_what_every_rclpy_node_has() -> 
         ),
     }
     assert "demo.launch.xml:6" in explain(derived, "/arm/transition_event")[2]
+
+
+@pytest.mark.parametrize(
+    ("service", "type_name"),
+    [
+        ("/arm/change_state", "my_msgs/srv/ChangeState"),
+        ("/arm/other", "lifecycle_msgs/srv/ChangeState"),
+        ("/arm/get_state", "lifecycle_msgs/srv/GetState"),
+    ],
+)
+def test_only_who_asks_for_transitions_follows_them(service: str, type_name: str) -> None:
+    launcher = launcher_node([call(service, type_name)])
+    assert [each.kind.value for each in launcher.interface.endpoints] == ["service_client"]
+    assert (launcher.role, launcher.interface.library.value) == ("launcher", "rclpy")
 
 
 @pytest.mark.parametrize("service", ["/<node_name_unspecified>/change_state", "/a b/_container/load_node"])
