@@ -230,7 +230,7 @@ def test_interfaces_that_a_manifest_repeats_are_not_doubled(node: NodeMaker) -> 
 # -- what is not known, and what must not be ---------------------------------------------------------
 
 
-EVENTS = {
+INTROSPECTED = {
     "serve": {"publish /a/_service_event"},
     "call": {"publish /a/_service_event"},
     "action": {
@@ -239,11 +239,11 @@ EVENTS = {
 }
 
 
-@pytest.mark.parametrize("kind", EVENTS)
+@pytest.mark.parametrize("kind", INTROSPECTED)
 def test_what_is_introspected_publishes_its_calls(kind: str, node: NodeMaker) -> None:
     (found,) = node(f"{kind} a").interface.endpoints
     silent, told = (derive(node(found._replace(introspected=each))) for each in (False, True))
-    assert declared(told) - declared(silent) == EVENTS[kind]
+    assert declared(told) - declared(silent) == INTROSPECTED[kind]
     for rule, (reason, *_) in told.reasons["/"].items():
         if rule.expression.endswith("/_service_event"):
             assert reason.note == "the service's calls are published (introspection)"
