@@ -13,17 +13,17 @@ from __future__ import annotations
 
 import os
 import re
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 
-from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.files import is_program, read_text
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
-_LAUNCH_FILE = re.compile(r"launch\.(py|xml|ya?ml)$")  # ros2launch/api/api.py, is_launch_file
-_PACKAGE_VERSION = re.compile(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
-_PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
+_LAUNCH_FILE = late_pattern(r"launch\.(py|xml|ya?ml)$")  # ros2launch/api/api.py, is_launch_file
+_PACKAGE_VERSION = late_pattern(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
+_PACKAGE_NAME = late_pattern("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
 
 
 class PackageNotFoundError(KeyError):
@@ -163,8 +163,8 @@ def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> s
             executable,
             folder,
         )
-    found = shutil.which(executable, path=folder)
-    if found is None:
+    found = executable if os.path.dirname(executable) else os.path.join(folder, executable)
+    if not is_program(found):
         raise ExecutableNotInstalledError(
             f"executable '{executable}' not found on the libexec directory '{folder}' ", executable, folder
         )

@@ -13,14 +13,15 @@ import re
 from collections.abc import Iterable
 from enum import Enum
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"  # that it holds no "__" is checked apart
-_NAME = re.compile(rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*\Z")
-_PREFIX = re.compile(rf"({_TOKEN}):(?!//)")
-_NODE_NAME = re.compile(rf"{_TOKEN}\Z")
-_NAMESPACE = re.compile(rf"/\Z|(?:/{_TOKEN})+/?\Z")
+_NAME = late_pattern(rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*\Z")
+_PREFIX = late_pattern(rf"({_TOKEN}):(?!//)")
+_NODE_NAME = late_pattern(rf"{_TOKEN}\Z")
+_NAMESPACE = late_pattern(rf"/\Z|(?:/{_TOKEN})+/?\Z")
 
 ACTION_SERVICES = ("send_goal", "cancel_goal", "get_result")
 ACTION_TOPICS = ("feedback", "status")

@@ -11,6 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from enclave_launch.boundary.files import text_or_nothing
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 
 OURS = (
@@ -34,7 +35,7 @@ _CONFIGURATIONS = (
     "FASTDDS_DEFAULT_PROFILES_FILE",
     "NDDS_QOS_PROFILES",
 )
-_SECURITY = re.compile(r"<\s*(?:DDS)?Security\b|dds\.sec\.", re.IGNORECASE)
+_SECURITY = late_pattern(r"<\s*(?:DDS)?Security\b|dds\.sec\.", re.IGNORECASE)
 _PRELOAD = ("LD_PRELOAD", "LD_AUDIT")
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Sequence
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.ros_rules.ros_arguments import shell_words
@@ -24,7 +25,7 @@ class Keeper(NamedTuple):
 
 
 def _keeper(values: str = "", words: int = 0, changes: str | None = None) -> Keeper:
-    return Keeper(frozenset(values.split()), words, re.compile(changes) if changes else None)
+    return Keeper(frozenset(values.split()), words, late_pattern(changes) if changes else None)
 
 
 _DEBUGGER_COMMAND = r"(?i).*\benv"  # gdb "unset environment", "set env", lldb "settings ... env-vars"

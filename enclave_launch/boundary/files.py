@@ -63,6 +63,11 @@ def check_regular(path: str | bytes | os.PathLike[str]) -> os.stat_result:
     return status
 
 
+def is_program(path: str) -> bool:
+    """Whether ``path`` can be executed, as ``shutil.which`` looks."""
+    return os.access(path, os.X_OK) and not os.path.isdir(path)
+
+
 def _read_all(descriptor: int, path: str | bytes | os.PathLike[str], expected: int, limit: int) -> bytes:
     """Some files, as those of /proc, have more to say than their size."""
     pieces: list[bytes] = []

@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import re
 
+from enclave_launch.boundary.late_pattern import late_pattern
+
 _BLANKS = " \t\r\n"
-_PIECE = re.compile(
+_PIECE = late_pattern(
     r"""
     (?P<blank>[ \t\r\n]+)
   | (?P<plain>[^ \t\r\n'"\\]+)
@@ -19,7 +21,7 @@ _PIECE = re.compile(
     """,
     re.VERBOSE | re.DOTALL,
 )
-_ESCAPED_IN_QUOTES = re.compile(r'\\([\\"])')
+_ESCAPED_IN_QUOTES = late_pattern(r'\\([\\"])')
 
 
 def split_words(text: str) -> list[str]:

@@ -16,7 +16,9 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager, redire
 from os import PathLike
 from typing import Any, TextIO, cast
 
-_PERHAPS_UNSAFE = re.compile(r"[^ -~\n\t]")
+from enclave_launch.boundary.late_pattern import late_pattern
+
+_PERHAPS_UNSAFE = late_pattern(r"[^ -~\n\t]")
 
 
 def printable(text: str) -> str:

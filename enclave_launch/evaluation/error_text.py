@@ -9,8 +9,6 @@ from __future__ import annotations
 import os
 import re
 import sys
-from collections.abc import Iterator
-from types import TracebackType
 from typing import cast
 
 from enclave_launch.boundary.dependencies import missing_dependency
@@ -21,6 +19,7 @@ from enclave_launch.description.markup.expose import action_parse_methods, subst
 from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
 from enclave_launch.description.watched_configurations import WatchedConfigurations
 from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.frontend.error_location import frames
 from enclave_launch.host.protocol import MISSING_PREFIX
 from nodl.ament_index import (
     ExecutableNotInstalledError,
@@ -73,19 +72,13 @@ def _syntax(error: SyntaxError) -> str:
 
 
 def _raised_by_us(error: BaseException) -> bool:
-    modules = [frame.tb_frame.f_globals.get("__name__", "") for frame in _frames(error.__traceback__)]
+    modules = [step.tb_frame.f_globals.get("__name__", "") for step in frames(error)]
     if modules[-1:] == [WatchedConfigurations.__module__]:  # a dict to whoever looks something up in it
         modules.pop()
     if not modules:
         return type(error).__module__.partition(".")[0] in _OWN_PACKAGES
     module = modules[-1]
     return isinstance(module, str) and module.partition(".")[0] in _OWN_PACKAGES
-
-
-def _frames(traceback: TracebackType | None) -> Iterator[TracebackType]:
-    while traceback is not None:
-        yield traceback
-        traceback = traceback.tb_next
 
 
 def _next_step(error: BaseException, text: str) -> str:

@@ -228,18 +228,18 @@ def _location(error: Exception, path: str) -> tuple[SourceLocation, SourceLocati
 def _user_frame(error: BaseException) -> SourceLocation | None:
     """The innermost frame that is neither ours nor of the standard library: the user's own."""
     import sysconfig
-    import traceback
 
     import enclave_launch
     import keystore
     import nodl
+    from enclave_launch.frontend import error_location
 
     packages = (enclave_launch.__file__, nodl.__file__, keystore.__file__)
     ours = tuple(os.path.dirname(os.path.abspath(file)) + os.sep for file in packages if file)
     library = sysconfig.get_paths()["stdlib"]
     found = None
-    for frame, line in traceback.walk_tb(error.__traceback__):
-        file = frame.f_code.co_filename
+    for step in error_location.frames(error):
+        file = step.tb_frame.f_code.co_filename
         if not file.startswith((*ours, library, "<")) or file.startswith(library + "/site-packages"):
-            found = SourceLocation(file, line)
+            found = SourceLocation(file, step.tb_lineno)
     return found

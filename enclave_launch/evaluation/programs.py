@@ -6,9 +6,9 @@ Looks at the file system; asked before anything starts.
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterable
 
+from enclave_launch.boundary.files import is_program
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import ResolvedProcess
 
@@ -25,7 +25,7 @@ def missing_programs(processes: Iterable[ResolvedProcess]) -> list[tuple[Resolve
         if process.cmd and not process.shell:
             key = _program(process), _path(process)
             if key not in known:
-                known[key] = shutil.which(key[0], path=key[1]) is not None
+                known[key] = _can_be_executed(*key)
             if not known[key]:
                 errors.append((process, LaunchFileError(_message(process), process.location)))
     return errors
@@ -39,6 +39,14 @@ def check_programs(processes: Iterable[ResolvedProcess]) -> None:
     missing = missing_programs(process for process in processes if process.on_event is None)
     if missing:
         raise LaunchFileError("\n".join((*(str(error) for _, error in missing), "nothing was started")))
+
+
+def _can_be_executed(program: str, path: str) -> bool:
+    if os.path.dirname(program):
+        return is_program(program)
+    import shutil  # brings four ways to compress along
+
+    return shutil.which(program, path=path) is not None
 
 
 def _program(process: ResolvedProcess) -> str:

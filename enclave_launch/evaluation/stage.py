@@ -7,7 +7,7 @@ own state comes back. A launch that is alone stays on the stage, so turns cost n
 
 from __future__ import annotations
 
-import threading
+from _thread import RLock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 
@@ -45,7 +45,7 @@ class Stage:
     """There is one, ``STAGE``. May be used from any thread."""
 
     def __init__(self) -> None:
-        self._lock = threading.RLock()
+        self._lock = RLock()
         self._depth = 0  # of turns and evaluations that are under way, in the thread that has the lock
         self._actor: Actor | None = None
 

@@ -6,6 +6,9 @@ of the exception object. Read by the evaluation when it turns the exception into
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from types import TracebackType
+
 from enclave_launch.source_location import SourceLocation
 
 _ATTRIBUTE = "enclave_launch_location"
@@ -45,6 +48,14 @@ def likeliest(error: BaseException) -> BaseException:
     if not attempts:
         return error
     return attempts[1] if len(attempts) > 1 and _is_no_xml(attempts[0]) else attempts[0]
+
+
+def frames(error: BaseException) -> Iterator[TracebackType]:
+    """The steps of the traceback of ``error``, outermost first."""
+    step = error.__traceback__
+    while step is not None:
+        yield step
+        step = step.tb_next
 
 
 def _is_no_xml(error: BaseException) -> bool:

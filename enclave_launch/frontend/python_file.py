@@ -13,6 +13,7 @@ from importlib.util import module_from_spec, spec_from_loader
 from types import CodeType, ModuleType
 
 from enclave_launch.boundary.files import check_regular, read_bytes
+from enclave_launch.frontend.error_location import frames
 from enclave_launch.source_location import SourceLocation
 
 MODULE_NAME = "python_launch_file"
@@ -42,11 +43,7 @@ def user_frame(error: BaseException, path: str) -> SourceLocation | None:
     """Where in ``path`` the exception came from: the innermost of that file's own frames."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return SourceLocation(path, error.lineno or 0)
-    import traceback
-
-    lines = [
-        line for frame, line in traceback.walk_tb(error.__traceback__) if frame.f_code.co_filename == path
-    ]
+    lines = [step.tb_lineno for step in frames(error) if step.tb_frame.f_code.co_filename == path]
     return SourceLocation(path, lines[-1]) if lines else None
 
 

@@ -20,6 +20,7 @@ import re
 from collections.abc import Iterator
 from typing import TypeAlias
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 
 MAX_NESTING = 128  # where upstream ends in a RecursionError, too
@@ -136,19 +137,20 @@ class _Context(NamedTuple):
     quote: str = ""
 
 
-_ESCAPED = re.compile(r"\\(.)")
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-_PLAIN_CALL = re.compile(rf"""\$\(({_NAME.pattern})((?: [^ '"\\$()]+)*)\)""")  # most calls; the same anywhere
+_ESCAPED = late_pattern(r"\\(.)")
+_NAME_TEXT = r"[A-Za-z][A-Za-z0-9_-]*"
+_NAME = late_pattern(_NAME_TEXT)
+_PLAIN_CALL = late_pattern(rf"""\$\(({_NAME_TEXT})((?: [^ '"\\$()]+)*)\)""")  # most calls; the same anywhere
 _DOLLAR = r"\$(?!\()|(?<=\\)\$"  # a dollar that begins no call
 _PARENTHESIS = r"(?<=\\)[()]"
 
-_UNQUOTED_ARGUMENT = re.compile(rf"""(?:[^ '"\\$()]+|\\["']|{_PARENTHESIS}|{_DOLLAR}|\\)+""")
-_TOP = _Context("substitution", re.compile(rf"(?:[^$]+|{_DOLLAR})+"), _UNQUOTED_ARGUMENT, may_quote=True)
+_UNQUOTED_ARGUMENT = late_pattern(rf"""(?:[^ '"\\$()]+|\\["']|{_PARENTHESIS}|{_DOLLAR}|\\)+""")
+_TOP = _Context("substitution", late_pattern(rf"(?:[^$]+|{_DOLLAR})+"), _UNQUOTED_ARGUMENT, may_quote=True)
 _QUOTED = {
     quote: _Context(
         f"{name}_quoted_substitution",
-        re.compile(rf"(?:[^{quote}\\$]+|\\{quote}|{_DOLLAR}|\\)+"),
-        re.compile(rf"(?:[^ {quote}\\$()]+|\\{quote}|{_PARENTHESIS}|{_DOLLAR}|\\)+"),
+        late_pattern(rf"(?:[^{quote}\\$]+|\\{quote}|{_DOLLAR}|\\)+"),
+        late_pattern(rf"(?:[^ {quote}\\$()]+|\\{quote}|{_PARENTHESIS}|{_DOLLAR}|\\)+"),
         may_quote=False,
         quote=quote,
     )

@@ -9,14 +9,14 @@ entity that the file declares must be short, the entities in it included, so tha
 
 from __future__ import annotations
 
-import re
 from functools import partial
 from xml.parsers import expat
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.xml_tree import RefusedXml, XmlElement, collect_elements
 
 MAX_ENTITY_LENGTH = 256  # characters of one declared entity
-_REFERENCE = re.compile("&([^;&#]+);")
+_REFERENCE = late_pattern("&([^;&#]+);")
 _PREDEFINED = dict.fromkeys(("lt", "gt", "amp", "apos", "quot"), " ")
 _UNKNOWN = " " * (MAX_ENTITY_LENGTH + 1)
 

@@ -6,15 +6,16 @@ is only loaded (20 ms) and run (50 us a value) for the rest. ``tests/frontend`` 
 
 from __future__ import annotations
 
-import re
 from functools import lru_cache
 from typing import Any
 
+from enclave_launch.boundary.late_pattern import late_pattern
+
 # PyYAML types a plain scalar by its first character; one of these can only become text, a bool or null.
 # Printable ASCII without ': ' and ' #' has no other meaning in YAML once the first character is harmless.
-_WORD = re.compile(r"[A-Za-z_/$](?:[!-~ ]*[!-~])?")
-_INT = re.compile(r"[-+]?(?:0|[1-9][0-9]{0,17})")
-_FLOAT = re.compile(r"[-+]?[0-9]{1,17}\.[0-9]{0,17}")
+_WORD = late_pattern(r"[A-Za-z_/$](?:[!-~ ]*[!-~])?")
+_INT = late_pattern(r"[-+]?(?:0|[1-9][0-9]{0,17})")
+_FLOAT = late_pattern(r"[-+]?[0-9]{1,17}\.[0-9]{0,17}")
 _NOT_TEXT: dict[str, bool | None] = {
     **{word: True for text in ("yes", "true", "on") for word in (text, text.title(), text.upper())},
     **{word: False for text in ("no", "false", "off") for word in (text, text.title(), text.upper())},

@@ -13,6 +13,7 @@ from typing import Any
 
 import yaml
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.yaml_nodes import (
     RefusedYaml,
@@ -26,9 +27,9 @@ MAX_CHARACTERS = 8_000_000  # libyaml and PyYAML together take some ten seconds 
 MAX_SLOW_CHARACTERS = 500_000  # of a text that only PyYAML's own scanner can read, at a third of that speed
 
 # Where libyaml reads otherwise, found by fuzzing: trailing tab, lone tag, "?" in flow context, mark inside.
-_LIBYAML_DIFFERS = re.compile(r"[\t!?\ufeff]")
+_LIBYAML_DIFFERS = late_pattern(r"[\t!?\ufeff]")
 # Surely no part of a text whose quotes end in the same line.
-_COMMENT = re.compile(r"(?<!\S)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
+_COMMENT = late_pattern(r"(?<!\S)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
 
 
 class YamlDocument(NamedTuple):

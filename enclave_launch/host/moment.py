@@ -9,12 +9,12 @@ looked at the event itself, or asked the network, is called again.
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.host.environment import environment_snapshot
 
@@ -70,8 +70,8 @@ class Looks:
                         self.look(part)
 
 
-_WRITTEN = re.compile(r">+\s*[^\s;&|>]+")  # by a shell: what it writes, it does not look at
-_SEPARATORS = re.compile(r"[\s;&|<>()'\"`]+")
+_WRITTEN = late_pattern(r">+\s*[^\s;&|>]+")  # by a shell: what it writes, it does not look at
+_SEPARATORS = late_pattern(r"[\s;&|<>()'\"`]+")
 _looks: Looks | None = None
 _listening = False
 

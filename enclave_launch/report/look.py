@@ -7,11 +7,11 @@ characters in a report are ours.
 from __future__ import annotations
 
 import os
-import re
 import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TextIO
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import message, printable
@@ -23,11 +23,11 @@ _FOLDED = 3  # lines of one list of names
 
 _RESET, _BOLD, _RED, _YELLOW, _CYAN = "\033[0m", "\033[1m", "\033[1;31m", "\033[33m", "\033[36m"
 _COLOURS = (
-    (re.compile(r"^error(?: under --secure)?:"), _RED),
-    (re.compile(r"^warning:"), _YELLOW),
-    (re.compile(r"(?<=── )enclave \S+"), _BOLD),
-    (re.compile(r"(?<=── )\[[^\]]+\]"), _CYAN),
-    (re.compile(r"permissions unknown"), _YELLOW),
+    (late_pattern(r"^error(?: under --secure)?:"), _RED),
+    (late_pattern(r"^warning:"), _YELLOW),
+    (late_pattern(r"(?<=── )enclave \S+"), _BOLD),
+    (late_pattern(r"(?<=── )\[[^\]]+\]"), _CYAN),
+    (late_pattern(r"permissions unknown"), _YELLOW),
 )
 
 

@@ -6,6 +6,8 @@ from __future__ import annotations
 import math
 import re
 
+from enclave_launch.boundary.late_pattern import late_pattern
+
 Scalar = bool | int | float | str
 ParameterValue = Scalar | bytes | tuple[Scalar | bytes, ...]
 
@@ -14,12 +16,12 @@ _BOOLEANS = {
     **dict.fromkeys(("N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"), False),
 }
 # strtoll with base 0 and strtod; the blanks they skip are those of ASCII
-_INTEGER = re.compile(r"\s*[+-]?(?:0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)", re.ASCII)
-_DOUBLE = re.compile(
+_INTEGER = late_pattern(r"\s*[+-]?(?:0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)", re.ASCII)
+_DOUBLE = late_pattern(
     r"\s*[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?|nan)",
     re.IGNORECASE | re.ASCII,
 )
-_NAMED_DOUBLE = re.compile(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
+_NAMED_DOUBLE = late_pattern(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
 _MOST_DIGITS = 25  # of a number in 64 bits, in whichever base
 _KINDS: tuple[type, ...] = (bool, int, float, str)
 

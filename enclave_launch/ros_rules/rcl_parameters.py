@@ -13,12 +13,12 @@ Sources in, values out; reads the parameter files that the command line names. R
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, TypeVar
 
 from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.ros_rules.parameter_value import ParameterValue, plain_scalar, type_slot
 from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
@@ -46,7 +46,7 @@ class ResolvedParameters(NamedTuple):
 Generated = Callable[[str], Mapping[str, Section] | None]
 
 EVERY_NODE = "/**"
-_PLAIN = re.compile(r"[A-Za-z0-9_./+-]*[A-Za-z0-9][A-Za-z0-9_./+-]*")  # no YAML syntax in it
+_PLAIN = late_pattern(r"[A-Za-z0-9_./+-]*[A-Za-z0-9][A-Za-z0-9_./+-]*")  # no YAML syntax in it
 
 
 def resolve_parameters(

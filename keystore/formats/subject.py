@@ -12,10 +12,12 @@ import re
 from collections.abc import Iterable, Mapping
 from enum import Enum
 
+from enclave_launch.boundary.late_pattern import late_pattern
+
 # X.520 ub-common-name; cryptography >= 43 enforces it.
 MAX_COMMON_NAME = 64
 _SEPARATORS = "[,/|]"
-_GENERATION = re.compile(r"[1-9][0-9]{0,8}\Z")
+_GENERATION = late_pattern(r"[1-9][0-9]{0,8}\Z")
 
 
 class SubjectScheme(str, Enum):

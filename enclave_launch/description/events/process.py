@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import signal as signals
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,8 @@ from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.events.event import Event
 
 if TYPE_CHECKING:
+    import signal as signals
+
     from enclave_launch.description.actions.processes import ExecuteLocal
 
 
@@ -197,6 +198,8 @@ class SignalProcess(ProcessTargetedEvent):
         self, *, signal_number: str | signals.Signals, process_matcher: Callable[[ExecuteLocal], bool]
     ) -> None:
         super().__init__(process_matcher=process_matcher)
+        import signal as signals  # has a thousand names to convert, which few launches need
+
         ensure_argument_type(signal_number, (str, signals.Signals), "signal_number", "SignalProcess")
         self.__signal = signal_number
 

@@ -7,12 +7,13 @@ from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
 
+from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.description.substitution import TextSubstitution
 from enclave_launch.frontend import yaml_scalar
 
 # What PyYAML writes without quotes and reads back as the same text: no word of YAML 1.1's booleans and
 # nulls, nothing that starts like a number, no space at which a long line would be folded.
-_PLAIN_TEXT = re.compile(
+_PLAIN_TEXT = late_pattern(
     r"(?!(?i:y|n|yes|no|on|off|true|false|null)\Z)[A-Za-z_/][A-Za-z0-9_/.+-]*\Z", re.ASCII
 )
 

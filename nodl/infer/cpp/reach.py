@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.late_pattern import late_pattern
 from nodl.infer.cpp.answer import Answer
 
 if TYPE_CHECKING:
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.reading.project import SourcePackage, Workspace
     from nodl.infer.start import Start
 
-_HOME = re.compile(r"^CMAKE_HOME_DIRECTORY:\w+=(.+)$", re.MULTILINE)
+_HOME = late_pattern(r"^CMAKE_HOME_DIRECTORY:\w+=(.+)$", re.MULTILINE)
 
 
 class SourcesInReach:
