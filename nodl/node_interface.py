@@ -31,7 +31,11 @@ class EndpointKind(str, Enum):
     @property
     def family(self) -> str:
         """``topic``, ``service`` or ``action``: the elements of NoDL v1."""
-        return "topic" if self in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION) else self.value[:-7]
+        return (
+            "topic"
+            if self in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+            else self.value.partition("_")[0]
+        )
 
     @property
     def role(self) -> str:

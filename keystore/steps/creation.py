@@ -254,7 +254,7 @@ def _import_ca(role: Role, options: CreateOptions, warnings: list[str]) -> tuple
             "one CA for identities and permissions: enclaves certified by it elsewhere can sign permissions "
             "that Cyclone DDS before 11.0 and Fast DDS before 2.6.5 accept (CVE-2023-24010, CVE-2023-24011)"
         )
-    return bound, (layout.KEY if isinstance(signer, FileSigner) else "key.p11"), reference
+    return bound, (layout.KEY if isinstance(signer, FileSigner) else layout.KEY_URI), reference
 
 
 def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:

@@ -18,7 +18,7 @@ def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: byt
     """Stage a CA pair durably; ``install_incoming`` publishes it, now or in the next run."""
     opened.ensure_directory(layout.PRIVATE)
     opened.ensure_directory(layout.INCOMING)
-    name = "key.p11" if key_name.endswith(".p11") else layout.KEY
+    name = layout.KEY_URI if key_name.endswith(".p11") else layout.KEY
     facts = read_certificate(cert, layout.INCOMING)
     with opened.batch() as batch:
         batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
@@ -37,11 +37,8 @@ def install_incoming(opened: Store) -> None:
         cert = safe_files.read_if_there(opened.root, f"{waiting}/{layout.CERT}")
         if cert is not None:
             _install(opened, role, waiting, cert)
-        for name in (
-            layout.CERT,
-            layout.KEY,
-            "key.p11",
-        ):  # the certificate first: without it nothing is installed
+        # The certificate first: without it nothing is installed.
+        for name in (layout.CERT, layout.KEY, layout.KEY_URI):
             opened.remove(f"{waiting}/{name}")
         opened.remove_empty_directory(waiting)
     opened.remove_empty_directory(layout.INCOMING)
@@ -49,7 +46,7 @@ def install_incoming(opened: Store) -> None:
 
 def _install(opened: Store, role: Role, waiting: str, cert: bytes) -> None:
     pem = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY}")
-    uri = safe_files.read_if_there(opened.root, f"{waiting}/key.p11")
+    uri = safe_files.read_if_there(opened.root, f"{waiting}/{layout.KEY_URI}")
     if pem is None and uri is None:
         raise DamagedKeystoreError(
             f"{printable(opened.root / waiting)} holds a certificate without key; remove it"

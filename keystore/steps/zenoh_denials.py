@@ -5,16 +5,15 @@ Reads only. The log is untrusted text, and keeps what clients sent: everything o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from keystore.disk import layout, safe_files
+from keystore.disk import layout
 from keystore.disk.register_file import read_register
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import complete_keystore
 from keystore.disk.zenoh_files import present_address, router_file, zenoh_enclaves
 from keystore.errors import KeystoreError
-from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_patterns import can_meet
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
 from keystore.formats.policy_xml import policy_xml
@@ -25,6 +24,12 @@ from keystore.formats.zenoh.trace import Dropped, RouterLog, TurnedAway
 
 _WITHOUT_EFFECT = "/@adv/sub/"
 """A subscription of rmw_zenoh says there that it is one; nobody asks for that, so it is not granted."""
+
+
+_APPLY = (
+    "this allows it, and nothing else; put it into the policy that is applied "
+    "(secure-keystore apply-policy, or secure-launch --policy):"
+)
 
 
 class Explanation(NamedTuple):
@@ -52,7 +57,9 @@ class RouterLogExplainer:
         self._view = complete_keystore(keystore)
         self._log = RouterLog()
         self._told: set[tuple[str, ...]] = set()
-        self._enclaves = dict(_names(self._view))
+        self._enclaves = {
+            name: one for one in zenoh_enclaves(self._view) if (name := self._view.common_name(one))
+        }
         self._granted: dict[str, frozenset[Meaning]] = {}
 
     def read(self, line: str) -> Explanation | None:
@@ -95,11 +102,7 @@ class RouterLogExplainer:
         ]
         if not similar:
             why = "the permissions that are signed for it do not grant that"
-            remedy = (
-                "this allows it, and nothing else; put it into the policy that is applied (secure-keystore "
-            )
-            remedy += "apply-policy, or secure-launch --policy):"
-            return Explanation(who, what, why, remedy, _policy(enclave, about))
+            return Explanation(who, what, why, _APPLY, _policy(enclave, about))
         if any(one.type in ("", about.type) and one.domain in ("*", about.domain) for one in similar):
             why = "it is granted now: the router had other rules when it wrote this"
             return Explanation(who, what, why, "restart the router with the keystore's file")
@@ -122,19 +125,11 @@ class RouterLogExplainer:
         return self._granted[enclave]
 
     def _former(self) -> Mapping[str, str]:
-        """Names of certificates that are no longer in force, and their enclaves."""
+        """Names of certificates that no enclave has any more, and whose they were."""
         register = read_register(self._view.root)
         held = register.certificates.values() if register is not None else ()
-        return {one.subject: one.enclave for one in held}
-
-
-def _names(view: KeystoreView) -> Iterator[tuple[str, str]]:
-    for enclave in zenoh_enclaves(view):
-        place = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
-        pem = safe_files.read_if_there(view.root, place)
-        name = read_certificate(pem, place).common_name if pem is not None else None
-        if name is not None:
-            yield name, enclave
+        present = {self._view.common_name(enclave) for enclave in self._view.enclaves()}
+        return {one.subject: one.enclave for one in held if one.subject not in present}
 
 
 def _what(about: Meaning | None, found: Dropped) -> str:

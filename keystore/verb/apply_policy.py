@@ -17,7 +17,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Apply the policy, and print which enclaves changed. Returns 0."""
     from keystore.formats.policy_xml import read_policy
     from keystore.steps.enclaves import apply_policy
 

@@ -44,7 +44,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Create or complete the keystore, and print what was made. Returns 0."""
     from keystore.formats.domains import Domains
     from keystore.formats.governance_yaml import load_governance_yaml
     from keystore.formats.role import Role

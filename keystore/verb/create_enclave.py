@@ -20,7 +20,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Create the enclaves, and print which are new. Returns 0."""
     from keystore.steps.enclaves import create_enclaves
 
     options = common.provision_options(arguments, domains=common.domains(arguments))

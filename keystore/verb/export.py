@@ -46,7 +46,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Write the bundles, print what they hold and how to pin their CAs. Returns 0."""
     if arguments.hosts or arguments.host:
         return _export_hosts(arguments)
     from keystore.steps.bundle import PublicFiles, export

@@ -21,7 +21,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Sign the governance if it differs, and print whether it did. Returns 0."""
     from keystore.formats.governance_yaml import load_governance_yaml
     from keystore.steps.governance import GovernanceOptions, set_governance
 

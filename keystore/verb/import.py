@@ -29,7 +29,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Put the bundle in force, and print what changed and what to restart. Returns 0."""
     from keystore.disk.versions import Versions
     from keystore.steps.importing import ImportOptions, import_bundle
 

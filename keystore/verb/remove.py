@@ -20,7 +20,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Remove the enclaves, and print what was revoked. Returns 0."""
     from keystore.steps.removal import RemoveOptions, remove
 
     options = RemoveOptions(

@@ -41,7 +41,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Renew, repair or replace, and print what was done. Returns 0."""
     from keystore.steps.creation import CreateOptions
 
     now = utc_now()

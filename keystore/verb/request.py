@@ -7,10 +7,10 @@ The private keys stay on this host, in KEYSTORE.d/pending, until a bundle with t
 from __future__ import annotations
 
 import argparse
-import os
 import sys
 from pathlib import Path
 
+from enclave_launch.boundary.new_file import write_bytes
 from keystore.errors import StorageError
 from keystore.verb import common
 
@@ -29,7 +29,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Make keys, print or write the requests for them. Returns 0."""
     from keystore.steps.host_keys import RequestOptions, request, requests_text
 
     options = RequestOptions(arguments.token, common.access(arguments), arguments.lock_timeout)
@@ -45,9 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(output: Path, text: bytes) -> None:
-    aside = output.with_name(f".{output.name}.{os.getpid()}.partial")
     try:
-        aside.write_bytes(text)
-        os.replace(aside, output)
+        write_bytes(output, text)
     except OSError as error:
         raise StorageError.of(error, "writing the requests") from None

@@ -32,7 +32,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Make the enclave, and print how to use it. Returns 0."""
     from keystore.steps.tool_enclaves import create_tool_enclave
 
     options = common.provision_options(arguments, domains=common.domains(arguments))

@@ -30,7 +30,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Do it, and print what was done. Returns 0."""
+    """Write the files, and print which changed and how to use them. Returns 0."""
     from keystore.disk import layout
     from keystore.steps.zenoh_configuration import RESTART, ZenohOptions, matching_enclaves, write_zenoh
 

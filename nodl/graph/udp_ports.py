@@ -11,6 +11,7 @@ import re
 import socket
 import sys
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import cached_property
 from ipaddress import ip_address
 from pathlib import Path
@@ -77,12 +78,11 @@ def _address(digits: str, size: int) -> str:
 
 
 def _sockets_of(process: str) -> Iterator[str]:
-    try:
+    with suppress(OSError):  # it has ended, or is somebody else's
         for each in os.scandir(f"{process}/fd"):
-            if match := _SOCKET.match(os.readlink(each.path)):
-                yield match[1]
-    except OSError:  # it has ended, or is somebody else's
-        return
+            with suppress(OSError):  # closed meanwhile
+                if match := _SOCKET.match(os.readlink(each.path)):
+                    yield match[1]
 
 
 def _is_ours(address: str) -> bool:

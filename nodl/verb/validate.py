@@ -27,7 +27,8 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print each fault. Returns 1 when there is one, 2 when there is no document."""
+    """Print a line for each document: what it describes, or its first fault. Returns 1 if one is not valid, 2 if there
+    is no document to check."""
     files = arguments.files or [str(path) for path in sorted(Path().glob("*.nodl.*"))]
     if not files:
         print(f"no documents here; name some, such as package{V1_SUFFIX}", file=sys.stderr)

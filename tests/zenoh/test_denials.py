@@ -172,8 +172,10 @@ def test_a_name_of_before_and_rules_of_before_are_told_as_such(tmp_path: Path) -
     assert former.who == "the certificate name ros.a" and "this name was of enclave /a" in former.why
     (granted,) = told(keystore, ZENOHD.replace("ros.a", "ros.b").replace("secret", "chatter"))
     assert "the router had other rules" in granted.why and not granted.policy
-    (nobody,) = told(keystore, ZENOHD.replace("ros.a", "ros.x"))
-    assert "no enclave that is on Zenoh here has this name" in nobody.why
+    main(["create-enclave", str(keystore), "/on_dds"])
+    for name in ("ros.x", "ros.on_dds"):
+        (nobody,) = told(keystore, ZENOHD.replace("ros.a", name))
+        assert "no enclave that is on Zenoh here has this name" in nobody.why
 
 
 def test_the_verb_reads_files_and_tells_by_its_exit_status(
