@@ -1,0 +1,80 @@
+"""Executables whose ``main`` only makes a component and spins it: they make what the component makes.
+
+Decided by the text of ``main``, statement by statement; any other ``main`` is a program of its own. Reads files.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+from enclave_launch.boundary.files import text_or_nothing
+from nodl.infer.cpp.entry import Entry
+from nodl.infer.cpp.program import Sources
+from nodl.infer.cpp.reading.declarations import FileIndex, Function
+from nodl.infer.cpp.syntax import text
+
+_MAIN = re.compile(
+    r"\{rclcpp::init\((?P<arguments>\w+,\w+)\);"
+    r"auto(?P<node>\w+)=std::make_shared<(?P<component>[\w:]+)>\((?:rclcpp::NodeOptions\(\))?\);"
+    r"rclcpp::spin\((?P=node)(?:->get_node_base_interface\(\))?\);"
+    r"(?:rclcpp::shutdown\(\);)?(?:return(?:0|EXIT_SUCCESS);)?\}"
+)  # without white space
+_DEFAULTS = ("rclcpp::NodeOptions()", "NodeOptions()", "{}")
+
+
+def may_only_make(executable: Entry, component: Entry) -> bool:
+    """Whether it is worth to ask ``only_makes``."""
+    file = _main_beside(executable, component)
+    return file is not None and f"<{component.cls}>" in text_or_nothing(file)
+
+
+def _main_beside(executable: Entry, component: Entry) -> str | None:
+    """The one source that the executable has beside those of the component; ``None`` if that is not all."""
+    own = [file for file in executable.files if file not in component.files]
+    rest = tuple(file for file in executable.files if file in component.files)
+    alike = (executable.symbols, executable.complete) == (component.symbols, component.complete)
+    return own[0] if alike and executable.main and rest == component.files and len(own) == 1 else None
+
+
+def only_makes(executable: Entry, component: Entry, sources: Sources) -> bool:
+    """Whether ``executable`` makes ``component``, as a container would, and nothing else."""
+    file, symbols = _main_beside(executable, component), dict(component.symbols)
+    index = sources.index(file, symbols, component.complete) if file is not None else None
+    if index is None or _component_made(index) != component.cls:
+        return False
+    reached = sources.closure(component.files, symbols, component.complete)
+    return {each.file for each in reached}.issuperset(index.source.includes) and _takes_options_alone(
+        component.cls, reached
+    )
+
+
+def _component_made(index: FileIndex) -> str | None:
+    """The class, where the file has nothing but such a ``main``."""
+    others = (
+        index.classes, index.globals, index.aliases, index.using, index.enums, index.declared, index.errors,
+        index.source.uncertain, index.source.unknown_macros,
+    )  # fmt: skip
+    mains = index.functions.get("main", ())
+    if any(others) or len(index.all_functions) != 1 or len(mains) != 1:
+        return None
+    match = _MAIN.fullmatch(re.sub(r"\s+", "", text(mains[0].body)))
+    given = ",".join(each.name for each in mains[0].parameters)
+    return match["component"] if match and match["arguments"] == given else None
+
+
+def _takes_options_alone(component: str, files: Iterable[FileIndex]) -> bool:
+    """One constructor takes options and has them as default: a container and ``main`` call the same."""
+    name = component.rpartition("::")[2]
+    found: list[Function] = []
+    for cls in (
+        each for index in files for each in index.classes.get(name, ()) if each.qualified == component
+    ):
+        found += (*cls.methods.get(name, ()), *cls.declared.get(name, ()))
+    given = [each.parameters for each in found if any("NodeOptions" in p.type for p in each.parameters)]
+    return (
+        len(given) == 1
+        and len(given[0]) == 1
+        and re.sub(r"\s+", "", text(given[0][0].default)) in _DEFAULTS
+        and all(each.parameters for each in found)
+    )
