@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import bisect
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function
@@ -206,7 +207,7 @@ def _is_declaration(index: FileIndex, site: Site) -> bool:
 
 def reachable_functions(run: Machine) -> set[Function]:
     """Every function that one of those that ran could call, by its name: more than are called, never fewer."""
-    return Reach(run).from_functions(run.called).reached
+    return Reach(run).from_functions(run.called)
 
 
 class Reach:
@@ -223,33 +224,36 @@ class Reach:
         self.used |= run.used_classes()
         self.followed = False  # whether functions that ran count with what was not followed in them alone
 
-    def from_functions(self, functions: Iterable[Function]) -> Reach:
+    def from_functions(self, functions: Iterable[Function]) -> set[Function]:
         for cls in sorted(self.used):
             self._use_class(cls)
         self.waiting += functions
         self.followed = True
-        return self._finish()
+        return set(self._each())
 
-    def from_words(self, words: Iterable[str]) -> Reach:
+    def from_words(self, words: Iterable[str]) -> Iterator[Function]:
         """From a function that mentions ``words``; what only the made objects' own hooks reach is left out."""
         self._mention(words)
-        return self._finish()
+        yield from self._each()
 
-    def _finish(self) -> Reach:
+    def _each(self) -> Iterator[Function]:
         while self.waiting:
-            self._visit(self.waiting.pop())
-        return self
+            function = self.waiting.pop()
+            if function not in self.reached and not self._is_idle(function):
+                self.reached.add(function)
+                yield function
+                self._visit(function)
+
+    def _is_idle(self, function: Function) -> bool:
+        owner = function.owner.rpartition("::")[2]
+        if not owner or owner in self.used or function in self.run.called:
+            return False
+        self.idle.setdefault(owner, []).append(function)
+        return True
 
     def _visit(self, function: Function) -> None:
-        if function in self.reached:
-            return
-        owner = function.owner.rpartition("::")[2]
-        if owner and owner not in self.used and function not in self.run.called:
-            self.idle.setdefault(owner, []).append(function)
-            return
-        self.reached.add(function)
         if not self.followed or function not in self.run.called:
-            self._mention(function.words)
+            self._mention(self.run.names.spoken_of(function))
             return
         calls, types = open_words(self.run, function, self.by_name)
         self._mention(calls)
@@ -369,7 +373,9 @@ def _is_dead(run: Machine, file: str, offset: int) -> bool:
 
 def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
     """Whether a function with these words, or one that it may call, makes an interface, a node or a plugin."""
-    if any(CREATES.fullmatch(word) or word in MAKERS for word in words):
-        return True
-    reach = Reach(run).from_words(words)
-    return any(CREATES.fullmatch(w) or w in MAKERS for function in reach.reached for w in function.words)
+    return _make(words) or any(_make(function.words) for function in Reach(run).from_words(words))
+
+
+@lru_cache(maxsize=50_000)
+def _make(words: frozenset[str]) -> bool:
+    return not words.isdisjoint(MAKERS) or any(map(CREATES.fullmatch, words))

@@ -25,11 +25,16 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.reading.declarations import Scope
 
 
+_USING = re.compile(r"\busing\s+namespace\s+([\w:]+)\s*;")
+
+
 def index_file(source: Preprocessed) -> FileIndex:
     """Raises ``CppSupportMissing``."""
     tree = parse(source.text.encode())
     index = FileIndex(source.file, source, tree)
     _Collector(index).collect(tree.root_node, (), [])
+    inside = (found.lstrip(":") for found in _USING.findall(source.text))  # of functions, for the whole file
+    index.using += [name for name in dict.fromkeys(inside) if name not in index.using]
     if tree.root_node.has_error:
         for node in walk(tree.root_node):
             if node.type == "ERROR" or node.is_missing:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
-from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from collections.abc import Callable, Iterable, Mapping
+from functools import cached_property, update_wrapper
+from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from nodl.infer.cpp.reading.c_headers import is_of_c
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
@@ -23,16 +23,35 @@ _WRAPPERS = frozenset({
 
 _INTERFACES = re.compile(r"/(?:msg|srv|action)/")
 
+Asked = ParamSpec("Asked")
+Answer = TypeVar("Answer")
+
+
+def _once(
+    method: Callable[Concatenate[Names, Asked], Answer],
+) -> Callable[Concatenate[Names, Asked], Answer]:
+    """Names do not change while a program runs: each question has one answer, which nobody may change."""
+    name = method.__name__
+
+    def ask(self: Names, /, *args: Asked.args, **kwargs: Asked.kwargs) -> Answer:
+        key = (name, *args, *kwargs.items())
+        try:
+            known: Answer = self._answers[key]
+        except KeyError:
+            known = self._answers[key] = method(self, *args, **kwargs)
+        return known
+
+    return update_wrapper(ask, method)
+
 
 class Names:
     """``files``: the sources and headers of the program. ``visible``: file -> every file that it includes."""
 
     def __init__(self, files: Iterable[FileIndex]):
         self.files = {index.file: index for index in files}
-        self._visible: dict[str, frozenset[str]] = {}
+        self._answers: dict[tuple[object, ...], Any] = {}
         self._types: dict[tuple[str, Scope, str], Type] = {}
         self.classes: dict[str, list[Class]] = {}
-        self._found: dict[tuple[str, Scope, str], Class | None] = {}
         self.functions: dict[str, list[Function]] = {}
         self.declared: dict[str, list[Function]] = {}
         self.globals: dict[str, list[Global]] = {}
@@ -78,18 +97,23 @@ class Names:
                 else:
                     _complete(function, self.declared.get(name, ()))
 
+    @_once
     def visible(self, file: str) -> frozenset[str]:
-        if file not in self._visible:
-            found = {file}
-            waiting = [file]
-            while waiting:
-                index = self.files.get(waiting.pop())
-                for name in index.source.includes if index else ():
-                    if name not in found:
-                        found.add(name)
-                        waiting.append(name)
-            self._visible[file] = frozenset(found)
-        return self._visible[file]
+        found = {file}
+        waiting = [file]
+        while waiting:
+            index = self.files.get(waiting.pop())
+            for name in index.source.includes if index else ():
+                if name not in found:
+                    found.add(name)
+                    waiting.append(name)
+        return frozenset(found)
+
+    @_once
+    def _used_namespaces(self, file: str) -> tuple[str, ...]:
+        """Those that ``using namespace`` brings into a file, its headers included."""
+        seen = (self.files[each] for each in sorted(self.visible(file)) if each in self.files)
+        return tuple(used for index in seen for used in index.using)
 
     @cached_property
     def functions_by_name(self) -> dict[str, list[Function]]:
@@ -99,15 +123,19 @@ class Names:
                 found.setdefault(function.name, []).append(function)
         return found
 
+    @_once
+    def spoken_of(self, function: Function) -> frozenset[str]:
+        """The functions, classes and aliases of the program whose names a function mentions."""
+        return function.words & self._declared_words
+
+    @cached_property
+    def _declared_words(self) -> frozenset[str]:
+        return frozenset(self.functions_by_name.keys() | self.classes.keys() | self.aliases.keys())
+
     # --- classes and functions --------------------------------------------------------------------------
 
+    @_once
     def find_class(self, name: str, scope: Scope, file: FileIndex) -> Class | None:
-        key = (name, scope, file.file)
-        if key not in self._found:
-            self._found[key] = self._find_class(name, scope, file)
-        return self._found[key]
-
-    def _find_class(self, name: str, scope: Scope, file: FileIndex) -> Class | None:
         last = name.rpartition("::")[2]
         listed = self.classes.get(last)
         if not listed:
@@ -127,11 +155,10 @@ class Names:
             yield "::".join((*scope[:length], name))
             for base in self._base_names("::".join(scope[:length])) if length else ():
                 yield f"{base}::{name}"
-        for each in sorted(self.visible(file.file)):
-            for used in self.files[each].using if each in self.files else ():
-                yield f"{used}::{name}"
-                for length in range(len(scope), 0, -1):
-                    yield "::".join((*scope[:length], used, name))
+        for used in self._used_namespaces(file.file):
+            yield f"{used}::{name}"
+            for length in range(len(scope), 0, -1):
+                yield "::".join((*scope[:length], used, name))
 
     def _base_names(self, qualified: str) -> tuple[str, ...]:
         """The bases of a class by that name: what they declare is visible in it."""
@@ -148,6 +175,7 @@ class Names:
         seen = [each for each in matches if each.file.file in self.visible(file.file)]
         return (own or seen or matches)[-1 if own else 0]
 
+    @_once
     def find_functions(self, name: str, scope: Scope, file: FileIndex) -> list[Function]:
         """Free functions, the nearest namespace first; those of the same file before others."""
         listed = [each for each in self.functions.get(name.rpartition("::")[2], ()) if self._is_free(each)]
@@ -174,6 +202,7 @@ class Names:
         target = self.alias(first, scope, file)
         return f"{target[0]}::{rest}" if target else name
 
+    @_once
     def find_global(self, name: str, scope: Scope, file: FileIndex) -> Global | None:
         listed = self.globals.get(name.rpartition("::")[2])
         if not listed:
@@ -188,6 +217,7 @@ class Names:
                 return (own or seen or with_value)[0]
         return None
 
+    @_once
     def bases(self, cls: Class) -> list[tuple[str, Class | None]]:
         """The bases as written, with the class where its source is in reach."""
         found = []
@@ -199,6 +229,7 @@ class Names:
     def class_of(self, kind: Type, scope: Scope, file: FileIndex) -> Class | None:
         return self.find_class(kind.name, scope, file)
 
+    @_once
     def ancestry(self, cls: Class) -> list[Class]:
         """The class and its bases, nearest first."""
         order = [cls]
@@ -209,6 +240,7 @@ class Names:
                 )
         return order
 
+    @_once
     def find_methods(self, cls: Class, name: str) -> list[Function]:
         for each in self.ancestry(cls):
             found = self.methods.get(each, {}).get(name)
@@ -216,6 +248,7 @@ class Names:
                 return found
         return []
 
+    @_once
     def declarations(self, cls: Class, name: str) -> list[Function]:
         return [d for each in self.ancestry(cls) for d in each.declared.get(name, ())]
 
@@ -254,6 +287,7 @@ class Names:
 
     # --- types ------------------------------------------------------------------------------------------
 
+    @_once
     def alias(self, name: str, scope: Scope, file: FileIndex) -> tuple[str, Scope, FileIndex] | None:
         listed = self.aliases.get(name.rpartition("::")[2])
         if not listed:
@@ -341,13 +375,8 @@ class Names:
         """``msg`` under ``using namespace std_msgs``."""
         if head not in ("msg", "srv", "action"):
             return None
-        used = [
-            u
-            for each in sorted(self.visible(file.file))
-            if each in self.files
-            for u in self.files[each].using
-        ]
-        packages = [u for u in used if u.endswith("_msgs") or u.endswith("_interfaces")]
+        used = self._used_namespaces(file.file)
+        packages = [u for u in used if u.endswith(("_msgs", "_interfaces"))]
         return f"{packages[0]}::{head}" if len(packages) == 1 else None
 
     def _member(self, outer: Type, rest: str, pointer: bool, scope: Scope, file: FileIndex) -> Type:

@@ -172,7 +172,7 @@ def _writes(rounds: _Rounds, atom: object) -> Writes:
             own, words = writes_of(atom.node), frozenset(WORD.findall(text(atom.node)))
         else:
             own, words = _written(atom.function), atom.function.words
-        rounds.writes[key] = own.union(map(_written, Reach(run).from_words(words).reached))
+        rounds.writes[key] = own.union(map(_written, Reach(run).from_words(words)))
     return rounds.writes[key]
 
 

@@ -183,6 +183,8 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
     """``new Foo(...)``: what its constructor makes, on the heap, so that assigning it copies nothing."""
     kind = run.type_of(text(node.child_by_field_name("type")), frame)
     given = [run.evaluate(child, frame) for child in children(node.child_by_field_name("arguments"))]
+    if kind.name in SIZES and node.child_by_field_name("declarator") is not None:
+        return unknown("an array of numbers")
     return construct(run, kind._replace(pointer=False), given, node, frame, heap=True)
 
 

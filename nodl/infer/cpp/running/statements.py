@@ -349,9 +349,7 @@ def _local_alias(run: Machine, node: Node, frame: Frame) -> None:
     inner = children(node)
     if node.type == "using_declaration":
         target = text(inner[-1]) if inner else ""
-        if "namespace" in text(node).split():
-            if target.lstrip(":") not in frame.file.using:
-                frame.file.using.append(target.lstrip(":"))
+        if "namespace" in text(node).split():  # counts for the whole file (``FileIndex.using``)
             return
         bound = {target.rpartition("::")[2]: run.type_of(target, frame)}
     elif node.type == "type_definition":
