@@ -6,6 +6,7 @@
     programs.py      programs that cannot be recorded, told before they start     reads their heads
     isolation.py     a launch for learning kept apart from other robots           changes our own process
     recording.py     the record of one launch, watched while it grows             reads and writes the record
+    listeners.py     who hears of it meanwhile; endpoints as events of the launch
     learning.py      --learn: records and manifests in a folder                   writes them
     audit.py         --audit: what the plan would refuse, what nobody asked for
     denials.py       a refused endpoint explained, with the patch that allows it

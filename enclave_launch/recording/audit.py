@@ -12,9 +12,8 @@ from typing import NamedTuple
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Need, PlannedGrants
-from enclave_launch.recording.recording import Recording, Unrecorded
-from enclave_launch.runtime.companion import LaunchControl
-from enclave_launch.runtime.run_events import RunEvent
+from enclave_launch.recording.listeners import Listener
+from enclave_launch.recording.recording import Unrecorded
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Rule
 from nodl.record.asked import EndpointRole, asked_endpoint, role_of
@@ -54,19 +53,14 @@ class AuditReport(NamedTuple):
         return 1 if self.refusals or self.unrecorded or self.complaints else 0
 
 
-class Audit:
+class Audit(Listener):
     """Follows one recording."""
 
     def __init__(self, plan: LaunchPlan) -> None:
         self._grants = PlannedGrants(plan)
-        self._launch: LaunchControl | None = None
-        self._recording: Recording | None = None
         self._asked: set[Need] = set()
         self._refusals: dict[Need, Refusal] = {}
         self._checked = 0
-
-    def opened(self, launch: LaunchControl, recording: Recording) -> None:
-        self._launch, self._recording = launch, recording
 
     def added(self, line: Line) -> None:
         if not isinstance(line, EndpointMade) or line.rc not in (0, 1):
@@ -85,15 +79,6 @@ class Audit:
                 short = described.text if described.missing is None else "nobody"
                 who, by = _by(described.text, line), _by(short, line)
                 self._refuse(Refusal(need, asked.written, asked.type, who, by))
-
-    def happened(self, event: RunEvent) -> None:
-        """Only what was asked for counts."""
-
-    def looked(self) -> None:
-        """Told when it is seen."""
-
-    def closed(self) -> None:
-        """The report is made when it is asked for."""
 
     def report(self) -> AuditReport:
         assert self._recording is not None

@@ -17,9 +17,8 @@ from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Need, PlannedGrants
+from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
-from enclave_launch.recording.recording import Recording
-from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
 from nodl.record.asked import REFUSED, Asked, EndpointRole, asked_endpoint, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
@@ -91,7 +90,7 @@ class NotJoined(NamedTuple):
         return printable(f"{head}: {said}")
 
 
-class Explainer:
+class Explainer(Listener):
     """Follows one recording of a secured launch; ``denials`` and ``not_joined`` are what it told."""
 
     def __init__(self, plan: LaunchPlan) -> None:
@@ -99,15 +98,10 @@ class Explainer:
         self.not_joined: list[NotJoined] = []
         self._grants = PlannedGrants(plan)
         self._on_zenoh = {item.process.process_name for item in plan.processes if item.middleware == ZENOH}
-        self._launch: LaunchControl | None = None
-        self._recording: Recording | None = None
         self._printed: dict[str, deque[str]] = {}
         self._waiting: list[tuple[float, RecordedProcess, str, tuple[str, ...]]] = []
         self._told: set[Need] = set()
         self._middlewares: set[str] = set()
-
-    def opened(self, launch: LaunchControl, recording: Recording) -> None:
-        self._launch, self._recording = launch, recording
 
     def added(self, line: Line) -> None:
         assert self._recording is not None

@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 from enclave_launch.boundary.new_file import write_bytes
 from enclave_launch.errors import ManifestError
+from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchControl
-from enclave_launch.runtime.run_events import RunEvent
 from nodl.record.assembly import Record, read_record
 from nodl.record.learning import Learnt, LearntNode, learn
 from nodl.record.lines import EndpointMade, Line, NodeMade, RecordedRun, StateEntered
@@ -33,19 +33,17 @@ _LONGEST_START = 15.0
 """Seconds that a process may take from its start to its first word to rcl before nobody waits for it any more."""
 
 
-class QuietWatch:
+class QuietWatch(Listener):
     """Ends the launch when nothing new was asked for during ``patience`` seconds; ``None``: never."""
 
     def __init__(self, patience: float | None) -> None:
         self._patience = patience
         self._known: set[tuple[object, ...]] = set()
         self._last = time.monotonic()
-        self._launch: LaunchControl | None = None
-        self._recording: Recording | None = None
         self._over = False
 
     def opened(self, launch: LaunchControl, recording: Recording) -> None:
-        self._launch, self._recording = launch, recording
+        super().opened(launch, recording)
         self._last = time.monotonic()
 
     def added(self, line: Line) -> None:
@@ -53,9 +51,6 @@ class QuietWatch:
         if what is not None and what not in self._known:
             self._known.add(what)
             self._last = time.monotonic()
-
-    def happened(self, event: RunEvent) -> None:
-        """What processes print, and that they end, counts as nothing new."""
 
     def looked(self) -> None:
         if self._patience is None or self._launch is None or self._recording is None or self._over:
@@ -67,9 +62,6 @@ class QuietWatch:
                 "INFO", f"no new endpoint for {self._patience:g} s: what was to be seen was seen"
             )
             self._launch.shut_down("learnt")
-
-    def closed(self) -> None:
-        """Nothing to tidy up."""
 
     def _starting(self, now: float) -> bool:
         """Whether a process that began a short while ago has said nothing to rcl yet."""

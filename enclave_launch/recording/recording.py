@@ -15,14 +15,14 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.recording.build import recorder_library
-from enclave_launch.recording.endpoint_events import EndpointEvents
 from enclave_launch.recording.environment import RECORD_VARIABLE, with_recorder
+from enclave_launch.recording.listeners import EndpointEvents, Listener
 from enclave_launch.recording.markers import Marked, MarkerRun
 from enclave_launch.recording.programs import look_at_command
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
@@ -44,22 +44,6 @@ INTERVAL = 0.1
 """Seconds between two looks at the record."""
 _LONGEST_WAIT = 2.0
 """Seconds after which nobody waits any more to hear who started a process."""
-
-
-class Listener(Protocol):
-    """Told in the event loop. ``added``: ``line`` is in the record already."""
-
-    def opened(self, launch: LaunchControl, recording: Recording) -> None: ...
-
-    def added(self, line: Line) -> None: ...
-
-    def happened(self, event: RunEvent) -> None: ...
-
-    def looked(self) -> None:
-        """After each look at the record."""
-
-    def closed(self) -> None:
-        """Every process has ended and every line was added."""
 
 
 class Unrecorded(NamedTuple):

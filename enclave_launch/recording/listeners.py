@@ -1,6 +1,6 @@
-"""Recorded endpoints as events of the launch, each with the process and component that asked for it.
+"""Who hears of a recording while it grows; and the listener of every one, which tells the launch of recorded endpoints.
 
-Listens to a recording and tells the launch; what an endpoint is says ``nodl.record.asked``.
+What an endpoint is says ``nodl.record.asked``.
 """
 
 from __future__ import annotations
@@ -17,15 +17,33 @@ if TYPE_CHECKING:
     from enclave_launch.recording.recording import Recording
 
 
-class EndpointEvents:
-    """A listener. Endpoints of processes that the launch did not start are passed over."""
+class Listener:
+    """Told in the event loop, and does nothing of it: each listener overrides what it is interested in."""
 
-    def __init__(self) -> None:
-        self._launch: LaunchControl | None = None
-        self._recording: Recording | None = None
+    _launch: LaunchControl | None = None
+    _recording: Recording | None = None
 
     def opened(self, launch: LaunchControl, recording: Recording) -> None:
         self._launch, self._recording = launch, recording
+
+    def added(self, line: Line) -> None:
+        """``line`` is in the record already."""
+
+    def happened(self, event: RunEvent) -> None:
+        """In the launch."""
+
+    def looked(self) -> None:
+        """After each look at the record."""
+
+    def closed(self) -> None:
+        """Every process has ended and every line was added."""
+
+
+class EndpointEvents(Listener):
+    """Recorded endpoints as events of the launch, each with the process and component that asked for it.
+
+    Endpoints of processes that the launch did not start are passed over.
+    """
 
     def added(self, line: Line) -> None:
         if not isinstance(line, EndpointMade) or self._launch is None or self._recording is None:
@@ -39,12 +57,6 @@ class EndpointEvents:
             self._launch.tell(EndpointCreated(name, pid, endpoint))
         else:
             self._launch.tell(EndpointRefused(name, pid, endpoint, asked.error))
-
-    def happened(self, event: RunEvent) -> None: ...
-
-    def looked(self) -> None: ...
-
-    def closed(self) -> None: ...
 
 
 def _endpoint(asked: Asked, node: RecordedNode, line: EndpointMade) -> AskedEndpoint:
