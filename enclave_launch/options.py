@@ -6,10 +6,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.admission import AdmissionOptions
+from enclave_launch.boundary.files import as_path
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError
@@ -20,6 +20,8 @@ from enclave_launch.policy.conditions import ALSO
 from keystore.errors import KeystoreError
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from enclave_launch.runtime.companion import LaunchCompanion
     from enclave_launch.runtime.run_options import Deadline
     from keystore.formats.policy_xml import PolicyDocument
@@ -63,9 +65,9 @@ class ResolveOptions(_ResolveOptions):
             paths = ("prefixes", "manifests", "library_folders", "source_folders")
             names = ("also", "accept_prefixes", "accept_middlewares")
             return options._replace(
-                **{name: tuple(map(Path, _several(getattr(options, name)))) for name in paths},
+                **{name: tuple(map(as_path, _several(getattr(options, name)))) for name in paths},
                 **{name: _several(getattr(options, name)) for name in names},
-                policy=None if options.policy is None else Path(options.policy),
+                policy=None if options.policy is None else as_path(options.policy),
                 enclave_scope=EnclaveScope(options.enclave_scope),
             )
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from enclave_launch import plan_remarks
+import enclave_launch.plan_remarks as plan_remarks
 from enclave_launch.admission import prefix_refusals, refusals, remarks
 from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.middleware import middleware_of

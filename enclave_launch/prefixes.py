@@ -5,9 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from nodl.ament_index import PREFIX_VARIABLE
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 
 @contextmanager

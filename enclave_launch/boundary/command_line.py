@@ -24,6 +24,14 @@ class CommandParser(argparse.ArgumentParser):
         settings.setdefault("allow_abbrev", False)
         super().__init__(**settings)
 
+    def add_argument(self, *names: str, **settings: Any) -> argparse.Action:
+        """As argparse's; its check of ``metavar`` need not know how wide the terminal is, which takes ``shutil``."""
+        vars(self)["_get_formatter"] = lambda: argparse.HelpFormatter("", width=80)
+        try:
+            return super().add_argument(*names, **settings)
+        finally:
+            del vars(self)["_get_formatter"]
+
     def error(self, message: str) -> NoReturn:
         """Usage, message and exit status 2, as argparse."""
         super().error(message + self._suggestion(message))

@@ -10,6 +10,10 @@ from __future__ import annotations
 import errno
 import os
 import stat
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 MEBIBYTE = 2**20
 DEFAULT_LIMIT = 16 * MEBIBYTE
@@ -53,6 +57,13 @@ def text_or_nothing(path: str | bytes | os.PathLike[str]) -> str:
         return read_text(path, errors="replace")
     except OSError:
         return ""
+
+
+def as_path(path: str | os.PathLike[str]) -> Path:
+    """``path`` as a ``Path``. Most commands and launch files name none, and ``pathlib`` is slow to import."""
+    from pathlib import Path
+
+    return Path(path)
 
 
 def check_regular(path: str | bytes | os.PathLike[str]) -> os.stat_result:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -15,9 +16,9 @@ def public_names(package: str, file: str) -> tuple[Callable[[str], Any], Callabl
 
     def homes() -> dict[str, str]:
         import re
-        from pathlib import Path
 
-        stub = Path(file).with_suffix(".pyi").read_text(encoding="utf-8")
+        with open(os.path.splitext(file)[0] + ".pyi", encoding="utf-8") as stub_file:
+            stub = stub_file.read()
         found = re.findall(r"^from (\S+) import (\w+) as \w+$", stub, re.MULTILINE)
         return {name: module for module, name in found}
 

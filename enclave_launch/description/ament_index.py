@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-import pathlib
 import warnings
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
+from enclave_launch.boundary.files import as_path
 from enclave_launch.host.current import current_host
 from nodl import ament_index
 from nodl.ament_index import INDEX_FOLDER as RESOURCE_INDEX_SUBFOLDER
@@ -15,6 +15,9 @@ from nodl.ament_index import PREFIX_VARIABLE as AMENT_PREFIX_PATH_ENV_VAR
 from nodl.ament_index import InvalidResourceNameError as InvalidResourceNameError
 from nodl.ament_index import InvalidResourceTypeNameError as InvalidResourceTypeNameError
 from nodl.ament_index import PackageNotFoundError as PackageNotFoundError
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 __all__ = ["AMENT_PREFIX_PATH_ENV_VAR", "RESOURCE_INDEX_SUBFOLDER"]
 
@@ -64,5 +67,5 @@ def get_package_share_directory(package_name: str, print_warning: bool = True) -
     return path
 
 
-def get_package_share_path(package_name: str, print_warning: bool = True) -> pathlib.Path:
-    return pathlib.Path(get_package_share_directory(package_name, print_warning))
+def get_package_share_path(package_name: str, print_warning: bool = True) -> Path:
+    return as_path(get_package_share_directory(package_name, print_warning))

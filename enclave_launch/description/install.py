@@ -7,11 +7,11 @@ Child processes are not concerned: nothing but this interpreter's import system 
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.machinery import ModuleSpec
-from pathlib import Path
 from types import ModuleType
 from typing import Any, cast
 
@@ -136,5 +136,9 @@ def _python_folders(prefixes: Sequence[str]) -> Iterator[str]:
     """Where colcon and Debian put the Python packages of an install prefix."""
     for prefix in prefixes:
         for base, leaf in (("lib", "site-packages"), ("local/lib", "dist-packages")):
-            for folder in sorted(Path(prefix, base).glob(f"python3*/{leaf}")):
-                yield str(folder)
+            try:
+                names = sorted(os.listdir(os.path.join(prefix, base)))
+            except OSError:
+                continue
+            folders = [os.path.join(prefix, base, name, leaf) for name in names if name.startswith("python3")]
+            yield from filter(os.path.exists, folders)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shlex
 from collections.abc import Iterator, Sequence
 
 from enclave_launch.boundary.named_tuple import NamedTuple
@@ -63,12 +62,20 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
     why = f", {item.enclave.reason.value}" if item.enclave else ""
     source = f", {origin_text(item)}" if _is_worth_a_word(item) else ""
     place = _place(process.location, plan.launch_file)
-    also = f", behind {shlex.join(process.prefix)}" if process.prefix else ""
+    also = _behind(process.prefix)
     also += f", domain {item.domain}" if item.domain else ""
     also += f": {UNKNOWN}" if item.missing else ""
     head = f"[{process.process_name}] {what}{f' as {names}' if names else ''}  ({place}{why}{source}{also}{event})"
     loaded = [Branch(_component(component)) for component in plan.components if component.container is item]
     return Branch(head, loaded)
+
+
+def _behind(prefix: Sequence[str]) -> str:
+    if not prefix:
+        return ""
+    import shlex
+
+    return f", behind {shlex.join(prefix)}"
 
 
 def _place(location: SourceLocation, launch_file: str) -> str:

@@ -5,10 +5,14 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version
+from enclave_launch.boundary.files import as_path
 from enclave_launch.ros_rules.distro import Distro
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 DESCRIPTION = """\
 Launch a ROS 2 launch file (XML, YAML or Python), with or without ROS installed.
@@ -59,7 +63,7 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--keystore",
         metavar="DIR",
-        type=Path,
+        type=as_path,
         default=_path_from_environment("ROS_SECURITY_KEYSTORE"),
         help="keystore to use (default: ROS_SECURITY_KEYSTORE); created when it does not exist",
     )
@@ -96,7 +100,7 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
     )
     passphrase = group.add_mutually_exclusive_group()
     passphrase.add_argument(
-        "--ca-passphrase-file", metavar="FILE", type=Path, help="passphrase of encrypted CA keys"
+        "--ca-passphrase-file", metavar="FILE", type=as_path, help="passphrase of encrypted CA keys"
     )
     passphrase.add_argument(
         "--ca-passphrase-env",
@@ -116,7 +120,7 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
         "--nodl",
         metavar="FILE|DIR",
         action="append",
-        type=Path,
+        type=as_path,
         default=[],
         help="use this NoDL manifest, or those of a folder, where definitions conflict (repeatable)",
     )
@@ -131,7 +135,7 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
         "--library",
         metavar="DIR",
         action="append",
-        type=Path,
+        type=as_path,
         default=[],
         help="documents of your own that add to or correct the library (repeatable; docs/library.md)",
     )
@@ -139,7 +143,7 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
         "--source",
         metavar="DIR",
         action="append",
-        type=Path,
+        type=as_path,
         default=[],
         help="look for the sources of compiled nodes below this folder too (repeatable; docs/inference.md)",
     )
@@ -177,7 +181,9 @@ def add_policy_options(group: argparse._ArgumentGroup) -> None:
         default=[],
         help="an RMW_IMPLEMENTATION that reads enclaves, though it is not known to (repeatable)",
     )
-    group.add_argument("--policy", metavar="FILE", type=Path, help="SROS2 policy merged over the derived one")
+    group.add_argument(
+        "--policy", metavar="FILE", type=as_path, help="SROS2 policy merged over the derived one"
+    )
 
 
 def add_looking_options(group: argparse._ArgumentGroup) -> None:
@@ -224,7 +230,7 @@ def add_evaluation_options(group: argparse._ArgumentGroup) -> None:
         "--prefix",
         metavar="DIR",
         action="append",
-        type=Path,
+        type=as_path,
         default=[],
         help="ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)",
     )
@@ -266,7 +272,10 @@ def _add_running(group: argparse._ArgumentGroup) -> None:
         help="observe the DDS domain beside the launch, and tell what runs otherwise than planned",
     )
     group.add_argument(
-        "--watch-report", metavar="FILE", type=Path, help="what --watch tells, as JSON lines, beside the text"
+        "--watch-report",
+        metavar="FILE",
+        type=as_path,
+        help="what --watch tells, as JSON lines, beside the text",
     )
     group.add_argument(
         "--watch-accept",
@@ -299,7 +308,7 @@ def _add_recording(group: argparse._ArgumentGroup) -> None:
     group.add_argument(
         "--learn",
         metavar="DIR",
-        type=Path,
+        type=as_path,
         help="run the launch, record what its nodes ask for, and write their manifests into DIR",
     )
     group.add_argument(
@@ -323,7 +332,9 @@ def _add_recording(group: argparse._ArgumentGroup) -> None:
         action="store_true",
         help="run unsecured, and tell what the plan would refuse and what it grants that nobody asks for",
     )
-    group.add_argument("--audit-report", metavar="FILE", type=Path, help="the audit as JSON, beside the text")
+    group.add_argument(
+        "--audit-report", metavar="FILE", type=as_path, help="the audit as JSON, beside the text"
+    )
     add_explain_option(group)
 
 
@@ -338,4 +349,4 @@ def add_explain_option(group: argparse._ArgumentGroup) -> None:
 
 def _path_from_environment(variable: str) -> Path | None:
     value = os.environ.get(variable)
-    return Path(value) if value else None
+    return as_path(value) if value else None

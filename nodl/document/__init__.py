@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_bytes
@@ -13,6 +12,8 @@ from nodl.errors import InvalidNoDLError
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from nodl.yaml_text import YamlMap
 
 __all__ = [

@@ -8,7 +8,6 @@ from enclave_launch.description.conditions import Condition, IfCondition, Unless
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.parameters.normalize import normalize_parameters
-from enclave_launch.description.parameters.types import Parameters, SomeParameters
 from enclave_launch.description.remap_rules import RemapRules, SomeRemapRules, normalize_remap_rules
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
@@ -19,6 +18,7 @@ from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
+    from enclave_launch.description.parameters.types import Parameters, SomeParameters
     from enclave_launch.source_location import SourceLocation
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.components import ComposableLifecycleNode, ComposableNode
@@ -21,7 +21,6 @@ from enclave_launch.description.parameters.descriptions import ParameterFile
 from enclave_launch.description.parameters.evaluate import evaluate_parameters
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
 from enclave_launch.description.parameters.of_component import to_parameters_list
-from enclave_launch.description.parameters.types import Parameters
 from enclave_launch.description.remap_rules import performed_remaps, placed
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
@@ -35,6 +34,9 @@ from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute, prefix_namespace
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
+
+if TYPE_CHECKING:
+    from enclave_launch.description.parameters.types import Parameters
 
 
 @expose_action("node_container")

@@ -4,7 +4,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.action import Action
 from enclave_launch.description.launch_context import LaunchContext
@@ -14,7 +14,6 @@ from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
-from enclave_launch.description.parameters.types import ParameterName, ParameterValue, SomeParameterValue
 from enclave_launch.description.remap_rules import PlacedRule
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
@@ -27,6 +26,9 @@ from enclave_launch.description.typed_values import normalize_typed_substitution
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute, prefix_namespace, push_enclave_scope
 from nodl.names import InvalidNameError, validate_namespace
+
+if TYPE_CHECKING:
+    from enclave_launch.description.parameters.types import ParameterName, ParameterValue, SomeParameterValue
 
 
 @expose_action("push_ros_namespace")

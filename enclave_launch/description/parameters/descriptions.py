@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
 
-from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.files import as_path, read_text
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
 from enclave_launch.description.substitution import (
@@ -19,6 +18,8 @@ from enclave_launch.description.substitution import (
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.parameters.types import EvaluatedParameterValue
     from enclave_launch.description.substitution import Substitution
@@ -135,8 +136,8 @@ class ParameterFile:
 
     def __path(self, context: LaunchContext) -> Path:
         if isinstance(self.__param_file, list):
-            return Path(perform_substitutions(context, self.__param_file))
-        return Path(self.__param_file)
+            return as_path(perform_substitutions(context, self.__param_file))
+        return as_path(self.__param_file)
 
     def cleanup(self) -> None:
         """Forget the generated copy; the host removes its files itself."""
@@ -157,4 +158,4 @@ def _substituted(context: LaunchContext, path: Path) -> Path:
             yaml_text.load_shared(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
-    return Path(context.host.write_parameter_file(text))
+    return as_path(context.host.write_parameter_file(text))

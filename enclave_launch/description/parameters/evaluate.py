@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.descriptions import Parameter, ParameterFile, ParameterValue
-from enclave_launch.description.parameters.types import (
-    EvaluatedParameters,
-    EvaluatedParameterValue,
-    Parameters,
-    ParametersDict,
-)
 from enclave_launch.description.substitution import Substitution, perform_substitutions
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
+
+if TYPE_CHECKING:
+    from enclave_launch.description.parameters.types import (
+        EvaluatedParameters,
+        EvaluatedParameterValue,
+        Parameters,
+        ParametersDict,
+    )
 
 _SCALARS = (bool, int, float, str)
 

@@ -11,16 +11,10 @@ A normalized file is a ``ParameterFile``; a normalized dict maps tuples of subst
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.parameters.descriptions import Parameter, ParameterFile, ParameterValue
-from enclave_launch.description.parameters.types import (
-    Parameters,
-    ParametersDict,
-    SomeParameters,
-    SomeParametersDict,
-)
 from enclave_launch.description.parameters.yaml_text import YamlConstant
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType_types_tuple,
@@ -28,6 +22,14 @@ from enclave_launch.description.substitution import (
     TextSubstitution,
     normalize_to_list_of_substitutions,
 )
+
+if TYPE_CHECKING:
+    from enclave_launch.description.parameters.types import (
+        Parameters,
+        ParametersDict,
+        SomeParameters,
+        SomeParametersDict,
+    )
 
 _ITEM_TYPES = (float, int, str, bool, *SomeSubstitutionsType_types_tuple)
 

@@ -7,10 +7,10 @@ section is taken flat.
 
 from __future__ import annotations
 
-import pathlib
+import os
 import warnings
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.named_tuple import NamedTuple
@@ -18,11 +18,13 @@ from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
-from enclave_launch.description.parameters.types import EvaluatedParameters, EvaluatedParameterValue
 from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.rcl_parameters import section_applies
+
+if TYPE_CHECKING:
+    from enclave_launch.description.parameters.types import EvaluatedParameters, EvaluatedParameterValue
 
 _NO_NAME = "node name not provided to launch; parameter files will not apply"
 
@@ -52,7 +54,7 @@ def to_parameters_list(
     current: Mapping[str, Any] = {}
     warned = False
     for item in evaluated_parameters:
-        if isinstance(item, pathlib.Path):
+        if isinstance(item, os.PathLike):
             content, has_sections = _applicable(_read(context, item), section)
             if has_sections and not section and not warned:
                 warnings.warn(_NO_NAME, stacklevel=2)
@@ -67,9 +69,9 @@ def to_parameters_list(
     return assignments
 
 
-def _read(context: LaunchContext, path: pathlib.Path) -> Any:
+def _read(context: LaunchContext, path: os.PathLike[str]) -> Any:
     generated = context.host.parameter_file(str(path))
-    if generated is None and context.host.allow_missing_packages and not path.is_file():
+    if generated is None and context.host.allow_missing_packages and not os.path.isfile(path):
         context.host.warn(parameter_file_missing(str(path)))
         return {}
     return yaml_text.load_shared(read_text(path) if generated is None else generated)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pathlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -46,7 +45,7 @@ class NodeParameters:
         if isinstance(item, Parameter):
             name, value = item.evaluate(context)
             return ("-p", f"{name}:={yaml_text.dump(value)}")
-        if isinstance(item, pathlib.Path):
+        if isinstance(item, os.PathLike):
             return self.__file_words(context, str(item))
         return ("--params-file", self.__write_file(context, section, item))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.markup.expose import expose_substitution
@@ -82,6 +81,8 @@ class PathSubstitution(PathOperator, Substitution):
         from enclave_launch.description.substitution import normalize_to_list_of_substitutions
 
         self.__path = path
+        from pathlib import Path  # slow to import, and here only when somebody has one
+
         text = str(path) if isinstance(path, Path) else path
         self.__parts = normalize_to_list_of_substitutions(text)  # type: ignore[arg-type]
 

@@ -10,10 +10,9 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.files import as_path, read_text
 from enclave_launch.boundary.late_pattern import late_pattern
 from nodl.infer.cpp.answer import Answer
 
@@ -57,26 +56,27 @@ class SourcesInReach:
 
         packages = find_packages(self._folders)
         for space in self._workspaces:
-            for name, package in find_packages([str(space / "src")]).items():
+            for name, package in find_packages([os.path.join(space, "src")]).items():
                 packages.setdefault(name, package)
-            for package in _built(space / "build"):
+            for package in _built(os.path.join(space, "build")):
                 packages.setdefault(package.name, package)
-        builds = tuple(str(space / "build") for space in self._workspaces)
+        builds = tuple(os.path.join(space, "build") for space in self._workspaces)
         return Workspace(packages, self._prefixes, builds)
 
     @cached_property
-    def _workspaces(self) -> list[Path]:
+    def _workspaces(self) -> list[str]:
         """Folders with ``src`` or ``build`` beside ``install``: above a merged prefix, or two above an isolated one."""
-        found: dict[Path, None] = {}
+        found: dict[str, None] = {}
         for prefix in self._prefixes:
-            for folder in list(Path(prefix).parents)[:2]:
-                if (folder / "src").is_dir() or (folder / "build").is_dir():
+            above = os.path.dirname(prefix.rstrip(os.sep))
+            for folder in (above, os.path.dirname(above)):
+                if any(os.path.isdir(os.path.join(folder, name)) for name in ("src", "build")):
                     found.setdefault(folder)
                     break
-        return [folder for folder in found if str(folder) not in ("/", "/usr", "/opt")]
+        return [folder for folder in found if folder not in ("/", "/usr", "/opt")]
 
     def _searched(self) -> str:
-        places = [*self._folders, *(str(space / "src") for space in self._workspaces)]
+        places = [*self._folders, *(os.path.join(space, "src") for space in self._workspaces)]
         return (
             f"looked below {', '.join(places)}"
             if places
@@ -84,11 +84,11 @@ class SourcesInReach:
         )
 
 
-def _built(folder: Path) -> Iterator[SourcePackage]:
+def _built(folder: str) -> Iterator[SourcePackage]:
     """The source folders that a build remembers."""
     from nodl.infer.cpp.reading.project import read_source_package
 
-    for cache in sorted(folder.glob("*/CMakeCache.txt")):
+    for cache in sorted(as_path(folder).glob("*/CMakeCache.txt")):
         try:
             match = _HOME.search(read_text(cache, errors="replace"))
         except OSError:
