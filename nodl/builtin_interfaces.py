@@ -56,6 +56,16 @@ _LIFECYCLE = "rcl_lifecycle com_interface.c"
 _CONTAINER = "rclcpp_components component_manager.cpp"
 _EVENT = "rcl_interfaces/msg/ParameterEvent"
 
+PARAMETER_SERVICES = {
+    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
+    "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
+    "get_parameters": "rcl_interfaces/srv/GetParameters",
+    "list_parameters": "rcl_interfaces/srv/ListParameters",
+    "set_parameters": "rcl_interfaces/srv/SetParameters",
+    "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
+}
+"""Below a node's name: what it serves, and what a client of its parameters calls; with their types."""
+
 TABLE: tuple[BuiltIn, ...] = (
     BuiltIn(_P, "/rosout", "rcl_interfaces/msg/Log", "rcl logging_rosout.c"),
     BuiltIn(
@@ -67,15 +77,8 @@ TABLE: tuple[BuiltIn, ...] = (
     ),
     BuiltIn(_S, "/parameter_events", _EVENT, "rclcpp time_source.cpp", library=ClientLibrary.RCLCPP),
     *(
-        BuiltIn(_R, f"~/{name}", f"rcl_interfaces/srv/{type_name}", _PARAMETERS, BuiltinCondition.PARAMETERS)
-        for name, type_name in (
-            ("describe_parameters", "DescribeParameters"),
-            ("get_parameter_types", "GetParameterTypes"),
-            ("get_parameters", "GetParameters"),
-            ("list_parameters", "ListParameters"),
-            ("set_parameters", "SetParameters"),
-            ("set_parameters_atomically", "SetParametersAtomically"),
-        )
+        BuiltIn(_R, f"~/{name}", type_name, _PARAMETERS, BuiltinCondition.PARAMETERS)
+        for name, type_name in PARAMETER_SERVICES.items()
     ),
     BuiltIn(
         _R,

@@ -1,9 +1,19 @@
 """What crosses the border of our process. The ground floor of all three packages: it imports none of them.
 
-dependencies.py a Python package that is not installed -> one line
-files.py        a file that others wrote -> its bytes: regular files of bounded size only
-late_pattern.py a regular expression -> compiled at its first use
-shell_words.py  a command line as text -> its words, in linear time
-yaml_nodes.py   YAML text -> PyYAML's nodes: bounded depth, aliases that cannot multiply
-terminal.py     text that others chose -> text that is safe to show on a terminal
+files.py         a file that others wrote -> its bytes: regular files of bounded size only
+new_file.py      a file that a person asked for, written whole or not at all
+short_paths.py   a path -> the name that a person in this folder would type
+xml_tree.py      XML text -> elements with line numbers
+yaml_nodes.py    YAML text -> PyYAML's nodes: bounded depth, aliases that cannot multiply
+shell_words.py   a command line as text -> its words, in linear time
+late_pattern.py  a regular expression -> compiled at its first use
+command_line.py  options, version, slips of the fingers: what all commands do alike
+words.py         numbers, lists and mistyped words in sentences
+terminal.py      text that others chose -> text that is safe to show on a terminal
+progress.py      what is still being done, on a terminal
+environment.py   variables of our own environment, set for a while
+dependencies.py  a Python package that is not installed -> one line
+public_names.py  the names that a package offers, imported when first used
+named_tuple.py   value types that cost little to define
+version.py       the version of all three packages
 """

@@ -11,6 +11,7 @@ from enum import Enum
 from types import MappingProxyType
 from typing import NamedTuple
 
+from nodl.builtin_interfaces import PARAMETER_SERVICES
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, LoadedComponent, StartedProcess
@@ -21,16 +22,6 @@ REFUSED = 1
 """``RCL_RET_ERROR``: what an endpoint gives that DDS refuses. Other results say that an argument is bad."""
 
 _ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
-_PARAMETER_SERVICES = frozenset(
-    {
-        "describe_parameters",
-        "get_parameter_types",
-        "get_parameters",
-        "list_parameters",
-        "set_parameters",
-        "set_parameters_atomically",
-    }
-)
 LOGGER_SERVICES = frozenset({"get_logger_levels", "set_logger_levels"})
 _INTROSPECTION = "/_service_event"
 _FIRST_PART = "/_action/send_goal"
@@ -141,7 +132,7 @@ def _role_of_server(endpoint: EndpointMade) -> EndpointRole:
     mine = slash and endpoint.written in (f"{own_name}/{last}", f"{endpoint.fqn}/{last}")
     if not mine or not (endpoint.type == "" or endpoint.type.startswith("rcl_interfaces/")):
         return EndpointRole.OWN
-    if last in _PARAMETER_SERVICES:
+    if last in PARAMETER_SERVICES:
         return EndpointRole.BUILT_IN
     return EndpointRole.LOGGER_SERVICE if last in LOGGER_SERVICES else EndpointRole.OWN
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable
 
+from nodl.builtin_interfaces import PARAMETER_SERVICES
 from nodl.infer.findings import FoundEndpoint, NodeRecord
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.formatting import as_texts, text_value
@@ -26,7 +27,6 @@ from nodl.infer.models.signatures import (
     HELPERS,
     NODE_CALLBACKS,
     NODE_ENDPOINTS,
-    PARAMETER_SERVICES,
     Argument,
     EndpointCall,
     FixedEndpoint,

@@ -156,16 +156,6 @@ HELPERS: dict[tuple[str, str], Helper] = {
     ),
 }
 
-# The services that a client of another node's parameters calls, below that node's name.
-PARAMETER_SERVICES: dict[str, str] = {
-    "describe_parameters": "rcl_interfaces/srv/DescribeParameters",
-    "get_parameter_types": "rcl_interfaces/srv/GetParameterTypes",
-    "get_parameters": "rcl_interfaces/srv/GetParameters",
-    "list_parameters": "rcl_interfaces/srv/ListParameters",
-    "set_parameters": "rcl_interfaces/srv/SetParameters",
-    "set_parameters_atomically": "rcl_interfaces/srv/SetParametersAtomically",
-}
-
 # Node methods that only take callbacks.
 NODE_CALLBACKS: dict[str, CallbackArgument] = {
     "create_timer": CallbackArgument(Argument(1, "callback"), 0),

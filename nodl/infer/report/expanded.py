@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from nodl.infer.models.signatures import PARAMETER_SERVICES
+from nodl.builtin_interfaces import PARAMETER_SERVICES
 from nodl.infer.results import remapped
 from nodl.infer.system import InferredSystem
 from nodl.name_template import NameTemplate, UnknownPart

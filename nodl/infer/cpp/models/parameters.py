@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from nodl.builtin_interfaces import PARAMETER_SERVICES
 from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method, node_method
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
@@ -28,7 +29,6 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.syntax import text, unwrapped
-from nodl.infer.models.signatures import PARAMETER_SERVICES
 from nodl.node_interface import EndpointKind
 
 if TYPE_CHECKING:
