@@ -26,9 +26,8 @@ from keystore.formats.permissions_names import (
     Topics,
     add_dds_topics,
     full_name,
-    has_wildcard,
 )
-from keystore.formats.permissions_patterns import can_meet, covers
+from keystore.formats.permissions_patterns import can_meet, covers, has_wildcard
 from keystore.formats.policy import EnclavePolicy, PolicyError, Qualifier
 from keystore.formats.validity import Validity
 

@@ -23,7 +23,6 @@ _FULL_NAME = re.compile(rf"(?:/{_TOKEN})+\Z")
 # What may stand in an expression with wildcards: names plus * ? [abc] [a-z] [!abc], the subset that
 # Cyclone DDS and Fast DDS read alike.
 _PATTERN = r"(?:[A-Za-z0-9_/*?]|\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\])+\Z"
-_WILDCARDS = frozenset("*?[]")
 
 Topics = tuple[str, ...]
 Forms = tuple[tuple[str, str], ...]
@@ -48,11 +47,6 @@ _FORMS: dict[Operation, tuple[Forms, Forms]] = {
     Operation.CALL: (_ACTION_REQUESTS, _ACTION_ANSWERS),
     Operation.EXECUTE: (_ACTION_ANSWERS, _ACTION_REQUESTS),
 }
-
-
-def has_wildcard(name: str) -> bool:
-    """Whether ``name`` holds a character that permissions read as a pattern."""
-    return not _WILDCARDS.isdisjoint(name)
 
 
 def full_name(expression: str, profile: Profile) -> str:

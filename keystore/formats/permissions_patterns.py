@@ -9,6 +9,7 @@ from __future__ import annotations
 from functools import lru_cache
 
 _ALPHABET = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_/")
+_WILDCARDS = frozenset("*?[")
 _ANY_TEXT = None  # stands for "*" among the elements of a pattern
 
 Element = frozenset[str] | None
@@ -16,7 +17,7 @@ Element = frozenset[str] | None
 
 def has_wildcard(name: str) -> bool:
     """Whether it stands for more than one name."""
-    return any(character in name for character in "*?[")
+    return not _WILDCARDS.isdisjoint(name)
 
 
 def can_meet(a: str, b: str) -> bool:

@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING
 from enclave_launch.boundary.files import read_bytes
 from keystore.errors import InvalidEnclaveNameError, InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
-from keystore.formats.permissions_names import full_name, has_wildcard
+from keystore.formats.permissions_names import full_name
+from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
 from keystore.formats.safe_xml import parse_xml
 

@@ -13,7 +13,8 @@ from enum import Enum
 from typing import NamedTuple
 
 from keystore.errors import InvalidInputError, printable
-from keystore.formats.permissions_names import full_name, has_wildcard
+from keystore.formats.permissions_names import full_name
+from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 
 FOLDER = "/tools"
