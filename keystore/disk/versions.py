@@ -63,7 +63,7 @@ class Versions:
             os.mkdir(staging, 0o700)
             os.chmod(staging, 0o755)
             for relative, entry in entries.items():
-                _make_directories(staging, relative)
+                make_directories(staging, relative)
                 if isinstance(entry, Link):
                     os.symlink(entry.target, staging / relative)
                 else:
@@ -116,7 +116,11 @@ def write_new(path: Path, data: bytes, mode: int, *, durable: bool = False) -> N
             os.fsync(descriptor)
 
 
-def _make_directories(root: Path, relative: str) -> None:
+def make_directories(root: Path, relative: str) -> None:
+    """Those above ``relative``, below ``root``, that are not there yet.
+
+    Modes are ours, whatever the umask: who can write in a directory can replace the key in it.
+    """
     for parent in reversed(list(parents(relative))):
         if not (root / parent).is_dir():
             os.mkdir(root / parent, 0o755)

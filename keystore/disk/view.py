@@ -38,7 +38,7 @@ _OWN_ENTRIES = frozenset({
 })  # fmt: skip
 
 
-def complete_keystore(keystore: Path | str) -> KeystoreView:
+def keystore_at(keystore: Path | str) -> KeystoreView:
     """The keystore at that path, links resolved. Raises NotAKeystoreError for what is none, or not a complete one."""
     view = KeystoreView(safe_files.resolve_root(keystore))
     view.require_complete()

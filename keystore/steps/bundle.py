@@ -16,9 +16,9 @@ from enum import Enum
 from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
-from keystore.disk.archive import ExportedFile, archive_bytes, parents
-from keystore.disk.versions import write_new
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.archive import ExportedFile, archive_bytes
+from keystore.disk.versions import make_directories, write_new
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
 from keystore.formats.validity import utc_now
 from keystore.verification import Finding, Severity, verify
@@ -49,7 +49,7 @@ def export(
     for whatever ``verify`` calls an error of these enclaves or of the keystore, and for exposures unless they are
     accepted.
     """
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     names = matching(view.enclaves(), list(patterns))
     refuse_unfit(view, names, now or utc_now(), accept_exposures)
     _refuse_without_key(view, names)
@@ -173,18 +173,8 @@ def _write_directory(aside: Path, files: list[ExportedFile]) -> None:
     os.chmod(aside, 0o755)
     for file in files:
         path = aside / file.path
-        _make_directories(aside, file.path)
+        make_directories(aside, file.path)
         if file.link is not None:
             os.symlink(file.link, path)
         else:
             write_new(path, file.data, file.mode, durable=True)
-
-
-def _make_directories(aside: Path, relative: str) -> None:
-    """Modes are ours, whatever the umask: who can write in a directory can replace the key in it."""
-    for parent in reversed(list(parents(relative))):
-        try:
-            os.mkdir(aside / parent, 0o755)
-            os.chmod(aside / parent, 0o755)
-        except FileExistsError:
-            continue

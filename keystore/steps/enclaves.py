@@ -7,7 +7,7 @@ from datetime import timedelta
 from pathlib import Path
 
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.view import complete_keystore
+from keystore.disk.view import keystore_at
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.validity import Validity, utc_now
@@ -73,7 +73,7 @@ def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
 
 def list_enclaves(keystore: Path | str) -> list[str]:
     """Names of all enclaves, sorted; the root is ``/``. Raises NotAKeystoreError."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     return view.enclaves()
 
 
@@ -84,7 +84,7 @@ def drop_shares(
 
     Raises InvalidInputError when it has none, or while a launch runs on one of these enclaves.
     """
-    root = complete_keystore(keystore).root
+    root = keystore_at(keystore).root
     chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
     wanted = {one.enclave: WantedEnclave(one.document, share=one) for one in given_up(root, owner)}
     return bring_about(root, wanted, chosen)

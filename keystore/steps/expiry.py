@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_validity
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats import certificate, der
 from keystore.formats.enclave_name import validate_enclave_name
@@ -58,7 +58,7 @@ class StatusReport(NamedTuple):
 
 def status(keystore: Path | str, *, now: datetime | None = None) -> StatusReport:
     """Raises NotAKeystoreError, DamagedKeystoreError for what cannot be read."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     names = view.enclaves()
     ordered = sorted(_expiries(view, names, {}), key=_order)
     return StatusReport(view.root, now or utc_now(), tuple(names), tuple(ordered))
@@ -77,7 +77,7 @@ def expires_soon(
     ``known``: enclaves that need not be read again, with the validity of their certificate and permissions, as
     ``ProvisionReport.validities`` gives them.
     """
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     names = view.enclaves() if enclaves is None else [validate_enclave_name(name) for name in enclaves]
     moment = now or utc_now()
     limit = later(moment, within)

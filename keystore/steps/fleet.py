@@ -19,7 +19,7 @@ from keystore.disk.archive import MAX_ARCHIVE, read_archive
 from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import own_permissions_cas
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, KeystoreError, StorageError, printable
 from keystore.formats.bundle import Manifest, parse_manifest
 from keystore.formats.certificate import CertificateFacts
@@ -98,7 +98,7 @@ def fleet_status(
 
 
 def _reference(root: Path) -> Reference:
-    view = complete_keystore(root)
+    view = keystore_at(root)
     register = read_register(root) or Register()
     return Reference(
         frozenset(fingerprint(view.ca(role).der) for role in Role),

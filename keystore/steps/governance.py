@@ -13,7 +13,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.copies import refresh_copies
 from keystore.disk.signed_documents import governance_stands, signed_governance, trusted_document
 from keystore.disk.store import Store
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
@@ -76,7 +76,7 @@ def set_governance(
     It must be deployed to all participants at once: those with different protection kinds do not talk.
     """
     chosen = options or GovernanceOptions()
-    root = complete_keystore(keystore).root
+    root = keystore_at(keystore).root
     document = governance_document(governance)
     now = chosen.now or utc_now()
     with opened_for_change(root, now, chosen) as opened:

@@ -18,7 +18,7 @@ from keystore.disk.archive import ExportedFile, archive_bytes
 from keystore.disk.crl_file import crl_number, crl_validity
 from keystore.disk.store import Store
 from keystore.disk.versions import write_new
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, StorageError, printable
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest
 from keystore.formats.certificate import read_certificate
@@ -75,7 +75,7 @@ def export_hosts(
     what ``verify`` calls an error of these enclaves, SigningUnavailableError without the permissions CA's key.
     """
     chosen = options or BundleOptions()
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     root, now = view.root, chosen.now or utc_now()
     names = {host: _enclaves_of(host, view, list(patterns)) for host, patterns in assigned.items()}
     if not chosen.accept_shared:

@@ -17,7 +17,7 @@ from cryptography import x509
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import signed_governance
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.disk.zenoh_files import session_file, zenoh_enclaves
 from keystore.errors import printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
@@ -63,7 +63,7 @@ def inventory(keystore: Path | str) -> tuple[KeyEntry, ...]:
 
     Raises NotAKeystoreError and DamagedKeystoreError.
     """
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     return (*_authorities(view), *_enclaves(view))
 
 
@@ -130,7 +130,7 @@ class GovernanceFacts(NamedTuple):
 
 def governance_facts(keystore: Path | str) -> GovernanceFacts:
     """Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
     return GovernanceFacts([_plain(rule) for rule in governance.domain_rules], tuple(weaknesses(governance)))
 
@@ -160,7 +160,7 @@ def granted(keystore: Path | str) -> dict[str, Granted]:
 
     Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read.
     """
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     found = {}
     for enclave in view.enclaves():
         place = f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"
@@ -195,7 +195,7 @@ def enforced(keystore: Path | str) -> dict[str, frozenset[Rule]]:
 
     Raises NotAKeystoreError, and InvalidInputError for a file that cannot be read.
     """
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     read = _read(view, layout.ZENOH_ROUTER)
     everybody = read.admitted.get(EVERYBODY, frozenset())
     return {

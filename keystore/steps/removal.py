@@ -19,7 +19,7 @@ from pathlib import Path
 
 from keystore.disk import layout
 from keystore.disk.store import Store
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
@@ -66,7 +66,7 @@ def remove(
     chosen = options or RemoveOptions()
     now = chosen.now or utc_now()
     wanted = sorted({validate_enclave_name(name) for name in names})
-    root = complete_keystore(keystore).root
+    root = keystore_at(keystore).root
     with opened_for_change(root, now, chosen) as opened:
         view = KeystoreView(root)
         lost = {one.enclave for one in revocable(view, opened.register, wanted)}

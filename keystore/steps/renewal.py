@@ -20,7 +20,7 @@ from keystore.disk.authorities import describe, foreign_authorities
 from keystore.disk.copies import refresh_copies
 from keystore.disk.register_file import read_register
 from keystore.disk.store import Store
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.disk.zenoh_files import has_router, zenoh_enclaves
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts
@@ -67,7 +67,7 @@ def renew(
     Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA keys.
     """
     chosen = options or RenewOptions()
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     root = view.root
     provisioning = chosen.provisioning._replace(create=False)
     now = provisioning.now or utc_now()

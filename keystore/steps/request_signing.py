@@ -12,7 +12,7 @@ from pathlib import Path
 
 from keystore.disk import layout
 from keystore.disk.store import PRIVATE_MODE, Batch, Content, Link
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.register import Register
@@ -48,7 +48,7 @@ def sign_requests(
     Raises InvalidInputError for an enclave that does not exist and a key that is another's, SigningUnavailableError.
     """
     chosen = options or SigningOptions()
-    root, listed = complete_keystore(keystore).root, list(requests)
+    root, listed = keystore_at(keystore).root, list(requests)
     provisioning = chosen.provisioning
     now = provisioning.now or utc_now()
     with opened_for_change(root, now, provisioning) as opened:
@@ -80,7 +80,7 @@ def accept_certificates(
     one that is not valid now; SigningUnavailableError without the permissions CA's key.
     """
     chosen = options or ProvisionOptions()
-    root, now = complete_keystore(keystore).root, chosen.now or utc_now()
+    root, now = keystore_at(keystore).root, chosen.now or utc_now()
     with opened_for_change(root, now, chosen) as opened:
         view = KeystoreView(root)
         by_key = {

@@ -26,7 +26,7 @@ from keystore.disk import layout, safe_files, store
 from keystore.disk.copies import refresh_copies
 from keystore.disk.signed_documents import governance_stands
 from keystore.disk.store import Content, Store
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate, read_pem
 from keystore.formats.der import DerError
@@ -69,7 +69,7 @@ def roll_over(
     order.
     """
     chosen = (options or ProvisionOptions())._replace(create=False)
-    root = complete_keystore(keystore).root
+    root = keystore_at(keystore).root
     now = chosen.now or utc_now()
     with opened_for_change(root, now, chosen) as opened:
         install_incoming(opened)

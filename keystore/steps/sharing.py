@@ -18,7 +18,7 @@ from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import LaunchHold, enclaves_with_shares, is_running, read_shares
 from keystore.disk.signed_documents import governance_domains
 from keystore.disk.store import PRIVATE_MODE, Batch, Store
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.permissions import permissions_document
 from keystore.formats.permissions_names import full_name
@@ -154,7 +154,7 @@ class LaunchShares(NamedTuple):
 
 def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
     """Every launch with shares, by owner. Raises NotAKeystoreError."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     found: dict[str, list[str]] = {}
     for enclave in enclaves_with_shares(view.root):
         for share in read_shares(view.root, enclave):

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.view import complete_keystore
+from keystore.disk.view import keystore_at
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
@@ -113,6 +113,6 @@ def _end(root: Path, enclave: str) -> datetime:
 def enclaves_by_guid(keystore: Path | str) -> dict[int, str]:
     """The first 48 bits of the GUIDs of its participants → enclave, for every enclave of the keystore. No key is
     read. Source: DDS-Security 9.3.3."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     names = {enclave: view.common_name(enclave) for enclave in view.enclaves()}
     return {guid_prefix(name): enclave for enclave, name in names.items() if name}

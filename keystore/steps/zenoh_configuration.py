@@ -19,7 +19,7 @@ from typing import NamedTuple
 from keystore.disk import layout, lock, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import PRIVATE_MODE, PUBLIC_MODE, Store
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.disk.zenoh_files import (
     RouterFile,
     has_router,
@@ -77,7 +77,7 @@ def write_zenoh(
     Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA key.
     """
     chosen = options or ZenohOptions()
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     asked = set(enclaves)
     view.require_enclaves(asked)
     names = sorted({*asked, *zenoh_enclaves(view)})
@@ -92,7 +92,7 @@ def write_zenoh(
 def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> list[str]:
     """Those that match one of ``patterns`` (``/robot1/*``); without patterns all, but none more where some are on Zenoh
     already. Raises InvalidInputError for a pattern that none matches."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     names = view.enclaves()
     if patterns is None:
         return [] if has_router(view) else names

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
-from keystore.disk.view import complete_keystore
+from keystore.disk.view import keystore_at
 from keystore.disk.zenoh_files import present_address, router_file, zenoh_enclaves
 from keystore.errors import KeystoreError
 from keystore.formats.permissions_patterns import can_meet
@@ -54,7 +54,7 @@ class RouterLogExplainer:
     """Explains a log line by line, each refusal once. ``keystore``: of the router that writes it."""
 
     def __init__(self, keystore: Path | str) -> None:
-        self._view = complete_keystore(keystore)
+        self._view = keystore_at(keystore)
         self._log = RouterLog()
         self._told: set[tuple[str, ...]] = set()
         self._enclaves = {

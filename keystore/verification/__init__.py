@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout
 from keystore.disk.crl_file import revoked_serials
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import KeystoreError, StorageError
 from keystore.formats.governance import Governance
 from keystore.formats.validity import utc_now
@@ -57,7 +57,7 @@ def verify(
     required: Requirements | None = None,
 ) -> VerifyReport:
     """Check everything; raises NotAKeystoreError only when there is nothing to check."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     order = list(Severity)
     try:
         found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))

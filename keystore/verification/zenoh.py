@@ -12,7 +12,7 @@ from itertools import islice
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.disk.view import KeystoreView, complete_keystore
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.disk.zenoh_files import (
     has_router,
     identity_problem,
@@ -35,7 +35,7 @@ _TOLD = 40
 
 def check_zenoh_files(keystore: Path | str, now: datetime) -> tuple[Finding, ...]:
     """``check_zenoh`` by itself. Raises NotAKeystoreError where there is nothing to check."""
-    view = complete_keystore(keystore)
+    view = keystore_at(keystore)
     return tuple(check_zenoh(view, now))
 
 

@@ -119,7 +119,7 @@ def _analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) ->
             found = True
             instantiated.add(cls.node)
             value = _call(run, main, cls, Arguments(more=missing))
-            if not _is_node(cls):
+            if not is_node(cls):
                 _expect_methods(run, value)
     for value in list(main.cells.values()):
         for atom in value:
@@ -161,12 +161,13 @@ def _expect_methods(run: Run, value: Iterable[object]) -> None:
 _NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_getitem__", "__set_name__"})
 
 
-def _is_node(cls: ClassValue) -> bool:
+def is_node(cls: ClassValue) -> bool:
+    """Whether rclpy's node classes are among its bases."""
     return any(isinstance(base, External) and is_node_class(base.path) for base in linearized(cls))
 
 
 def _creates(run: Run, node: ast.AST, cls: ClassValue | None) -> bool:
-    if cls is not None and _is_node(cls):
+    if cls is not None and is_node(cls):
         return True
     first, last = node.lineno, node.end_lineno or node.lineno  # type: ignore[attr-defined]
     places = _creating_lines(run.main)

@@ -21,14 +21,13 @@ from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.analysis import is_node
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
-from nodl.infer.models.foreign import is_node_class
 from nodl.infer.models.signatures import NODE_ENDPOINTS
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.values import ClassValue, External, ModuleValue
+from nodl.infer.values import ModuleValue
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 
@@ -119,7 +118,7 @@ class _Audit:
         for node, cls in self._run.classes.items():
             if (
                 cls.module is module
-                and _is_node(cls)
+                and is_node(cls)
                 and not self._is_made(cls.node)
                 and self._referred(cls.name)
             ):
@@ -187,10 +186,6 @@ class _Audit:
 
     def _gap(self, node: ast.AST, why: str) -> None:
         self.gaps.append(Gap(SourceRef(self._file, getattr(node, "lineno", 0)), why))
-
-
-def _is_node(cls: ClassValue) -> bool:
-    return any(isinstance(base, External) and is_node_class(base.path) for base in linearized(cls))
 
 
 def _last_name(function: ast.expr) -> str:
