@@ -1,8 +1,8 @@
 """``typing.NamedTuple`` at a fraction of what it costs to define one, for the value types that every dry run defines.
 
 ``typing`` compiles each annotation and the constructor when a class is defined. Here annotations stay text and the
-constructor is compiled for the first instance, which most of the hundred classes never have; ``bench/resolve.py`` shows
-what start-up costs. Type checkers see ``typing``'s own, whose interface this has.
+constructor is compiled for a class with many instances, which few of the hundred classes have. ``bench/resolve.py``
+shows what start-up costs. Type checkers see ``typing``'s own, whose interface this has.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ if TYPE_CHECKING:
 else:
     from collections import namedtuple
 
+    _FEW = 20  # instances that are made sooner than a constructor is compiled
     _Field = type(namedtuple("_One", "field").field)
 
     def _constructor(cls):
@@ -23,6 +24,16 @@ else:
         constructor = eval(code, {"_tuple_new": tuple.__new__, "__builtins__": {}})
         constructor.__defaults__ = tuple(cls._field_defaults.values())
         return constructor
+
+    def _values(home, args, given):
+        """The fields of an instance from the arguments; ``None`` for what the constructor refuses."""
+        rest = home._fields[len(args) :]
+        if not rest and not given:
+            return args if len(args) == len(home._fields) else None
+        values = {**home._field_defaults, **given} if given else home._field_defaults
+        if len(args) > len(home._fields) or not given.keys() <= {*rest} or not values.keys() >= {*rest}:
+            return None
+        return (*args, *[values[name] for name in rest])
 
     class _Definition(type):
         """Makes the annotated names of a class its fields."""
@@ -34,15 +45,17 @@ else:
                 members.update((field, _Field(index, "")) for index, field in enumerate(fields))
                 members["_fields"] = members["__match_args__"] = fields
                 members["__slots__"] = ()
-            return super().__new__(mcs, name, bases, members)
+            made = super().__new__(mcs, name, bases, members)
+            if "_fields" in members:
+                made._home, made._instances = made, 0
+            return made
 
         @property
         def __signature__(cls):
             import inspect
 
             _cls, *fields = inspect.signature(_constructor(cls)).parameters.values()
-            home = next(base for base in cls.__mro__ if "_fields" in vars(base))
-            types = vars(home)["__annotations__"]
+            types = vars(cls._home)["__annotations__"]
             return inspect.Signature([each.replace(annotation=types.get(each.name)) for each in fields])
 
     class NamedTuple(tuple, metaclass=_Definition):
@@ -51,7 +64,11 @@ else:
         __slots__ = ()
 
         def __new__(cls, /, *args, **given):
-            home = next(base for base in cls.__mro__ if "_fields" in vars(base))
+            home = cls._home
+            home._instances += 1
+            values = _values(home, args, given) if home._instances < _FEW else None
+            if values is not None:
+                return tuple.__new__(cls, values)
             home.__new__ = staticmethod(_constructor(home))
             return home.__new__(cls, *args, **given)
 

@@ -7,7 +7,6 @@ characters in a report are ours.
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TextIO
 
@@ -105,6 +104,8 @@ def look_for(stream: TextIO, environment: Mapping[str, str], *, verbose: bool = 
     folder = os.path.join(os.getcwd(), "")
     if not stream.isatty():
         return Look(full=verbose, folder=folder)
+
+    import shutil  # slow to import, and only a terminal needs it
 
     plain = bool(environment.get("NO_COLOR")) or environment.get("TERM") == "dumb"
     return Look(shutil.get_terminal_size().columns, not plain, verbose, folder)

@@ -79,6 +79,13 @@ def test_it_is_used_as_typings(use: str) -> None:
     assert outcome(USES[use], Ours) == outcome(USES[use], Theirs)
 
 
+@pytest.mark.parametrize("use", USES)
+def test_it_is_used_so_when_there_are_many_too(use: str) -> None:
+    for number in range(100):
+        Ours(str(number))
+    assert outcome(USES[use], Ours) == outcome(USES[use], Theirs)
+
+
 def test_a_pattern_takes_it_apart() -> None:
     match Ours("a", line=3):
         case Ours(source, line=line):
