@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 import pytest
 
 from keystore.errors import InvalidInputError
-from keystore.formats.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_moment
+from keystore.formats.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_moment, utc_now
 from tests.keystore.kit import DAY, NOW
 
 
@@ -35,6 +35,39 @@ def test_a_leaf_is_cut_to_its_ca() -> None:
 def test_seconds_are_whole_and_zones_become_utc() -> None:
     late = datetime(2031, 1, 1, 2, 0, 0, 123456, tzinfo=timezone(timedelta(hours=2)))
     assert iso(Validity(late, late + DAY).not_before) == "2031-01-01T00:00:00Z"
+
+
+SECOND = timedelta(seconds=1)
+
+
+def test_the_bounds_themselves() -> None:
+    assert Validity(NOW, NOW + SECOND).not_after == NOW + SECOND
+    with pytest.raises(InvalidInputError, match="before it begins"):
+        Validity(NOW, NOW)
+    assert Validity.starting(NOW, until=NOW + SECOND).not_after == NOW + SECOND
+    with pytest.raises(InvalidInputError, match="already have ended"):
+        Validity.starting(NOW, until=NOW)
+    ten_years = timedelta(days=3650)
+    assert Validity.starting(NOW, DAY, backdate=ten_years).not_before == NOW - ten_years
+    with pytest.raises(InvalidInputError, match="10 years"):
+        Validity.starting(NOW, DAY, backdate=ten_years + SECOND)
+    assert Validity(NOW, datetime(2300, 1, 1, tzinfo=timezone.utc)).not_after == datetime(
+        2262, 4, 11, tzinfo=timezone.utc
+    )
+
+
+def test_fractions_of_a_second_are_cut() -> None:
+    late = NOW.replace(microsecond=999_999)
+    assert Validity(late, late + DAY) == Validity(NOW, NOW + DAY)
+    assert utc_now().microsecond == 0
+
+
+@pytest.mark.parametrize(
+    ("now", "covered"),
+    [(NOW - SECOND, False), (NOW, True), (NOW + DAY, True), (NOW + DAY + SECOND, False)],
+)
+def test_what_is_not_yet_valid_is_not_covered_nor_what_has_ended(now: datetime, covered: bool) -> None:
+    assert Validity(NOW, NOW + DAY).covers(now) is covered
 
 
 def test_ends_before_it_begins() -> None:

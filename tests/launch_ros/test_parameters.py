@@ -127,6 +127,12 @@ FILES: dict[str, object] = {
     "/n: {ros__parameters: {a: [1, {b: 2}]}}": {"a.b": (1, 2)},
     "/n: {ros__parameters: {a: {b: 1}, a.b: 2}}": {"a.b": 2},
     "/n: {ros__parameters: {a: 1}}\nb: {}": {"a": 1},
+    "/n: {ros__parameters: {a: [], b: [[]], c: [[1], [2]], d: [1, []]}}": {
+        "a": (),
+        "b": (),
+        "c": (2,),
+        "d": (1,),
+    },
     "- 1": "a list cannot be a key",
     "---": "a key is empty",
     "a: 1": "a value stands before ros__parameters",
@@ -162,6 +168,14 @@ def test_a_file_is_read_or_refused_as_by_rcl(tmp_path: Path, text: str) -> None:
     else:
         ((_, why),) = found.unread
         assert str(FILES[text]) in why and why.startswith("line ")
+
+
+@pytest.mark.parametrize("depth", [200, 100_000])
+def test_a_file_that_is_nested_without_end_is_refused(tmp_path: Path, depth: int) -> None:
+    (tmp_path / "a.yaml").write_text("/n: {ros__parameters: {" + "a: {" * depth + "b: 1" + "}" * depth + "}}")
+    found = resolve_parameters(["n"], [ParameterFileArgument("a.yaml")], directory=str(tmp_path))
+    assert len(found.values) == (depth < 250)
+    assert ["nested" in why for _, why in found.unread] == [True] * (depth > 250)
 
 
 @pytest.mark.parametrize("text", ["a: [", "\x00", None])
