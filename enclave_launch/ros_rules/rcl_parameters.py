@@ -20,7 +20,7 @@ from typing import Any, TypeVar
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.late_pattern import late_pattern
 from enclave_launch.boundary.named_tuple import NamedTuple
-from enclave_launch.ros_rules.parameter_value import ParameterValue, plain_scalar, type_slot
+from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
 from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 
 Section = Mapping[str, ParameterValue]
@@ -114,16 +114,20 @@ def as_rcl_reads(value: Any) -> ParameterValue:
 
     The two disagree on a few plain words: PyYAML writes the text ``1e3`` without quotes, rcl reads 1000.0.
     """
-    if isinstance(value, (list, tuple)):
-        return tuple(as_rcl_reads(item) for item in value)  # type: ignore[misc]  # items are scalars
-    if not isinstance(value, str):
-        return value  # type: ignore[no-any-return]
-    typed = plain_scalar(value)
-    if isinstance(typed, str):
+    return (
+        tuple(map(_item_as_rcl_reads, value))
+        if isinstance(value, (list, tuple))
+        else _item_as_rcl_reads(value)
+    )
+
+
+def _item_as_rcl_reads(value: Scalar | bytes) -> Scalar | bytes:
+    typed = plain_scalar(value) if isinstance(value, str) else value
+    if typed is value or isinstance(typed, str):
         return value
     from yaml import safe_load
 
-    return typed if isinstance(safe_load(value), str) else value
+    return typed if isinstance(safe_load(str(value)), str) else value
 
 
 def _value_of_rule(rule: ParameterRule) -> ParameterValue | None:

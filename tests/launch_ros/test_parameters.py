@@ -127,10 +127,10 @@ FILES: dict[str, object] = {
     "/n: {ros__parameters: {a: [1, {b: 2}]}}": {"a.b": (1, 2)},
     "/n: {ros__parameters: {a: {b: 1}, a.b: 2}}": {"a.b": 2},
     "/n: {ros__parameters: {a: 1}}\nb: {}": {"a": 1},
-    "/n: {ros__parameters: {a: [], b: [[]], c: [[1], [2]], d: [1, []]}}": {
+    "/n: {ros__parameters: {a: [], b: [[]], c: [[1]], d: [1, []]}}": {
         "a": (),
         "b": (),
-        "c": (2,),
+        "c": (1,),
         "d": (1,),
     },
     "- 1": "a list cannot be a key",
