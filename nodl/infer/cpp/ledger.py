@@ -228,6 +228,9 @@ class Reach:
         for cls in sorted(self.used):
             self._use_class(cls)
         self.waiting += functions
+        self.waiting += [
+            f for name, found in self.by_name.items() if name.startswith("operator") for f in found
+        ]
         self.followed = True
         return set(self._each())
 
@@ -286,7 +289,9 @@ class Reach:
             for field in cls.fields.values():
                 self._field(field)
             for method in (m for table in self.run.names.methods.get(cls, {}).values() for m in table):
-                if method.virtual:  # called through a base
+                if method.virtual or method.name.startswith(
+                    "operator"
+                ):  # called through a base, or by a sign
                     self.waiting.append(method)
 
     def _field(self, field: Field) -> None:

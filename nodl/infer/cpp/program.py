@@ -17,7 +17,7 @@ from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account
 from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
-from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function
+from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
@@ -28,7 +28,7 @@ from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import BudgetExceeded, Machine, Settings
 from nodl.infer.cpp.running.values import BOTTOM, Obj, Seq, Value, unknown
-from nodl.infer.cpp.syntax import line_of
+from nodl.infer.cpp.syntax import children, line_of, text
 from nodl.source_ref import SourceRef
 
 MAX_FILE_SIZE = 2_000_000
@@ -209,11 +209,33 @@ def _globals(run: Machine, entry: Entry) -> None:
 
     for file in entry.files:
         index = run.names.files.get(file)
-        for listed in list(index.globals.values()) if index is not None else []:
-            for each in listed:
-                kind = run.names.resolve(each.type, each.scope, each.file)
-                if run.names.class_of(kind, each.scope, each.file) is not None or each.value is not None:
-                    constant(run, "::".join((*each.scope, each.name)), Frame(each.file, each.scope))
+        for each in _variables(run, index) if index is not None else ():
+            kind = run.names.resolve(each.type, each.scope, each.file)
+            mark = run.store.mark()
+            if run.names.class_of(kind, each.scope, each.file) is not None or each.value is not None:
+                constant(run, "::".join((*each.scope, each.name)), Frame(each.file, each.scope))
+            _check_order(run, each, mark)
+
+
+def _check_order(run: Machine, initialised: Global, mark: int) -> None:
+    """Nobody knows which of two files is initialised first ([basic.start.dynamic]): one must not write to the other."""
+    for cell in run.store.changes(mark):
+        owner = cell[0]
+        if isinstance(owner, Global) and owner.file.file not in run.names.visible(initialised.file.file):
+            place = SourceRef(initialised.file.file, line_of(initialised.node))
+            why = f"{owner.name} is changed before main by another file than its own: in which order is not known"
+            run.gaps.setdefault((place, why))
+
+
+def _variables(run: Machine, index: FileIndex) -> list[Global]:
+    """Those of a file in their order, with what reads as a function whose parameters are variables."""
+    found = [each for listed in index.globals.values() for each in listed]
+    for each in index.maybe:
+        given = [text(argument) for argument in children(each.value)]
+        if any(run.names.find_global(name, each.scope, index) for name in given):
+            run.names.globals.setdefault(each.name, []).append(each)
+            found.append(each)
+    return sorted(found, key=lambda each: each.node.start_byte)
 
 
 def _run_main(run: Machine, function: Function) -> None:
@@ -274,6 +296,9 @@ def _findings(run: Machine, sources: Sources) -> Findings:
             findings.gaps.setdefault(
                 (source, f"{what} was never seen to be set: what {name}() makes is not known")
             )
+    for kind, cls in run.names.doubts.items():
+        why = f"which specialisation of {cls.qualified} is meant by {kind} is not known"
+        findings.gaps.setdefault((SourceRef(cls.file.file, cls.line), why))
     own = list(run.names.files.values())
     findings.answers = account(run, own)
     for index in own:

@@ -212,10 +212,21 @@ for _what in ("name", "ns", "fqn"):
     _says(_what)
 
 
-@node_method("get_effective_namespace", "get_sub_namespace")
-def _namespaces(run: Machine, call: Call) -> Value:
+@node_method("get_sub_namespace")
+def _sub_namespace(run: Machine, call: Call) -> Value:
+    """rclcpp/src/rclcpp/node.cpp: empty for the node itself."""
+    return (call.receiver.data.get("prefix") if call.receiver is not None else None) or literal("")
+
+
+@node_method("get_effective_namespace")
+def _effective_namespace(run: Machine, call: Call) -> Value:
+    """rclcpp/src/rclcpp/node.cpp: the namespace of the node, of a sub-node with its own behind it."""
     record = call.receiver.node if call.receiver is not None else None
-    return (Text((NodePart(record, "ns"),)),) if record is not None else unknown("a namespace")
+    if call.receiver is None or record is None:
+        return unknown("a namespace")
+    if call.receiver.data.get("prefix"):
+        return unknown("the namespace of a sub-node")
+    return (Text((NodePart(record, "ns"),)),)
 
 
 @node_method("create_sub_node")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from itertools import pairwise
 from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
@@ -17,7 +18,8 @@ from nodl.infer.cpp.reading.declarations import (
     type_text,
 )
 from nodl.infer.cpp.reading.preprocess import Preprocessed
-from nodl.infer.cpp.syntax import children, line_of, parse, text, walk
+from nodl.infer.cpp.reading.type_names import split_type
+from nodl.infer.cpp.syntax import children, line_of, parse, parse_expression, text, walk
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -100,12 +102,16 @@ class _Collector:
         made = Class(
             name, "::".join((*scope, *(steps or [name]))), self.index, node, inner, templates=templates
         )
+        made.specialises = split_type(text(named))[1] or None
         made.template_defaults, self.defaults = (self.defaults if templates else {}), {}
         for child in node.named_children:
             if child.type == "base_class_clause":
-                made.bases = [
-                    text(b) for b in children(child) if b.type not in ("access_specifier", "virtual")
+                listed = [
+                    b for b in child.children if b.type == "virtual" or (b.is_named and b.type != "comment")
                 ]
+                listed = [b for b in listed if b.type != "access_specifier"]
+                made.bases = [text(b) for b in listed if b.type != "virtual"]
+                made.virtual_bases = {text(b) for before, b in pairwise(listed) if before.type == "virtual"}
         self.index.classes.setdefault(name, []).append(made)
         self.collect(body, inner, [], made)
 
@@ -156,12 +162,14 @@ class _Collector:
         declarator = function_declarator(node)
         if declarator is None:
             return None
-        full = _plain_name(text(declarator.child_by_field_name("declarator")))
+        named = text(declarator.child_by_field_name("declarator"))
+        full = _plain_name(named)
         owner, _, name = full.rpartition("::")
         if cls is not None:
             owner = cls.qualified
         inner = scope if cls is not None else (*scope, *(step for step in owner.split("::") if step))
         made = Function(name, node, self.index, inner, owner, templates=templates)
+        made.specialises = _specialised(named, templates) if cls is None else None
         made.parameters = parameters_of(declarator, made)
         words = {
             text(child)
@@ -193,19 +201,35 @@ class _Collector:
             made = self._function(node, scope, templates, cls)
             if made is not None:
                 self._declare(made, cls)
+                if cls is None and made.parameters and not any(p.name for p in made.parameters):
+                    self._object_or_function(node, made)
             return
         for declared in declared_names(node):
-            self._variable(node, declared, scope, cls)
+            self._variable(node, declared, scope, templates, cls)
 
-    def _variable(self, node: Node, declared: DeclaredVariable, scope: Scope, cls: Class | None) -> None:
+    def _object_or_function(self, node: Node, made: Function) -> None:
+        """``Foo foo(bar);`` is a variable where ``bar`` is one."""
+        declarator = function_declarator(node)
+        listed = text(declarator.child_by_field_name("parameters")) if declarator is not None else "()"
+        call = parse_expression(f"f{listed}")
+        given = call.child_by_field_name("arguments") if call is not None else None
+        self.index.maybe.append(
+            Global(made.name, type_text(node), given, node, made.scope, self.index, False)
+        )
+
+    def _variable(
+        self, node: Node, declared: DeclaredVariable, scope: Scope, templates: list[str], cls: Class | None
+    ) -> None:
         name, value, pointer, written = declared
+        specialises = _specialised(name, templates)
+        name = _plain_name(name)
         static = any(text(c) == "static" for c in node.named_children if c.type == "storage_class_specifier")
         if cls is not None:
             cls.fields[name] = Field(name, written, value, static, pointer, node)
             return
         owner, _, last = name.rpartition("::")
         inner = (*scope, *(step for step in owner.split("::") if step))
-        made = Global(last, written, value, node, inner, self.index, pointer)
+        made = Global(last, written, value, node, inner, self.index, pointer, specialises)
         self.index.globals.setdefault(last, []).append(made)
 
     def alias(self, node: Node, scope: Scope, cls: Class | None) -> None:
@@ -240,6 +264,16 @@ class _Collector:
             self.index.aliases["::".join((*scope, text(inner[0])))] = (text(inner[-1]), scope)
 
 
+def _specialised(name: str, templates: list[str]) -> tuple[str, ...] | None:
+    """The arguments in ``Foo<int>::f`` and ``f<int>``, unless they are the parameters of the template themselves."""
+    written = split_type(name)[1] if "operator" not in name else ()
+    return (
+        None
+        if not written or set(written) <= {*templates, *(f"{each}..." for each in templates)}
+        else written
+    )
+
+
 def _required(node: Node, name: str) -> Node:
     return node.child_by_field_name(name) or node
 
@@ -262,8 +296,8 @@ def _template_names(node: Node | None) -> list[str]:
 def _template_defaults(node: Node | None) -> dict[str, str]:
     found = {}
     for child in children(node):
-        default = child.child_by_field_name("default_type")
-        name = child.child_by_field_name("name")
+        default = child.child_by_field_name("default_type") or child.child_by_field_name("default_value")
+        name = child.child_by_field_name("name") or child.child_by_field_name("declarator")
         if default is not None and name is not None:
             found[text(name)] = text(default)
     return found

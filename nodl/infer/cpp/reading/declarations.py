@@ -48,6 +48,7 @@ class Function:
     virtual: bool = False
     static: bool = False
     variadic: bool = False
+    specialises: tuple[str, ...] | None = None  # arguments as written, its own or those of its class
     written: Writes | None = None  # variables that it may change, when asked
     _words: frozenset[str] | None = None
 
@@ -98,12 +99,16 @@ class Class:
     node: Node
     scope: Scope
     bases: list[str] = field(default_factory=list)
+    virtual_bases: set[str] = field(default_factory=set)
     templates: list[str] = field(default_factory=list)
     fields: dict[str, Field] = field(default_factory=dict)
     methods: dict[str, list[Function]] = field(default_factory=dict)
     declared: dict[str, list[Function]] = field(default_factory=dict)  # without body: defaults and virtual
     inherits_constructors: bool = False
     template_defaults: dict[str, str] = field(default_factory=dict)
+    specialises: tuple[str, ...] | None = (
+        None  # arguments as written, of an explicit or partial specialisation
+    )
 
     @property
     def line(self) -> int:
@@ -124,6 +129,7 @@ class Global:
     scope: Scope
     file: FileIndex
     pointer: bool
+    specialises: tuple[str, ...] | None = None  # the arguments of its class, as written
 
 
 @dataclass(eq=False, slots=True)
@@ -146,6 +152,7 @@ class FileIndex:
     enumerator_numbers: dict[str, int] = field(default_factory=dict)  # by qualified name
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
+    maybe: list[Global] = field(default_factory=list)  # declarations that read as functions, too
 
 
 def function_declarator(node: Node) -> Node | None:

@@ -48,7 +48,8 @@ def expanded(source: str, macros: Mapping[str, Macro], depth: int = 0) -> str:
             if given is None:
                 continue
         rest = {name: each for name, each in macros.items() if name != word}
-        body = expanded(_filled(macro, given or []), rest, depth + 1)
+        scanned = [expanded(each, macros, depth + 1) for each in given or ()]
+        body = expanded(_filled(macro, given or [], scanned), rest, depth + 1)
         out += [source[position : match.start()], body, "\n" * source.count("\n", match.start(), end)]
         position = end
     out.append(source[position:])
@@ -82,16 +83,24 @@ def _arguments(source: str, position: int) -> tuple[list[str] | None, int]:
     return None, position
 
 
-def _filled(macro: Macro, given: list[str]) -> str:
+def _filled(macro: Macro, given: list[str], scanned: list[str]) -> str:
+    """The body with its arguments: as written beside ``#`` and ``##``, else ``scanned`` ([cpp.subst])."""
     if not macro.parameters:
         return macro.body
-    names = [name for name in macro.parameters if name]
+    values, expanded_ones = _by_name(macro, given), _by_name(macro, scanned)
+    body = re.sub(r"(?<!#)#\s*(\w+)", lambda m: _quoted(values[m[1]]) if m[1] in values else m[0], macro.body)
+    if "##" in body:
+        body = re.sub(r"(\w+)(?=\s*##)|(?<=##)(\s*\w+)", lambda m: values.get(m[0].strip(), m[0]), body)
+        body = re.sub(r"\s*##\s*", "", body)
+    return _WORD.sub(lambda m: expanded_ones.get(m[0], m[0]), body)
+
+
+def _by_name(macro: Macro, given: list[str]) -> dict[str, str]:
+    names = [name for name in macro.parameters or () if name]
     values = dict(zip(names, given, strict=False))
     if names and names[-1].endswith("..."):
         values["__VA_ARGS__"] = ", ".join(given[len(names) - 1 :])
-    body = re.sub(r"(?<!#)#\s*(\w+)", lambda m: _quoted(values[m[1]]) if m[1] in values else m[0], macro.body)
-    body = _WORD.sub(lambda m: values.get(m[0], m[0]), body)
-    return re.sub(r"\s*##\s*", "", body)
+    return values
 
 
 def _quoted(value: str) -> str:

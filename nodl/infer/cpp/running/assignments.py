@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.running.contents import copied
+from nodl.infer.cpp.running.contents import copied, overwrite
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.hiding import cell_of, class_of_member, lexical_class, seen_class
 from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.numbers import added, as_type
+from nodl.infer.cpp.running.references import is_plain, through, told
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Group,
     Map,
     Obj,
     Param,
@@ -23,12 +27,14 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.running.variables import current_object, declared_type
+from nodl.infer.cpp.running.variables import current_object, declared_type, static_member
 from nodl.infer.cpp.syntax import children, text, unwrapped
 from nodl.name_template import UnknownPart
 
 if TYPE_CHECKING:
     from tree_sitter import Node
+
+    from nodl.infer.cpp.reading.declarations import Class
 
 
 @expression("assignment_expression")
@@ -40,11 +46,19 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     right = node.child_by_field_name("right")
     if left is None:
         return BOTTOM
+    misread = next((child for child in node.children if child.is_error), None)
+    if misread is not None:
+        return _with_comma(run, left, misread, right, frame)
     if operator == "=" and right is not None and right.type == "initializer_list":
         value = _braced(run, left, right, frame)
     else:
         value = run.evaluate(right, frame)
     if operator == "=":
+        cls = object_class(run, left, frame)
+        before = run.evaluate(left, frame) if cls is not None else BOTTOM
+        objects = bool(before) and all(isinstance(atom, Obj) and atom.cls is not None for atom in before)
+        if objects and _assigned(run, before, value, node, frame):
+            return before
         value = copied(run, value, node, frame)
     elif operator == "+=":
         before = run.evaluate(left, frame)
@@ -56,8 +70,84 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
             value = _combined("+", before, value)
     else:
         value = _combined(operator[:-1], run.evaluate(left, frame), value)
-    assign(run, left, _as_declared(run, left, value, frame), frame)
+    value_held = _as_declared(run, left, value, frame)
+    if operator == "=" and left.type == "identifier" and _is_pointer(run, left, frame):
+        _points_elsewhere(run, left, value_held, frame)
+    else:
+        assign(run, left, value_held, frame)
     return value
+
+
+def _is_pointer(run: Machine, name: Node, frame: Frame) -> bool:
+    found = declared_type(run, name, frame)
+    return found is not None and (found[0].pointer or (found[1] and not _is_reference(run, name, frame)))
+
+
+def _is_reference(run: Machine, name: Node, frame: Frame) -> bool:
+    owner = frame.owner_of(text(name))
+    if owner is not None:
+        return owner.types.get(text(name), "").endswith("&")
+    this = current_object(frame)
+    fields = (
+        [c.fields[text(name)] for c in run.names.ancestry(this.cls) if text(name) in c.fields]
+        if this and this.cls
+        else []
+    )
+    return bool(fields) and "&" in text(fields[0].node).partition("=")[0]
+
+
+def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> None:
+    """``p = &x``: of a plain value what the pointer shows from now on is not known."""
+    owner = frame.owner_of(text(name))
+    if owner is not None and text(name) in owner.aliases:
+        owner.aliases[text(name)] = None
+        value = unknown(f"what {text(name)} points to")
+    _assign_name(run, name, value, frame)
+
+
+def _with_comma(run: Machine, left: Node, misread: Node, right: Node | None, frame: Frame) -> Value:
+    """``(x = a, b)``, which the parser reads as ``x = b`` with an error ``a,`` in between."""
+    listed = children(misread)
+    is_comma = text(misread).endswith(",") and len(listed) == 1
+    assign(
+        run,
+        left,
+        run.evaluate(listed[0], frame) if is_comma else unknown("what the parser did not understand"),
+        frame,
+    )
+    return run.evaluate(right, frame)
+
+
+def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, frame: Frame) -> bool:
+    """``object = value``: by the operator of its class, else member by member; whether that could be done."""
+    from nodl.infer.cpp.running.invocation import call_methods
+
+    for target in targets:
+        own = run.names.find_methods(target.cls, "operator=") if target.cls is not None else []
+        if own:
+            call_methods(run, own, target, [value], node, frame, ())
+        elif all(isinstance(atom, Obj) and atom.cls is not None for atom in value):
+            overwrite(run, targets, value)
+            break
+        else:
+            return False
+    return True
+
+
+def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
+    """The class of what an object is assigned to; ``None`` where a pointer is assigned, or that is not known."""
+    inner = unwrapped(left)
+    if inner is not None and inner.type == "pointer_expression":
+        return seen_class(run, inner, frame)
+    found = declared_type(run, inner, frame) if inner is not None else None
+    if (
+        inner is None
+        or found is None
+        or found[0].pointer
+        or (found[1] and not _is_reference(run, inner, frame))
+    ):
+        return None
+    return run.names.class_of(found[0], frame.scope, frame.file)
 
 
 def _combined(operator: str, before: Value, value: Value) -> Value:
@@ -92,7 +182,7 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
     if inner is None:
         return
     if inner.type in ("identifier", "field_identifier", "qualified_identifier"):
-        _assign_name(run, text(inner), value, frame)
+        _assign_name(run, inner, value, frame)
     elif inner.type == "field_expression":
         _assign_field(run, inner, value, frame)
     elif inner.type == "subscript_expression":
@@ -100,6 +190,7 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
     elif inner.type == "pointer_expression":
         argument = inner.child_by_field_name("argument")
         if argument is not None:
+            _through_pointer(run, argument, value, frame)
             assign(run, argument, value, frame)
     elif inner.type == "conditional_expression":
         for side in ("consequence", "alternative"):
@@ -136,16 +227,45 @@ def _one_of(atom: object, value: Value) -> object:
     return atom._replace(open=True) if isinstance(atom, Map) else Unknown("a text whose letters are written")
 
 
-def _assign_name(run: Machine, name: str, value: Value, frame: Frame) -> None:
+def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) -> None:
+    """``*p = x`` where ``p`` is an iterator, or a pointer of which nobody knows to what."""
+    found = declared_type(run, pointer, frame)
+    owner = frame.owner_of(text(pointer))
+    if owner is None or found is None or found[0].pointer or text(pointer) in owner.aliases:
+        return
+    if owner.function is not None and any(p.name == text(pointer) for p in owner.function.parameters):
+        return
+    before = run.evaluate(pointer, frame)
+    if is_plain(before) and is_plain(value) and set(before) != set(value):
+        through(run, pointer, frame)
+
+
+def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None:
+    name = text(target)
     owner = frame.owner_of(name)
+    if owner is not None and name in owner.aliases:
+        alias = owner.aliases[name]
+        if alias is None:
+            through(run, target, frame)
+        else:
+            assign(run, alias, value, owner)
+            return
     if owner is not None:
+        told(run, (owner, name), value, target, frame)
         run.store.set((owner, name), value)
         return
     this_object = current_object(frame)
     if this_object is not None and "::" not in name:
-        for each in run.names.ancestry(this_object.cls) if this_object.cls is not None else ():
+        lexical = lexical_class(run, this_object, frame)
+        for each in run.names.ancestry(lexical) if lexical is not None else ():
             if name in each.fields:
-                run.store.set((each if each.fields[name].static else this_object, name), value)
+                cell = cell_of(run, this_object, name, each)
+                if not each.fields[name].static:
+                    told(run, (this_object, cell), value, target, frame)
+                    run.store.set((this_object, cell), value)
+                    return
+                before = static_member(run, each, name) if each.templates else BOTTOM
+                run.store.set((each, name), join(before, value) if each.templates else value)
                 return
     outside = run.names.find_global(name, frame.scope, frame.file)
     if outside is not None:
@@ -156,15 +276,34 @@ def _assign_name(run: Machine, name: str, value: Value, frame: Frame) -> None:
 
 def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     owners = run.evaluate(node.child_by_field_name("argument"), frame)
-    name = text(node.child_by_field_name("field"))
+    name = text(node.child_by_field_name("field")).rpartition("::")[2]
     objects = [atom for atom in owners if isinstance(atom, Obj)]
+    if any(isinstance(atom, Group) for atom in owners) and name in ("first", "second"):
+        _assign_half(run, node, owners, name, value, frame)
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
         for atom in value:  # a library keeps it and may call it
             run.later(atom, frame)
     for each in objects:
         strong = len(owners) == 1
-        before = run.store.get((each, name)) or BOTTOM
-        run.store.set((each, name), value if strong else join(before, value))
+        cell = (each, cell_of(run, each, name, class_of_member(run, each, name, node, frame)))
+        before = run.store.get(cell) or BOTTOM
+        run.store.set(cell, value if strong else join(before, value))
+
+
+def _assign_half(run: Machine, node: Node, owners: Value, name: str, value: Value, frame: Frame) -> None:
+    """``pair.first = x``; through an iterator it is not known whose entry is written."""
+    argument = node.child_by_field_name("argument")
+    if not is_plain(value):
+        return
+    if argument is None or text(node.child_by_field_name("operator")) == "->":
+        through(run, node, frame)
+        return
+    halves = [
+        (value, a.items[1]) if name == "first" else (a.items[0], value)
+        for a in owners
+        if isinstance(a, Group)
+    ]
+    assign(run, argument, tuple(Group(each) for each in halves), frame)
 
 
 def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> None:

@@ -10,16 +10,19 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BASES, Call
 from nodl.infer.cpp.reading.type_names import NO_TYPE
+from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.hiding import lexical_class
 from nodl.infer.cpp.running.invocation import call_functions, call_methods, call_values
 from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.method_calls import by_model, is_library_method, method_call, of_this, on_object
 from nodl.infer.cpp.running.objects import cast, is_plain_type, made
+from nodl.infer.cpp.running.references import is_plain, keep_references
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, may_write
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
-from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, join, unknown
 from nodl.infer.cpp.running.variables import current_object, member, variable
 from nodl.infer.cpp.syntax import children, text, unwrapped
 
@@ -59,6 +62,11 @@ def _named_call(run: Machine, node: Node, callee: Node, given: list[Node], frame
     name = callee_name(callee)
     if name in CASTS:
         value = run.evaluate(given[0], frame) if given else BOTTOM
+        if name in ("std::ref", "std::cref") and is_plain(value):
+            later = join(value, unknown("what is written through a reference to it"))
+            if name == "std::ref":
+                assign(run, given[0], later, frame)
+            return later
         return cast(run, types_of(run, callee, frame)[0], value) if name == "static_cast" else value
     if "::" not in name:
         owner = frame.owner_of(name)
@@ -87,7 +95,7 @@ def _own_method(
                 return call_methods(
                     run, methods, this_object, values, node, frame, types_of(run, callee, frame)
                 )
-            field = member(run, this_object, name, frame)
+            field = member(run, this_object, name, lexical_class(run, this_object, frame))
             if field is not None:
                 values = [run.evaluate(each, frame) for each in given]
                 return call_values(run, field, values, node, frame)
@@ -143,7 +151,9 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
     ):
         values = [run.evaluate(each, frame) for each in given]
         kind = types[0] if types else NO_TYPE
-        return construct(run, kind._replace(pointer=False), values, node, frame, heap=True)
+        new = construct(run, kind._replace(pointer=False), values, node, frame, heap=True)
+        keep_references(run, new, given, frame)
+        return new
     functions = run.names.find_functions(name, frame.scope, frame.file)
     if functions:
         values = [run.evaluate(each, frame) for each in given]
@@ -172,7 +182,7 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
     if known or run.names.class_of(kind, frame.scope, frame.file) is not None:
         return made(run, node, kind, given, frame)
     if head:
-        found = _static_method(run, node, callee, head, last, given, frame)
+        found = _static_method(run, node, callee, name.rpartition("::")[0] or head, last, given, frame)
         if found is not None:
             return found
     values = [run.evaluate(each, frame) for each in given]
@@ -237,7 +247,7 @@ def _static_method(
             frame,
             types_of(run, callee, frame),
             exactly=True,
-            bindings=dict(zip(cls.templates, kind.arguments, strict=False)),
+            bindings=run.names.bindings(cls, kind),
         )
     if is_only_declared(run, cls, last):
         return without_source(run, f"{cls.name}::{last}", values, node, frame, None)

@@ -7,12 +7,24 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
+from nodl.infer.cpp.reading.inheritance import repeated_base
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
-from nodl.infer.cpp.running.objects import MAPS, SEQUENCES, converted, default_value, initial_value, made
-from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Map, Obj, Seq, Text, Value, unknown
+from nodl.infer.cpp.running.hiding import cell_of
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, WORD, Machine
+from nodl.infer.cpp.running.objects import (
+    MAPS,
+    SEQUENCES,
+    converted,
+    default_value,
+    fields_of,
+    initial_value,
+    is_aggregate,
+    made,
+)
+from nodl.infer.cpp.running.overloads import chosen
+from nodl.infer.cpp.running.values import BOTTOM, Map, Obj, Seq, Text, Unknown, Value, unknown
 from nodl.infer.cpp.syntax import children
 
 if TYPE_CHECKING:
@@ -41,7 +53,16 @@ def construct(
     made_object = run.obj(key, kind, cls=cls, heap=heap)
     run.handle(node, frame)
     if cls is not None:
+        if members is None and arguments and is_aggregate(run, cls):
+            members = dict(zip(fields_of(cls), arguments, strict=False))
         made_object.data["members"] = members or {}
+        twice = repeated_base(run.names, cls)
+        if twice is not None:
+            run.gap(
+                node,
+                frame,
+                f"{cls.name} has the members of {twice.name} twice: which are meant is not followed",
+            )
         _start_fields(run, made_object, cls)
         construct_class(run, made_object, cls, kind, arguments, node, frame)
         return (made_object,)
@@ -98,17 +119,14 @@ def _start_fields(run: Machine, made_object: Obj, cls: Class) -> None:
     for each in run.names.ancestry(cls):
         for name, member in each.fields.items():
             if not member.static:
-                run.store.set((made_object, name), BOTTOM)
+                run.store.set((made_object, cell_of(run, made_object, name, each)), BOTTOM)
 
 
 def construct_class(
     run: Machine, this: Obj, cls: Class, kind: Type, arguments: Sequence[Value], node: Node, frame: Frame
 ) -> None:
     """Run the constructor of ``cls`` (a base or the class itself) on ``this``."""
-    bindings = dict(zip(cls.templates, kind.arguments, strict=False))
-    for name, default in cls.template_defaults.items():
-        bindings.setdefault(name, run.names.resolve(default, cls.scope, cls.file))
-    this.bindings[cls] = bindings
+    this.bindings[cls] = run.names.bindings(cls, kind)
     constructor = chosen(
         run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
     )
@@ -141,14 +159,41 @@ def construct_class(
         outcome = run.execute(constructor.body, inner)
         run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     this.building = outside
+    if constructor is not None:
+        _written_arguments(run, constructor, arguments, inner, node, frame)
     inner.active, inner.finished = False, not inner.captured
     if constructor is not None:
         run.active.pop()
-    elif arguments and cls.name in cls.declared:
-        handed_over(
-            run, f"the constructor of {cls.name}, whose source is not in reach", arguments, node, frame
-        )
+    elif arguments and not this.data["members"] and not cls.inherits_constructors:
+        _made_unseen(run, cls, arguments, node, frame)
+
+
+def _made_unseen(run: Machine, cls: Class, arguments: Sequence[Value], node: Node, frame: Frame) -> None:
+    """No constructor in reach takes these arguments: they copy an object, or what becomes of them is not known."""
+    if cls.name in cls.declared:
+        whom = f"the constructor of {cls.name}, whose source is not in reach"
+        handed_over(run, whom, arguments, node, frame)
         run.gap(node, frame, f"the source of the constructor of {cls.name} is not in reach")
+    elif len(arguments) > 1 or not all(isinstance(atom, Obj | Unknown) for atom in arguments[0]):
+        run.gap(node, frame, f"how {cls.name} is made of what it is given is not known")
+
+
+def _written_arguments(
+    run: Machine, constructor: Function, arguments: Sequence[Value], inner: Frame, node: Node, frame: Frame
+) -> None:
+    """A constructor that writes to a text or list of its caller through a reference is not followed."""
+    for parameter, value in zip(constructor.parameters, arguments, strict=False):
+        after = run.store.get((inner, parameter.name)) or BOTTOM
+        changed = is_written_back(parameter) and set(after) != set(value)
+        if changed and any(isinstance(atom, Text | Seq | Map) for atom in (*value, *after)):
+            what = f"what the constructor of {constructor.name} writes to its argument {parameter.name}"
+            run.gap(node, frame, f"{what} is not followed")
+
+
+def is_written_back(parameter: FunctionParameter) -> bool:
+    """Whether what a function writes to the parameter shows in its caller."""
+    marked = parameter.type.rstrip().endswith(("&", "*"))
+    return marked and "const" not in parameter.type.split() and bool(parameter.name)
 
 
 def _is_delegate(run: Machine, cls: Class, written: str, inner: Frame) -> bool:
@@ -178,7 +223,7 @@ def _bases(
     node: Node,
     inner: Frame,
 ) -> None:
-    for written in cls.bases:
+    for written in _made_by(run, this, cls):
         kind = run.names.resolve(written, cls.scope, cls.file, this.bindings.get(cls))
         name = _member_name(written)
         where = given.get(name) or given.get(kind.last) or _alias_initialiser(run, cls, kind, given, inner)
@@ -200,6 +245,14 @@ def _bases(
                 where or node,
                 inner if where is not None else Frame(cls.file, cls.scope, path=inner.path),
             )
+
+
+def _made_by(run: Machine, this: Obj, cls: Class) -> list[str]:
+    """The bases that a constructor makes: virtual ones only that of the object's own class, and those of its bases."""
+    if this.cls is not cls:
+        return [written for written in cls.bases if written not in cls.virtual_bases]
+    above = [written for each in run.names.ancestry(cls)[1:] for written in sorted(each.virtual_bases)]
+    return [*dict.fromkeys((*above, *cls.bases))]
 
 
 def _alias_initialiser(
@@ -236,7 +289,7 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: 
         if member.static:
             continue
         if name in known:
-            run.store.set((this, name), known[name])
+            run.store.set((this, cell_of(run, this, name, cls)), known[name])
             continue
         where = given.get(name)
         frame = (
@@ -279,65 +332,7 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: 
                 conditions=inner.conditions,
             )
             found = default_value(run, member.node, kind, keyed)
-        run.store.set((this, name), found)
-
-
-def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:
-    """The overload that takes so many arguments; of several, the one whose parameters look like them."""
-    found = candidates(functions, arguments)
-    return found[0] if found else None
-
-
-MAX_OVERLOADS = 3
-
-
-def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Sequence[Function]:
-    """The overloads that fit best: more than one where a text may be meant in several ways. Of arguments that are not
-    known the first decides; the ledger asks about the others."""
-    fitting = [each for each in functions if _takes(each, len(arguments))]
-    if len(fitting) <= 1:
-        return fitting or (functions if len(functions) == 1 else ())
-    scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
-    best = [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
-    is_text = any(isinstance(atom, Text) for value in arguments for atom in value)
-    return best if is_text and len(best) <= MAX_OVERLOADS else best[:1]
-
-
-def _takes(function: Function, count: int) -> bool:
-    required = sum(1 for p in function.parameters if p.default is None and "..." not in p.type)
-    return function.variadic or required <= count <= len(function.parameters)
-
-
-def _likeness(parameter: FunctionParameter, value: Value) -> int:
-    """How well an argument fits a parameter, by their looks."""
-    atom = value[0] if value else None
-    kind = parameter.type
-    is_text = "string" in kind or "char" in kind
-    is_generic = (
-        re.fullmatch(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?", kind) is not None and "Descriptor" not in kind
-    )
-    if isinstance(atom, Text):
-        return 3 if is_text else (1 if is_generic else -3)
-    if isinstance(atom, Obj):
-        names = {atom.type.last, *(c.name for c in atom.bindings)}
-        if atom.node is not None and ("Node" in kind or "node" in kind):
-            return 3
-        return (
-            3 if any(name and name in kind for name in names) else (1 if is_generic else -3 if is_text else 0)
-        )
-    if isinstance(atom, bool):
-        return 3 if "bool" in kind else (1 if is_generic else -2)
-    if isinstance(atom, int | float):
-        own = r"double|float" if isinstance(atom, float) else r"int|size_t|long"
-        return 3 if re.search(own, kind) else 2 if _NUMBER.search(kind) else (1 if is_generic else -2)
-    if isinstance(atom, Lambda | Bound):
-        return 2 if "function" in kind or "allback" in kind else (1 if is_generic else -2)
-    if isinstance(atom, Seq | Map):
-        return 2 if re.search(r"vector|array|list|map|set", kind) else (1 if is_generic else -2)
-    return 0
-
-
-_NUMBER = re.compile(r"int|double|float|size_t|long")
+        run.store.set((this, cell_of(run, this, name, cls)), found)
 
 
 def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value], inner: Frame) -> None:
@@ -349,7 +344,9 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
             if function.variadic and index + 1 == len(function.parameters) < len(arguments):
                 value = unknown("several arguments of a parameter pack")
             if not parameter.type.rstrip().endswith(("&", "*")):
-                value = copied(run, value, function.node, inner)
+                value = copied(
+                    run, value, function.node, inner, _class_of_parameter(run, parameter, value, inner)
+                )
         else:
             value = unknown(f"the argument {parameter.name}")
             if parameter.default is not None:
@@ -359,3 +356,17 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
                 value = run.evaluate(parameter.default, place)
         if parameter.name:
             run.local(inner, parameter.name, value, parameter.type)
+
+
+def _class_of_parameter(
+    run: Machine, parameter: FunctionParameter, value: Value, inner: Frame
+) -> Class | None:
+    """The class of a parameter that is an object, where an object is given."""
+    if not any(isinstance(atom, Obj) and atom.cls is not None for atom in value):
+        return None
+    if inner.function is not None and not {*WORD.findall(parameter.type)}.isdisjoint(
+        inner.function.templates
+    ):
+        return None  # may be a pointer
+    kind = run.type_of(parameter.type, inner)
+    return None if kind.pointer else run.names.class_of(kind, inner.scope, inner.file)

@@ -121,7 +121,12 @@ def _added(
     elif given and given[-1].type == "initializer_list" and inner is not None and inner.name:
         value = made(run, given[-1], inner, children(given[-1]), frame)
     else:
-        listed = [copied(run, run.evaluate(each, frame), each, frame) for each in given]
+        cls = (
+            run.names.class_of(inner, frame.scope, frame.file)
+            if inner is not None and not inner.pointer
+            else None
+        )
+        listed = [copied(run, run.evaluate(each, frame), each, frame, cls) for each in given]
         if name == "insert" and len(listed) == 3:
             return _inserted(run, atom, listed, given, receiver, frame)
         value = listed[-1] if listed else BOTTOM

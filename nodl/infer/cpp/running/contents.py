@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.hiding import cell_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
+    Lambda,
     Map,
     Obj,
     Param,
     Seq,
     Unknown,
     Value,
+    join,
     literal,
     unknown,
 )
+from nodl.infer.cpp.syntax import text, walk
 
 if TYPE_CHECKING:
     from tree_sitter import Node
+
+    from nodl.infer.cpp.reading.declarations import Class, Function
 
 
 def nodes_in(run: Machine, value: Value) -> list[Obj]:
@@ -56,29 +65,78 @@ def handed_over(
             run.later(atom, frame)
 
 
-def copied(run: Machine, value: Value, node: Node, frame: Frame) -> Value:
-    """Structures are copied by value; nodes, pointers and all else stay who they are."""
+def copied(run: Machine, value: Value, node: Node, frame: Frame, cls: Class | None = None) -> Value:
+    """Structures are copied by value; nodes, pointers and all else stay who they are.
+
+    Into an object of ``cls`` goes of a derived class what it has of ``cls`` (slicing), also from behind a pointer.
+    """
     if not any(
-        isinstance(atom, Obj) and not atom.heap and atom.cls is not None and atom.node is None
+        (isinstance(atom, Obj) and atom.cls is not None and atom.node is None) or isinstance(atom, Lambda)
         for atom in value
     ):
         return value
-    return tuple(_copy(run, atom, node, frame) for atom in value)
+    return tuple(_copy(run, atom, node, frame, cls) for atom in value)
 
 
-def _copy(run: Machine, atom: object, node: Node, frame: Frame) -> object:
-    if not isinstance(atom, Obj) or atom.heap or atom.cls is None or atom.node is not None:
-        return atom
-    names = [name for each in run.names.ancestry(atom.cls) for name in each.fields]
-    values = {name: run.store.get((atom, name)) for name in names}
-    if any(nodes_in(run, value or BOTTOM) for value in values.values()):
+def _copy_of_closure(run: Machine, atom: Lambda, node: Node, frame: Frame) -> Lambda:
+    """A closure that changes what it captured by value does so in each copy of its own."""
+    if not any(child.type == "mutable" or text(child) == "mutable" for child in walk(atom.node)):
         return atom
     key = ("copy", atom, frame.file.file, node.start_byte, frame.path)
-    twin = run.obj(key, atom.type, cls=atom.cls, bindings=atom.bindings, foreign_base=atom.foreign_base)
-    for name, value in values.items():
+    twin = run.frame(
+        key, dataclasses.replace(atom.frame, names={*atom.frame.names}, exits=[], exit_values=[], loops=[])
+    )
+    for name in atom.frame.names:
+        run.store.set((twin, name), run.store.get((atom.frame, name)) or BOTTOM)
+    return Lambda(atom.node, twin)
+
+
+def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | None) -> object:
+    if isinstance(atom, Lambda):
+        return _copy_of_closure(run, atom, node, frame)
+    if not isinstance(atom, Obj) or atom.cls is None or atom.node is not None:
+        return atom
+    target = cls if cls is not None and cls in run.names.ancestry(atom.cls) else atom.cls
+    if atom.heap and target is not cls:
+        return atom
+    own = [each for each in run.names.methods[target].get(target.name, ()) if _takes_another(each)]
+    if any(map(run.makes_interfaces, own)) or (
+        own and any("string" in f.type for f in target.fields.values())
+    ):
+        run.gap(node, frame, f"the constructor of {target.name} that copies or moves it is not followed here")
+    cells = {
+        (each, name): run.store.get((atom, cell_of(run, atom, name, each)))
+        for each in run.names.ancestry(target)
+        for name in each.fields
+    }
+    if target is atom.cls and any(nodes_in(run, value or BOTTOM) for value in cells.values()):
+        return atom
+    kind = atom.type if target is atom.cls else Type(target.qualified)
+    key = ("copy", atom, frame.file.file, node.start_byte, frame.path, target)
+    twin = run.obj(key, kind, cls=target, bindings=atom.bindings, foreign_base=atom.foreign_base)
+    for (each, name), value in cells.items():
         if value is not None:
-            run.store.set((twin, name), value)
+            run.store.set((twin, cell_of(run, twin, name, each)), value)
     return twin
+
+
+def _takes_another(constructor: Function) -> bool:
+    """Whether it copies or moves an object of its class."""
+    given = [each for each in constructor.parameters if each.default is None]
+    words = re.findall(r"\w+", given[0].type) if len(given) == 1 else []
+    return constructor.name in words and "&" in given[0].type
+
+
+def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
+    """``object = other``: the object has the members of the other one then; or may have, of several objects."""
+    others = [atom for atom in value if isinstance(atom, Obj) and atom.cls is not None]
+    for target in targets:
+        for each in run.names.ancestry(target.cls) if target.cls is not None else ():
+            for name in each.fields:
+                cell = (target, cell_of(run, target, name, each))
+                read = [run.store.get((o, cell_of(run, o, name, each))) or BOTTOM for o in others]
+                before = [] if len(targets) == 1 else [run.store.get(cell) or BOTTOM]
+                run.store.set(cell, join(*before, *read))
 
 
 def iterated(run: Machine, subject: Value, node: Node, frame: Frame) -> tuple[list[Value], bool]:

@@ -12,6 +12,7 @@ from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.numbers import SIZES
 from nodl.infer.cpp.running.objects import as_map, cast, made
 from nodl.infer.cpp.running.operators import has_text
+from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
 from nodl.infer.cpp.running.variables import variable
 from nodl.infer.cpp.syntax import children, text, unwrapped, walk
@@ -182,10 +183,13 @@ def compound_literal(run: Machine, node: Node, frame: Frame) -> Value:
 def new(run: Machine, node: Node, frame: Frame) -> Value:
     """``new Foo(...)``: what its constructor makes, on the heap, so that assigning it copies nothing."""
     kind = run.type_of(text(node.child_by_field_name("type")), frame)
-    given = [run.evaluate(child, frame) for child in children(node.child_by_field_name("arguments"))]
+    given = children(node.child_by_field_name("arguments"))
+    values = [run.evaluate(child, frame) for child in given]
     if kind.name in SIZES and node.child_by_field_name("declarator") is not None:
         return unknown("an array of numbers")
-    return construct(run, kind._replace(pointer=False), given, node, frame, heap=True)
+    found = construct(run, kind._replace(pointer=False), values, node, frame, heap=True)
+    keep_references(run, found, given, frame)
+    return found
 
 
 @expression("sizeof_expression")

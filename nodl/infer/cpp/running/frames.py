@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.findings import Condition
 from nodl.infer.cpp.reading.declarations import FileIndex, Function, Scope
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.values import BOTTOM, Obj, Value
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
 
 
 @dataclass(eq=False)
@@ -46,6 +50,8 @@ class Frame:
     kept: dict[str, Frame] = field(
         default_factory=dict
     )  # of a lambda: what it captured of blocks that may have ended
+    aliases: dict[str, Node | None] = field(default_factory=dict)
+    """References and pointers to plain values: the expression that each stands for, ``None`` if not known."""
     depth: int = 0
     finished: bool = False  # nobody can see its variables any more
     captured: bool = False  # a lambda can

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
 from nodl.infer.cpp.reading.collect import parameters_of
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.constructors import bind_parameters, candidates, chosen
+from nodl.infer.cpp.running.constructors import bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome
+from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
@@ -58,6 +59,19 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             found.append(unknown(f"the result of {name}()"))
     run.left = run.left if len(found) == 1 else None
     return join(*found) if found else unknown("the result of a call")
+
+
+def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Frame) -> Value:
+    """``x->`` and ``*x``: what the operator of its class gives for an object that has one, else ``x`` itself."""
+    found: list[Value] = []
+    for atom in value:
+        own = (
+            run.names.find_methods(atom.cls, operator)
+            if isinstance(atom, Obj) and atom.cls is not None
+            else []
+        )
+        found.append(call_methods(run, own, atom, [], node, frame, ()) if own else (atom,))
+    return join(*found)
 
 
 def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Sequence[Value]]]:
@@ -106,6 +120,10 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     outcome = run.execute(body, inner) if body is not None else NEXT
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     inner.active = False
+    given = parameters_of(declarator) if declarator is not None else []
+    left = {p.name: run.store.get((inner, p.name)) for p in given if is_written_back(p)}
+    if left and len(children(node.child_by_field_name("arguments"))) == len(values):
+        _write_back(run, given, left, node, frame)
     return inner.returned
 
 
@@ -118,10 +136,35 @@ def call_functions(
     types: Sequence[Type],
 ) -> Value:
     """What the overloads that fit best may return; ``unknown_call`` decides if none fits."""
-    fitting = candidates(functions, values)
+    fitting = candidates(_meant(run, functions, types, node, frame), values)
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
     return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
+
+
+def _meant(
+    run: Machine, functions: Sequence[Function], arguments: Sequence[Type], node: Node, frame: Frame
+) -> Sequence[Function]:
+    """Of a template's specialisations that for these arguments, else the template; a gap where they are not known."""
+    special = [each for each in functions if each.specialises is not None]
+    if not special:
+        return functions
+    if not arguments:
+        run.gap(node, frame, f"which specialisation of {special[0].name} is called is not known")
+    found = [
+        f
+        for f in special
+        if [run.names.resolve(t, f.scope, f.file) for t in f.specialises or ()] == [*arguments]
+    ]
+    return found or [each for each in functions if each.specialises is None]
+
+
+def _of_class(
+    run: Machine, methods: Sequence[Function], this_object: Obj | None, bindings: dict[str, Type] | None
+) -> list[Type]:
+    """The arguments of the class whose methods these are."""
+    bound = bindings or (_class_bindings(run, methods[0], this_object) if this_object is not None else {})
+    return list(bound.values())
 
 
 def _any_of(run: Machine, calls: Sequence[Callable[[], Value]]) -> Value:
@@ -151,6 +194,7 @@ def call_methods(
     bindings: dict[str, Type] | None = None,
 ) -> Value:
     """As ``call_functions``; if none fits, bases (unless ``exactly``) and methods of nodes are tried."""
+    methods = _meant(run, methods, types or _of_class(run, methods, this_object, bindings), node, frame)
     function = chosen(methods, values)
     if function is None and this_object is not None and this_object.cls is not None and not exactly:
         for base in run.names.ancestry(this_object.cls)[1:]:
@@ -165,11 +209,35 @@ def call_methods(
                 run, Call(node, frame, list(values), list(types), [], this_object)
             )
         return unknown_call(run, name, values, node, [], frame)
+    if this_object is not None and not exactly and len(values) < len(function.parameters):
+        _check_defaults(run, function, this_object, len(values), node, frame)
     fitting = candidates(methods, values) if function in methods else [function]
     calls = [
         partial(invoke, run, each, this_object, values, node, frame, types, bindings) for each in fitting
     ]
     return _any_of(run, calls)
+
+
+def _check_defaults(
+    run: Machine, function: Function, this: Obj, given: int, node: Node, frame: Frame
+) -> None:
+    """A virtual method gets the default arguments of the class that its object is seen as ([dcl.fct.default]/10)."""
+    if this.cls is None or not function.virtual:
+        return
+    named = [
+        each
+        for cls in run.names.ancestry(this.cls)
+        for each in (
+            *run.names.methods.get(cls, {}).get(function.name, ()),
+            *cls.declared.get(function.name, ()),
+        )
+        if len(each.parameters) == len(function.parameters)
+    ]
+    written = {tuple(text(p.default) for p in each.parameters[given:]) for each in named}
+    if len(written - {("",) * (len(function.parameters) - given)}) > 1:
+        run.gap(
+            node, frame, f"which default arguments {function.name}() gets here is not known: classes differ"
+        )
 
 
 def invoke(
@@ -198,7 +266,7 @@ def invoke(
     given = (tuple(values), inner.bindings, inner.conditions, len(run.nodes))
     key = (function, this_object, inner.path)
     outcome = _outcome(run, key, given, inner.depth, lambda: _run_body(run, function, values, inner))
-    _write_back(run, function, outcome, node, frame)
+    _write_back(run, function.parameters, outcome.parameters, node, frame)
     run.left = node.id if outcome.ends else None
     return outcome.returned
 
@@ -230,7 +298,7 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
         inner.exits = _successes(inner)
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
-    left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if _is_written_back(p)}
+    left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if is_written_back(p)}
     ends = not outcome & NEXT and not inner.exits
     inner.active, inner.finished = False, not inner.captured
     return CallOutcome(inner.returned, left, ends)
@@ -297,22 +365,23 @@ def _deduced(
     return bound
 
 
-def _is_written_back(parameter: FunctionParameter) -> bool:
-    marked = parameter.type.rstrip().endswith(("&", "*"))
-    return marked and "const" not in parameter.type.split() and bool(parameter.name)
-
-
-def _write_back(run: Machine, function: Function, outcome: CallOutcome, node: Node, frame: Frame) -> None:
+def _write_back(
+    run: Machine,
+    parameters: Sequence[FunctionParameter],
+    left: Mapping[str, Value | None],
+    node: Node,
+    frame: Frame,
+) -> None:
     """What a function does to its reference parameters shows in the caller's variables."""
     given = children(node.child_by_field_name("arguments"))
-    for parameter, argument in zip(function.parameters, given, strict=False):
-        if not _is_written_back(parameter):
+    for parameter, argument in zip(parameters, given, strict=False):
+        if not is_written_back(parameter):
             continue
         target = unwrapped(argument)
         if target is not None and target.type == "pointer_expression":
             target = target.child_by_field_name("argument")
         if target is None or target.type not in ("identifier", "field_expression", "subscript_expression"):
             continue
-        value = outcome.parameters[parameter.name]
+        value = left[parameter.name]
         if value is not None and value != run.evaluate(target, frame):
             assign(run, target, value, frame)

@@ -7,9 +7,11 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.declarations import type_text
+from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.frames import Frame, Loop
 from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Machine, statement
+from nodl.infer.cpp.running.references import elements_written
 from nodl.infer.cpp.running.statements import bind_names, condition_value, in_a_block
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.values import Value, join, unknown
@@ -44,7 +46,21 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
             by_value = "&" not in text(declarator)
             run.local(frame, text(names[0]), copied(run, item, node, frame) if by_value else item, written)
 
-    return _over(run, body, [partial(bind, item) for item in items], exact, frame)
+    outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame)
+    is_reference = (
+        declarator is not None and "&" in text(declarator) and "const" not in text(node).split(":")[0]
+    )
+    if is_reference and right is not None and _is_variable(right):
+        names = (
+            [text(n) for n in walk(declarator) if n.type == "identifier"] if declarator is not None else []
+        )
+        if body is not None and elements_written(run, body, names, frame):
+            assign(run, right, unknown("what a loop writes to the elements"), frame)
+    return outcome
+
+
+def _is_variable(node: Node) -> bool:
+    return node.type in ("identifier", "field_expression", "subscript_expression", "pointer_expression")
 
 
 def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exact: bool, frame: Frame) -> int:

@@ -18,7 +18,7 @@ from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.memory import Memory
 from nodl.infer.cpp.running.notes import Notes
-from nodl.infer.cpp.running.store import AbstractStore, Changes
+from nodl.infer.cpp.running.store import AbstractStore, Cell, Changes
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
@@ -121,6 +121,7 @@ class Machine:
         self.unset: dict[
             tuple[str, int], tuple[SourceRef, str, str]
         ] = {}  # calls on pointers that hold nothing
+        self.shared: dict[Cell, None] = {}  # plain variables that an object keeps a reference to
         self._used: set[str] = set()
         self._known: set[Class] = set()
         self._leading: dict[tuple[object, int], bool] = {}
@@ -133,6 +134,8 @@ class Machine:
         self.steps += 1
         if self.steps > self.limit:
             raise BudgetExceeded
+        if node.has_error and node.type != "assignment_expression" and any(c.is_error for c in node.children):
+            return self._misread(node, frame)
         handler = EXPRESSIONS.get(node.type)
         if handler is None:
             what = f"the C++ {node.type.replace('_', ' ')}"
@@ -140,6 +143,13 @@ class Machine:
                 self.gap(node, frame, f"{what} is not followed; it may make interfaces")
             return unknown(what)
         return handler(self, node, frame)
+
+    def _misread(self, node: Node, frame: Frame) -> Value:
+        """What the parser did not understand in an expression: its parts are run, its value is not known."""
+        for child in node.named_children:
+            for each in child.named_children if child.is_error else [child]:
+                self.evaluate(each, frame)
+        return unknown("what the parser did not understand")
 
     def count(self, steps: int) -> None:
         """Raises ``BudgetExceeded``."""
@@ -204,6 +214,10 @@ class Machine:
     # --- variables ----------------------------------------------------------------------------------------
 
     def local(self, frame: Frame, name: str, value: Value, written_type: str = "") -> None:
+        if frame.aliases:
+            from nodl.infer.cpp.running.references import forget_shadowed
+
+            forget_shadowed(self, name, frame)
         if frame.blocks and name not in frame.blocks[-1]:
             before = self.store.get((frame, name)) or BOTTOM
             frame.blocks[-1][name] = (name in frame.names, before, frame.types.get(name))

@@ -12,7 +12,8 @@ from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.invocation import call_methods, call_values
+from nodl.infer.cpp.running.hiding import class_of_member, lexical_class
+from nodl.infer.cpp.running.invocation import call_methods, call_values, pointed_to
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
 from nodl.infer.cpp.running.values import (
@@ -59,6 +60,8 @@ def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame
     if field is not None and field.type == "qualified_identifier":
         name = name.rpartition("::")[2]
     receiver = run.evaluate(receiver_node, frame)
+    if text(callee.child_by_field_name("operator")) == "->":
+        receiver = pointed_to(run, receiver, "operator->", callee, frame)
     if (
         name in ("get", "lock", "value", "release")
         and not given
@@ -170,12 +173,17 @@ def on_object(
     types = types_of(run, callee, frame)
     if atom.cls is not None:
         argument = callee.child_by_field_name("argument")
-        own = argument is not None and argument.type == "this"
-        methods = of_this(run, atom, name, frame) if own else run.names.find_methods(atom.cls, name)
+        own = (
+            argument is not None
+            and argument.type == "this"
+            and "::" not in text(callee.child_by_field_name("field"))
+        )
+        seen = None if own else class_of_member(run, atom, name, callee, frame)
+        methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name, frame)
         if methods:
             values = [run.evaluate(each, frame) for each in given]
             return call_methods(run, methods, atom, values, node, frame, types)
-        field = member(run, atom, name, frame)
+        field = member(run, atom, name, seen or lexical_class(run, atom, frame))
         if field is not None and name not in NODE_METHODS:
             values = [run.evaluate(each, frame) for each in given]
             return call_values(run, field, values, node, frame)

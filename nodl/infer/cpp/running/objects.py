@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from nodl.infer.cpp.running.contents import copied, items_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.numbers import as_type
+from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -75,8 +77,7 @@ def declared_value(
         found = initial_value(run, value, frame, pointer or (_is_auto(written) and "&" in written))
         return found if pointer or kind.pointer else as_type(kind.name, found)
     if value.type not in ("argument_list", "initializer_list"):
-        found = copied(run, run.evaluate(value, frame), node, frame)
-        return converted(run, kind, found, node, frame)
+        return converted(run, kind, run.evaluate(value, frame), node, frame)
     return made(run, node, kind, children(value), frame)
 
 
@@ -89,19 +90,30 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
     if value.type in ("argument_list", "initializer_list"):
         inner = children(value)
         if len(inner) == 1:
-            return run.evaluate(inner[0], frame)
+            return initial_value(run, inner[0], frame, reference)
         return BOTTOM if not inner else run.evaluate(value, frame)
     found = run.evaluate(value, frame)
-    return found if reference else copied(run, found, value, frame)
+    return found if reference or _gives_iterator(value) else copied(run, found, value, frame)
+
+
+def _gives_iterator(value: Node) -> bool:
+    """``x.find(...)``, ``std::find_if(...)``: the element itself, seen through an iterator."""
+    callee = text(value.child_by_field_name("function")) if value.type == "call_expression" else ""
+    return _ITERATORS.search(callee) is not None
+
+
+_ITERATORS = re.compile(
+    r"(?:^std::|[.>])(?:ranges::)?(?:c?r?(?:begin|end)|find\w*|(?:lower|upper|equal)_\w+|(?:min|max)_element|next|prev)$"
+)
 
 
 def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
-    """``Foo x = y``: the object itself, or a Foo made of y."""
+    """``Foo x = y``: a copy of an object, as a Foo, or a Foo made of y."""
     from nodl.infer.cpp.running.constructors import construct
 
     cls = run.names.class_of(kind, frame.scope, frame.file)
     if cls is None or any(isinstance(atom, Obj) for atom in value):
-        return value
+        return copied(run, value, node, frame, cls)
     if any(isinstance(atom, Seq | Group) for atom in value) or not run.names.find_methods(cls, cls.name):
         return value
     return construct(run, kind, [value], node, frame)
@@ -125,21 +137,27 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
             else default_value(run, node, kind, frame)
         )
     if cls is not None and is_aggregate(run, cls) and given:
-        return _aggregate(run, node, kind, cls, given, frame)
+        found = _aggregate(run, node, kind, cls, given, frame)
+        keep_references(run, found, given, frame)
+        return found
     values = [run.evaluate(each, frame) for each in given]
     if cls is None and len(values) == 1 and _all_of(kind, values[0]):
         return values[0]  # a copy of a library's object
-    return construct(run, kind, values, node, frame)
+    if cls is not None and len(values) == 1 and _copies(run, cls, values[0]):
+        return copied(run, values[0], node, frame, cls)
+    found = construct(run, kind, values, node, frame)
+    keep_references(run, found, given, frame)
+    return found
 
 
 def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
     """In braces its elements; in parentheses a copy, a part of another one, or so many equal elements."""
     inner = kind.arguments[0] if kind.arguments else NO_TYPE
-    is_class = run.names.class_of(inner, frame.scope, frame.file) is not None and not inner.pointer
+    cls = None if inner.pointer else run.names.class_of(inner, frame.scope, frame.file)
     items = [
         made(run, each, inner, children(each), frame)
-        if is_class and each.type == "initializer_list"
-        else run.evaluate(each, frame)
+        if cls is not None and each.type == "initializer_list"
+        else copied(run, run.evaluate(each, frame), each, frame, cls)
         for each in given
     ]
     if len(given) == 1 and given[0].type != "initializer_list" and any(isinstance(a, Seq) for a in items[0]):
@@ -206,6 +224,14 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
     return unknown("a text made of several values")
 
 
+def _copies(run: Machine, cls: Class, value: Value) -> bool:
+    """Whether an object of the class, or of a derived one, is all that a constructor gets."""
+    objects = [
+        a for a in value if isinstance(a, Obj) and a.cls is not None and cls in run.names.ancestry(a.cls)
+    ]
+    return bool(value) and len(objects) == len(value) and cls.name not in run.names.methods[cls]
+
+
 def _all_of(kind: Type, value: Value) -> bool:
     return bool(value) and all(isinstance(atom, Obj) and atom.type.name == kind.name for atom in value)
 
@@ -229,13 +255,18 @@ def is_aggregate(run: Machine, cls: Class) -> bool:
     return not (cls.bases or run.names.find_methods(cls, cls.name) or cls.name in cls.declared)
 
 
+def fields_of(cls: Class) -> list[str]:
+    """The members that braces fill, in order."""
+    return [each.name for each in cls.fields.values() if not each.static]
+
+
 def _aggregate(
     run: Machine, node: Node, kind: Type, cls: Class, given: Sequence[Node], frame: Frame
 ) -> Value:
     from nodl.infer.cpp.running.constructors import construct
 
-    names = [f.name for f in cls.fields.values() if not f.static]
-    bindings = dict(zip(cls.templates, kind.arguments, strict=False))
+    names = fields_of(cls)
+    bindings = run.names.bindings(cls, kind)
     members: dict[str, Value] = {}
     for position, item in enumerate(given):
         name, value = names[position] if position < len(names) else "", item

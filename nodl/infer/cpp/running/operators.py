@@ -9,6 +9,8 @@ from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.hiding import class_of_member
+from nodl.infer.cpp.running.invocation import pointed_to
 from nodl.infer.cpp.running.machine import NEXT, Machine, expression
 from nodl.infer.cpp.running.numbers import added, arithmetic
 from nodl.infer.cpp.running.values import (
@@ -43,11 +45,13 @@ if TYPE_CHECKING:
 def field(run: Machine, node: Node, frame: Frame) -> Value:
     """``x.f`` or ``x->f``: a member of an object, ``first`` or ``second`` of a pair; unknown for all else."""
     owners = run.evaluate(node.child_by_field_name("argument"), frame)
-    name = text(node.child_by_field_name("field"))
+    if text(node.child_by_field_name("operator")) == "->":
+        owners = pointed_to(run, owners, "operator->", node, frame)
+    name = text(node.child_by_field_name("field")).rpartition("::")[2]
     found: list[Value] = []
     for atom in owners:
         if isinstance(atom, Obj):
-            value = member(run, atom, name, frame)
+            value = member(run, atom, name, class_of_member(run, atom, name, node, frame))
             if value is None and atom.cls is None and name.endswith(("options", "callbacks")):
                 value = (run.obj(("field", atom, name), Type("")),)  # options in options
                 run.store.set((atom, name), value)
@@ -206,7 +210,7 @@ def pointer(run: Machine, node: Node, frame: Frame) -> Value:
     found = run.evaluate(argument, frame)
     if argument is not None and argument.type == "subscript_expression" and has_text(found):
         return unknown("a text from some letter on")
-    return found
+    return found if text(node).startswith("&") else pointed_to(run, found, "operator*", node, frame)
 
 
 def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:

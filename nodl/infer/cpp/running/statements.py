@@ -11,6 +11,7 @@ from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.frames import Frame, Loop
 from nodl.infer.cpp.running.machine import BREAK, CONTINUE, NEXT, RETURN, Machine, StatementHandler, statement
 from nodl.infer.cpp.running.objects import declared_value
+from nodl.infer.cpp.running.references import bind_reference
 from nodl.infer.cpp.running.values import BOTTOM, Group, Value, join, truth, unknown
 from nodl.infer.cpp.syntax import children, parse_expression, text, unwrapped, walk
 
@@ -190,6 +191,9 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     subject = condition_atoms(run, node.child_by_field_name("condition"), frame)
     cases = [c for c in children(node.child_by_field_name("body")) if c.type == "case_statement"]
     chosen, certain = _chosen_cases(run, cases, subject, frame)
+    if certain and _has_inner_labels(node):
+        chosen, certain = list(range(len(cases))), False
+        run.gap(node, frame, "a switch jumps into another statement: what it makes is not followed")
     mark = run.store.mark()
     loop = _Switch(mark, mark)
     frame.loops.append(loop)
@@ -205,6 +209,18 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
         if certain and chosen and index < min(chosen):
             run.kill(case, frame, "the switch never takes this case")
     return outcome
+
+
+def _has_inner_labels(switch: Node) -> bool:
+    """Whether a case of this switch stands inside of another statement of it."""
+    body = switch.child_by_field_name("body")
+    waiting = [inner for case in children(body) for inner in children(case) if case.type == "case_statement"]
+    while waiting:
+        each = waiting.pop()
+        if each.type == "case_statement":
+            return True
+        waiting += [] if each.type in ("switch_statement", "lambda_expression") else children(each)
+    return False
 
 
 def condition_atoms(run: Machine, condition: Node | None, frame: Frame) -> Value:
@@ -277,6 +293,7 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
     for declarator in node.children_by_field_name("declarator"):
         if declarator.type == "function_declarator":
             _vexing(run, node, declarator, written, frame)
+    path, several = frame.path, len(node.children_by_field_name("declarator")) > 1
     for name, value, pointer, written in declared_names(node):
         if any(
             d.type == "function_declarator" and text(d).startswith(name)
@@ -288,12 +305,15 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
             names = [text(n) for n in structured.named_children if n.type == "identifier"]
             bind_names(run, names, run.evaluate(value, frame), frame)
             break
-        kind = written + ("&" if pointer else "")
+        kind = written + (("*" if _points(node) else "&") if pointer else "")
         initial = partial(declared_value, run, node, written, value, pointer, frame)
         if _is_static(node):
             _static_local(run, node, name, kind, initial, frame)
         else:
+            frame.path = (*path, name) if several else path  # each variable is an object of its own
             run.local(frame, name, initial(), kind)
+            frame.path = path
+            bind_reference(run, name, kind, value, frame)
     structured = next((n for n in node.named_children if n.type == "init_declarator"
                        and any(c.type == "structured_binding_declarator" for c in walk(n))), None)  # fmt: skip
     if structured is not None:
@@ -301,6 +321,11 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
                  and n.parent.type == "structured_binding_declarator"]  # fmt: skip
         bind_names(run, names, run.evaluate(structured.child_by_field_name("value"), frame), frame)
     return NEXT
+
+
+def _points(node: Node) -> bool:
+    """Whether a declaration has a ``*``, and not only ``&``."""
+    return any(each.type == "pointer_declarator" for each in walk(node) if each.type.endswith("declarator"))
 
 
 def _is_static(node: Node) -> bool:

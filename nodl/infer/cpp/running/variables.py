@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.hiding import cell_of, lexical_class
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
 from nodl.infer.cpp.syntax import children, text
@@ -20,10 +22,13 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
     """Local variable, member, constant, enumerator or function of that name."""
     owner = frame.owner_of(name)
     if owner is not None:
-        return run.store.get((owner, name)) or BOTTOM
+        target = owner.aliases.get(name)
+        return run.evaluate(target, owner) if target is not None else run.store.get((owner, name)) or BOTTOM
+    if name in frame.bindings:
+        return _argument(run, frame.bindings[name].name, frame)
     this_object = current_object(frame)
     if this_object is not None and "::" not in name:
-        found = member(run, this_object, name, frame)
+        found = member(run, this_object, name, lexical_class(run, this_object, frame))
         if found is not None:
             return found
     found = constant(run, name, frame)
@@ -32,6 +37,16 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
     if name.endswith("string::npos"):
         return (NPOS,)
     return unknown(f"the value of {name}")
+
+
+def _argument(run: Machine, written: str, frame: Frame) -> Value:
+    """A parameter of a template that stands for a value, as the argument is written."""
+    if re.fullmatch(r"-?\d+", written):
+        return (int(written),)
+    if written in ("true", "false"):
+        return (written == "true",)
+    found = constant(run, written, frame) if re.fullmatch(r"[\w:]+", written) else None
+    return found or unknown(f"the value of {written}")
 
 
 def current_object(frame: Frame | None) -> Obj | None:
@@ -43,14 +58,14 @@ def current_object(frame: Frame | None) -> Obj | None:
     return None
 
 
-def member(run: Machine, owner: Obj, name: str, frame: Frame) -> Value | None:
-    """The field ``name`` of an object; ``None`` when its class has no such field in reach."""
-    value = run.store.get((owner, name))
+def member(run: Machine, owner: Obj, name: str, seen: Class | None) -> Value | None:
+    """The field of an object that is seen as one of ``seen``; ``None`` when there is no such field in reach."""
+    value = run.store.get((owner, cell_of(run, owner, name, seen)))
     if value is not None:
         return value
     if owner.cls is None:
         return None
-    for each in run.names.ancestry(owner.cls):
+    for each in run.names.ancestry(seen or owner.cls):
         declared = each.fields.get(name)
         if declared is not None and declared.static:
             return static_member(run, each, name)
@@ -71,11 +86,11 @@ def static_member(run: Machine, cls: object, name: str) -> Value:
         return known
     declared = cls.fields[name]
     frame = Frame(cls.file, cls.scope)
-    outside = next(
-        (g for g in run.names.globals.get(name, ()) if g.value is not None and g.scope[-1:] == (cls.name,)),
-        None,
-    )
-    if declared.default is not None:
+    defined = [g for g in run.names.globals.get(name, ()) if g.scope == cls.scope and g.value is not None]
+    outside = defined[0] if defined else None
+    if any(each.specialises for each in defined):
+        found = unknown(f"the value of {name}, which several specialisations have")
+    elif declared.default is not None:
         found = _initial(run, declared.default, declared.type, frame)
     elif outside is not None:
         found = _initial(run, outside.value, declared.type, Frame(outside.file, cls.scope))
@@ -103,7 +118,7 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
         cell = (cell_owner, "")
         known = run.store.get(cell)
         if known is None:
-            inner = Frame(cell_owner.file, cell_owner.scope)
+            inner = Frame(cell_owner.file, cell_owner.scope, path=(name,))
             run.store.set(cell, BOTTOM)
             kind = run.names.resolve(cell_owner.type, cell_owner.scope, cell_owner.file)
             if cell_owner.value is not None:

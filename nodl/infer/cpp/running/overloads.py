@@ -1,0 +1,70 @@
+"""Which of several functions of one name a call means, by the number and the looks of its arguments."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Value
+
+if TYPE_CHECKING:
+    from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
+
+
+def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:
+    """The overload that takes so many arguments; of several, the one whose parameters look like them."""
+    found = candidates(functions, arguments)
+    return found[0] if found else None
+
+
+MAX_OVERLOADS = 3
+
+
+def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Sequence[Function]:
+    """The overloads that fit best: more than one where a text may be meant in several ways. Of arguments that are not
+    known the first decides; the ledger asks about the others."""
+    fitting = [each for each in functions if _takes(each, len(arguments))]
+    if len(fitting) <= 1:
+        return fitting or (functions if len(functions) == 1 else ())
+    scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
+    best = [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
+    is_text = any(isinstance(atom, Text) for value in arguments for atom in value)
+    return best if is_text and len(best) <= MAX_OVERLOADS else best[:1]
+
+
+def _takes(function: Function, count: int) -> bool:
+    required = sum(1 for p in function.parameters if p.default is None and "..." not in p.type)
+    return function.variadic or required <= count <= len(function.parameters)
+
+
+def _likeness(parameter: FunctionParameter, value: Value) -> int:
+    """How well an argument fits a parameter, by their looks."""
+    atom = value[0] if value else None
+    kind = parameter.type
+    is_text = "string" in kind or "char" in kind
+    is_generic = (
+        re.fullmatch(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?", kind) is not None and "Descriptor" not in kind
+    )
+    if isinstance(atom, Text):
+        return 3 if is_text else (1 if is_generic else -3)
+    if isinstance(atom, Obj):
+        names = {atom.type.last, *(c.name for c in atom.bindings)}
+        if atom.node is not None and ("Node" in kind or "node" in kind):
+            return 3
+        return (
+            3 if any(name and name in kind for name in names) else (1 if is_generic else -3 if is_text else 0)
+        )
+    if isinstance(atom, bool):
+        return 3 if "bool" in kind else (1 if is_generic else -2)
+    if isinstance(atom, int | float):
+        own = r"double|float" if isinstance(atom, float) else r"int|size_t|long"
+        return 3 if re.search(own, kind) else 2 if _NUMBER.search(kind) else (1 if is_generic else -2)
+    if isinstance(atom, Lambda | Bound):
+        return 2 if "function" in kind or "allback" in kind else (1 if is_generic else -2)
+    if isinstance(atom, Seq | Map):
+        return 2 if re.search(r"vector|array|list|map|set", kind) else (1 if is_generic else -2)
+    return 0
+
+
+_NUMBER = re.compile(r"int|double|float|size_t|long")

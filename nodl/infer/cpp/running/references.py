@@ -1,0 +1,132 @@
+"""References and pointers to texts, numbers and lists: who reads or writes through one means the variable behind it.
+
+Objects are the same ones wherever they are seen; plain values lie in the cells of their variables. A local reference
+stands for the expression that it was made of; what is written through any other is a gap.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.reading.writes import writes_of
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.hiding import cell_of, lexical_class
+from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.store import Cell
+from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Param, Seq, Text, Value
+from nodl.infer.cpp.syntax import children, text, unwrapped, walk
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+
+def is_plain(value: Value) -> bool:
+    """Whether a text, number or container is among the alternatives."""
+    return any(isinstance(atom, Text | Seq | Map | Group | Param | int | float) for atom in value)
+
+
+def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:
+    """``T & name = initial`` or ``T * name = &initial`` was declared, and has its value."""
+    target = unwrapped(initial)
+    if (
+        target is None
+        or not kind.endswith(("&", "*"))
+        or not is_plain(run.store.get((frame, name)) or BOTTOM)
+    ):
+        return
+    if kind.endswith("*"):
+        if target.type != "pointer_expression":
+            return
+        target = unwrapped(target.child_by_field_name("argument"))
+    if target is not None and _is_fixed(target):
+        frame.aliases[name] = target
+    elif (
+        "const"
+        not in text(initial.parent.parent if initial is not None and initial.parent else None).split("=")[0]
+    ):
+        frame.aliases[name] = None
+
+
+def _is_fixed(target: Node) -> bool:
+    """An expression that means the same variable wherever it stands."""
+    if target.type == "subscript_expression":
+        listed = children(target.child_by_field_name("indices"))
+        inner = target.child_by_field_name("argument")
+        return (
+            all(each.type.endswith("_literal") for each in listed) and inner is not None and _is_fixed(inner)
+        )
+    if target.type == "field_expression":
+        inner = target.child_by_field_name("argument")
+        return inner is not None and (inner.type == "this" or _is_fixed(inner))
+    return target.type in ("identifier", "qualified_identifier")
+
+
+def forget_shadowed(run: Machine, name: str, frame: Frame) -> None:
+    """A variable of this name is declared: what stood for another one of the name keeps what that holds now."""
+    frame.aliases.pop(name, None)
+    for alias, target in list(frame.aliases.items()):
+        if target is not None and any(text(each) == name for each in walk(target)):
+            run.store.set((frame, alias), run.evaluate(target, frame))
+            frame.aliases[alias] = None
+
+
+def elements_written(run: Machine, body: Node, names: Sequence[str], frame: Frame) -> bool:
+    """Whether a loop writes to the plain elements that its references ``names`` stand for."""
+    held = [atom for name in names for atom in run.store.get((frame, name)) or BOTTOM]
+    held += [inner for atom in held if isinstance(atom, Group) for item in atom.items[1:] for inner in item]
+    if not any(isinstance(atom, Text | Param | int | float) for atom in held):
+        return False
+    return not writes_of(body).changed.isdisjoint(names)
+
+
+def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Frame) -> None:
+    """An object made of variables may keep references to them: changes of either are told from now on."""
+    held = [cell for obj in made if isinstance(obj, Obj) for cell in _held(run, obj)]
+    for each in given if held else ():
+        target = unwrapped(each)
+        if target is not None and target.type == "pointer_expression":
+            target = unwrapped(target.child_by_field_name("argument"))
+        cell = (
+            cell_of_name(run, text(target), frame)
+            if target is not None and target.type == "identifier"
+            else None
+        )
+        value = run.store.get(cell) or BOTTOM if cell is not None else BOTTOM
+        same = [one for one in held if is_plain(value) and run.store.get(one) == value]
+        if cell is not None and same:
+            run.shared.update(dict.fromkeys((cell, *same)))
+
+
+def _held(run: Machine, obj: Obj) -> list[Cell]:
+    """Members that are references or pointers to plain values, but for letters."""
+    return [
+        (obj, cell_of(run, obj, name, cls))
+        for cls in (run.names.ancestry(obj.cls) if obj.cls is not None else ())
+        for name, each in cls.fields.items()
+        if each.pointer and not each.static and "char" not in each.type
+    ]
+
+
+def cell_of_name(run: Machine, name: str, frame: Frame) -> Cell | None:
+    """Where a local variable or member of that name lies."""
+    owner = frame.owner_of(name)
+    if owner is not None:
+        return owner, name
+    outer: Frame | None = frame
+    while outer is not None and outer.this is None:
+        outer = outer.outer
+    if outer is None or outer.this is None:
+        return None
+    return outer.this, cell_of(run, outer.this, name, lexical_class(run, outer.this, outer))
+
+
+def told(run: Machine, cell: Cell, value: Value, node: Node, frame: Frame) -> None:
+    """A gap where a variable is written that an object keeps a reference to."""
+    if cell in run.shared and set(run.store.get(cell) or BOTTOM) != set(value):
+        run.gap(node, frame, f"{text(node)[:40]} is written while an object keeps a reference to it")
+
+
+def through(run: Machine, what: Node, frame: Frame) -> None:
+    """A gap: somebody writes to a plain value through ``what``, and it is not known to which."""
+    run.gap(what, frame, f"what {text(what)[:40]} refers to is written: which variable that is is not known")
