@@ -24,7 +24,6 @@ THOROUGH = (
     "nodl/infer/test_deceptions.py",
     "nodl/infer/test_in_a_launch.py",
     "policy/test_components.py",
-    "test_requirements.py",
 )
 """Tables in these folders that take more than three seconds each: together half of the time."""
 
@@ -46,20 +45,11 @@ def pytest_configure() -> None:
             signal.signal(number, lambda *_: None)
 
 
-def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """With ``-m fast`` the others need not even be imported, which takes longer than many a test."""
-    leaves_out = config.getoption("markexpr") == "fast" and not _may_be_fast(collection_path)
-    return True if leaves_out else None
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    tests = Path(__file__).parent
     for item in items:
-        if _may_be_fast(item.path):
+        file = item.path.relative_to(tests)
+        if file.as_posix() in THOROUGH:
+            continue
+        if file.parts[0] in FAST or item.path.parent == tests:
             item.add_marker(pytest.mark.fast)
-
-
-def _may_be_fast(path: Path) -> bool:
-    below = path.relative_to(Path(__file__).parent)
-    if below.as_posix() in THOROUGH:
-        return False
-    return not below.parts or below.parts[0] in FAST or (len(below.parts) == 1 and below.suffix == ".py")
