@@ -22,13 +22,7 @@ if TYPE_CHECKING:
     from enclave_launch.secured import ProvisionedLaunch
     from keystore.steps.expiry import Expiry
 
-MARGINS = (
-    timedelta(days=7),
-    timedelta(days=1),
-    timedelta(hours=1),
-    timedelta(minutes=5),
-    timedelta(0),
-)
+MARGINS = (timedelta(days=7), timedelta(days=1), timedelta(hours=1), timedelta(minutes=5), timedelta(0))
 _LONGEST_SLEEP = timedelta(hours=1)
 """A clock that is set is noticed after that."""
 _USED = 0.8  # of what is left; provisioning renews what has used two thirds of its life
@@ -94,10 +88,7 @@ def watched(
 
 
 def _watch(
-    launch: ProvisionedLaunch,
-    say: Callable[[str], None],
-    now: Callable[[], datetime],
-    over: threading.Event,
+    launch: ProvisionedLaunch, say: Callable[[str], None], now: Callable[[], datetime], over: threading.Event
 ) -> None:
     due = _all_notices(launch, now())
     while due:

@@ -83,9 +83,7 @@ def _launcher_refusals(plan: LaunchPlan) -> list[Diagnostic]:
     if why is None:
         return []
     place = plan.launcher.location
-    return [
-        middleware_refused("the launcher's own node", middleware, why, place, by_launch_file=False),
-    ]
+    return [middleware_refused("the launcher's own node", middleware, why, place, by_launch_file=False)]
 
 
 def evaluate_launch(

@@ -22,19 +22,12 @@ from enclave_launch.admission.middleware import (
     vendor_of,
 )
 from enclave_launch.boundary.named_tuple import NamedTuple
-from enclave_launch.diagnostics import (
-    Diagnostic,
-)
+from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope
 from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode
-from enclave_launch.process import (
-    UNSPECIFIED_NODE_NAME,
-    Evaluation,
-    ResolvedComponent,
-    ResolvedProcess,
-)
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 from nodl.node_interface import Endpoint, NodeInterface

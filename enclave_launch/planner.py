@@ -28,12 +28,7 @@ from enclave_launch.plan import (
 from enclave_launch.policy import derive_policy
 from enclave_launch.policy.launcher import launcher_node
 from enclave_launch.policy.running_node import Role, UnknownNodeName, node_of_component, node_of_process
-from enclave_launch.process import (
-    UNSPECIFIED_NODE_NAME,
-    Evaluation,
-    ResolvedComponent,
-    ResolvedProcess,
-)
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.node_interface import RANDOM_ENDING
 
 

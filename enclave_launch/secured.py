@@ -80,10 +80,7 @@ class ProvisionedLaunch(NamedTuple):
 
 
 def provision_policies(
-    settings: SecuritySettings,
-    plan: LaunchPlan,
-    options: ProvisionOptions,
-    only: EnclavePolicy | None = None,
+    settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions, only: EnclavePolicy | None = None
 ) -> ProvisionReport:
     """All enclaves of ``plan``, or one. Raises ``ProvisionError`` with the keystore's own message, and where the plan
     asks for what it cannot give."""

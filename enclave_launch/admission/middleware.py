@@ -106,7 +106,4 @@ def halves(pairs: Iterable[Pair]) -> dict[str, Half]:
     """Where each enclave should sort so that Cyclone begins every handshake; none for enclaves of both."""
     found = tuple(pair for pair in pairs if pair.fast != pair.cyclone)
     fast, cyclone = {pair.fast for pair in found}, {pair.cyclone for pair in found}
-    return {
-        **dict.fromkeys(fast - cyclone, Half.HIGH),
-        **dict.fromkeys(cyclone - fast, Half.LOW),
-    }
+    return {**dict.fromkeys(fast - cyclone, Half.HIGH), **dict.fromkeys(cyclone - fast, Half.LOW)}

@@ -162,7 +162,7 @@ def _start(
 
 def _script(process: DeployedProcess, setup: tuple[str, ...]) -> str:
     """Security last: what sets up ROS cannot take it away."""
-    parts = [f". {_shell_word(file)}" for file in setup]
+    parts = [f". {shlex.quote(file)}" for file in setup]
     exports = [f"{ENABLE}=true", f"{STRATEGY}=Enforce"]
     if process.enclave is not None:
         exports.append(f'{KEYSTORE}="$RUNTIME_DIRECTORY"')
@@ -240,7 +240,3 @@ def _escape(char: str) -> str:
 
 def _specifiers(text: str) -> str:
     return text.replace("%", "%%")
-
-
-def _shell_word(text: str) -> str:
-    return shlex.quote(text)

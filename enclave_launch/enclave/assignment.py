@@ -86,9 +86,7 @@ def assign_enclave(
         return assignment._replace(too_deep=str(error))
     except InvalidEnclaveNameError as error:
         raise LaunchFileError(
-            f"enclave {assignment.path!r} ({assignment.reason.value}): {error}",
-            process.location,
-            error,
+            f"enclave {assignment.path!r} ({assignment.reason.value}): {error}", process.location, error
         ) from error
     return assignment
 

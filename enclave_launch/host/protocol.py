@@ -19,12 +19,7 @@ if TYPE_CHECKING:
     from enclave_launch.diagnostics import Diagnostic
     from enclave_launch.host.loading import LoadCache
     from enclave_launch.host.outcomes import Outcomes
-    from enclave_launch.process import (
-        LauncherCall,
-        ResolvedComponent,
-        ResolvedProcess,
-        Unforeseeable,
-    )
+    from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
     from enclave_launch.ros_rules.distro import Release
 
 MISSING_PREFIX = "/missing"

@@ -123,9 +123,7 @@ def _merged(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
 
     merged = merge_policy_file(derived.policy, derived.reasons, document)
     return derived._replace(
-        policy=merged.policy,
-        reasons=merged.reasons,
-        warnings=_unique((*derived.warnings, *merged.warnings)),
+        policy=merged.policy, reasons=merged.reasons, warnings=_unique((*derived.warnings, *merged.warnings))
     )
 
 

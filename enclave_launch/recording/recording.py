@@ -186,11 +186,7 @@ class Recording:
     def _try_it(self) -> None:
         """One program with the recorder, before any node depends on it: a folder without execution, or a libc of
         another kind, is told now."""
-        environment = {
-            **os.environ,
-            "LD_PRELOAD": str(self._library),
-            RECORD_VARIABLE: str(self._file),
-        }
+        environment = {**os.environ, "LD_PRELOAD": str(self._library), RECORD_VARIABLE: str(self._file)}
         ran = subprocess.run(
             ["/bin/sh", "-c", ":"], env=environment, capture_output=True, text=True, check=False
         )

@@ -50,10 +50,7 @@ def findings_text(judged: Judged) -> str:
 
 def findings_document(judged: Judged) -> dict[str, object]:
     """The findings for JSON, each with the reason why it was accepted, or ``None``."""
-    return {
-        "version": 1,
-        "findings": [{**told._asdict(), "accepted": accepted} for told, accepted in judged],
-    }
+    return {"version": 1, "findings": [{**told._asdict(), "accepted": accepted} for told, accepted in judged]}
 
 
 def suggestions_text(merges: Sequence[Merge], splits: Sequence[Split]) -> str:

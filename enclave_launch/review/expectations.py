@@ -74,8 +74,9 @@ def read_expectations(content: Any, place: str) -> Expectations:
             for item in _items(content, "never", place)
         ),
         tuple(
-            _accepted(*_texts(item, ("code", "why"), ("subject",), f"{place}: accept"))
+            Accepted(code, subject or "*", why)
             for item in _items(content, "accept", place)
+            for code, why, subject in [_texts(item, ("code", "why"), ("subject",), f"{place}: accept")]
         ),
     )
 
@@ -177,7 +178,3 @@ def _texts(item: Any, needed: tuple[str, ...], optional: tuple[str, ...], place:
     if not all(isinstance(value, str) for value in values):
         raise UsageError(f"{place}: texts expected in {item!r}")
     return values
-
-
-def _accepted(code: str, why: str, subject: str) -> Accepted:
-    return Accepted(code, subject or "*", why)

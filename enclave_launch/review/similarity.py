@@ -6,7 +6,6 @@ may then do what the others may (the excess). The same number, the other way rou
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from itertools import combinations
 from typing import NamedTuple
 
@@ -62,11 +61,7 @@ def splits(plan: PlanDocument) -> list[Split]:
 
 
 def _asked_for(plan: PlanDocument, enclave: str) -> frozenset[GrantedName]:
-    return _union(node.own for node in plan.nodes_of(enclave))
-
-
-def _union(sets: Iterable[frozenset[GrantedName]]) -> frozenset[GrantedName]:
-    return frozenset[GrantedName]().union(*sets)
+    return frozenset[GrantedName]().union(*(node.own for node in plan.nodes_of(enclave)))
 
 
 def _similarity(one: frozenset[GrantedName], two: frozenset[GrantedName]) -> float:

@@ -83,9 +83,7 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
         parameters={},
         environment={},
         enclave=EnclaveRequest(
-            enclave_attribute(action, context),
-            scope_in_force(context),
-            parse_ros_arguments(words).enclave,
+            enclave_attribute(action, context), scope_in_force(context), parse_ros_arguments(words).enclave
         ),
         location=location_in(context, type(action).__name__),
         prefix=prefix,

@@ -31,10 +31,7 @@ from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the 
 from enclave_launch.ros2.session import EnclaveSession
 from enclave_launch.ros_rules.distro import choose_release
 from enclave_launch.secured import ProvisionedLaunch, zenoh_router
-from enclave_launch.security_environment import (
-    OVERRIDE,
-    launcher_environment,
-)
+from enclave_launch.security_environment import OVERRIDE, launcher_environment
 from nodl.ament_index import search_prefixes
 
 EXTENSION = "enclave_launch.ros2.node_action"

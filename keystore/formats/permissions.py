@@ -21,12 +21,7 @@ from typing import NamedTuple
 
 from keystore.errors import printable
 from keystore.formats.domains import Domains
-from keystore.formats.permissions_names import (
-    DISCOVERY_TOPIC,
-    Topics,
-    add_dds_topics,
-    full_name,
-)
+from keystore.formats.permissions_names import DISCOVERY_TOPIC, Topics, add_dds_topics, full_name
 from keystore.formats.permissions_patterns import can_meet, covers, has_wildcard
 from keystore.formats.policy import EnclavePolicy, PolicyError, Qualifier
 from keystore.formats.validity import Validity
@@ -68,12 +63,7 @@ class DdsRules(NamedTuple):
 
 
 def permissions_document(
-    subject: str,
-    policy: EnclavePolicy,
-    *,
-    validity: Validity,
-    domains: Domains,
-    rmw: str | None = None,
+    subject: str, policy: EnclavePolicy, *, validity: Validity, domains: Domains, rmw: str | None = None
 ) -> bytes:
     """The permissions document (UTF-8, LF) for the certificate with this ``subject`` (``CN=/talker``).
 

@@ -131,12 +131,7 @@ class _Found(NamedTuple):
 
 
 def _identity(
-    view: KeystoreView,
-    register: Register | None,
-    enclave: str,
-    directory: str,
-    now: datetime,
-    due: datetime,
+    view: KeystoreView, register: Register | None, enclave: str, directory: str, now: datetime, due: datetime
 ) -> _Found:
     mode = _key_mode(view, directory)
     key = safe_files.read_if_there(view.root, f"{directory}/{layout.KEY}")

@@ -23,14 +23,7 @@ from keystore.errors import InvalidInputError, printable
 from keystore.formats.permissions import permissions_document
 from keystore.formats.permissions_names import full_name
 from keystore.formats.policy import EnclavePolicy, Profile, Qualifier
-from keystore.formats.shares import (
-    Share,
-    is_part_of,
-    merged_profiles,
-    shares_json,
-    united,
-    united_domains,
-)
+from keystore.formats.shares import Share, is_part_of, merged_profiles, shares_json, united, united_domains
 from keystore.formats.validity import Validity
 
 

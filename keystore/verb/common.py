@@ -131,10 +131,7 @@ def access(arguments: argparse.Namespace) -> CaAccess:
     given = vars(arguments)
     passphrase = Secret(given["passphrase_file"], given["passphrase_fd"], given["passphrase_env"])
     pin = Secret(file=given["pin_file"], variable=given["pin_env"])
-    return CaAccess(
-        passphrase=passphrase if passphrase.is_given else None,
-        pin=pin if pin.is_given else None,
-    )
+    return CaAccess(passphrase=passphrase if passphrase.is_given else None, pin=pin if pin.is_given else None)
 
 
 @dataclass(frozen=True, slots=True)

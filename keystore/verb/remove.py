@@ -24,9 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     from keystore.steps.removal import RemoveOptions, remove
 
     options = RemoveOptions(
-        revoke=not arguments.no_revoke,
-        access=common.access(arguments),
-        lock_timeout=arguments.lock_timeout,
+        revoke=not arguments.no_revoke, access=common.access(arguments), lock_timeout=arguments.lock_timeout
     )
     report = remove(arguments.keystore, arguments.enclaves, options=options)
     if not arguments.quiet:

@@ -216,10 +216,7 @@ def _interfaces(
 
 
 def _joined(
-    kind: EndpointKind,
-    name: str,
-    members: Sequence[tuple[SeenEndpoint, Part]],
-    by: Mapping[str, Attribution],
+    kind: EndpointKind, name: str, members: Sequence[tuple[SeenEndpoint, Part]], by: Mapping[str, Attribution]
 ) -> Iterator[SeenInterface]:
     """The parts of one name; the topics of an action without any of its services are topics (``ros2 topic echo``)."""
     if kind in _ACTIONS and all(part.part in ACTION_TOPICS for _, part in members):
@@ -237,9 +234,7 @@ def _joined(
         yield SeenInterface(kind, name, type_name, endpoints, missing, by[endpoints[0].guid])
 
 
-def _by_type(
-    members: Sequence[tuple[SeenEndpoint, Part]],
-) -> dict[str, list[tuple[SeenEndpoint, Part]]]:
+def _by_type(members: Sequence[tuple[SeenEndpoint, Part]]) -> dict[str, list[tuple[SeenEndpoint, Part]]]:
     """Parts that do not tell a type belong to each that the others tell."""
     types = sorted({part.type for _, part in members if part.type}) or [""]
     return {each: [(e, part) for e, part in members if part.type in ("", each)] for each in types}

@@ -14,15 +14,7 @@ from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.asked import Asked, AskedNode, all_asked
 from nodl.record.assembly import Record
 from nodl.record.lines import RecordedRun
-from nodl.record.origins import (
-    FIXED,
-    MARKER,
-    Name,
-    NameOrigin,
-    Observation,
-    arguments_as_inputs,
-    origins_of,
-)
+from nodl.record.origins import FIXED, MARKER, Name, NameOrigin, Observation, arguments_as_inputs, origins_of
 
 _NUMBERED = re.compile(r"(.+?)_((?:0x)?(?=[0-9a-f]*[0-9])[0-9a-f]{6,}|[0-9]{3,})\Z")
 _TF_LISTENER = "transform_listener_impl_*"

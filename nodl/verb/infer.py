@@ -76,8 +76,7 @@ def run(args: argparse.Namespace) -> int:
     if not system.nodes:
         count = len(system.files)
         print(
-            f"secure-nodl infer: error: no node was found in {counted(count, 'source file')}",
-            file=sys.stderr,
+            f"secure-nodl infer: error: no node was found in {counted(count, 'source file')}", file=sys.stderr
         )
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):
         print(f"{len(expanded.unresolved)} unresolved:", file=sys.stderr)

@@ -179,12 +179,7 @@ _SPECIAL = {
     "InteractiveMarkers": _Reading.interactive_markers,
     "RobotModel": _Reading.robot_model,
 }
-_MORE = {
-    "Camera": _Reading.camera,
-    "Effort": _Reading.effort,
-    "Map": _Reading.map,
-    "Marker": _Reading.marker,
-}
+_MORE = {"Camera": _Reading.camera, "Effort": _Reading.effort, "Map": _Reading.map, "Marker": _Reading.marker}
 
 
 def _get(value: YamlValue | None, key: str) -> YamlValue | None:
