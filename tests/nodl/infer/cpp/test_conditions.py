@@ -1,0 +1,65 @@
+"""What ``exact`` says of an interface under a condition: its name, in C++ as in Python; not that every run makes it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nodl.infer import InferredSystem, infer_paths
+from nodl.node_interface import Certainty
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+PUB = "void pub(std::string t) { create_publisher<std_msgs::msg::String>(t, 1); }\n"
+UNDECIDED = {
+    "an if": ('if (std::rand() > 5) { pub("a"); }', {"a"}),
+    "both sides of it": ('if (std::rand() > 5) { pub("a"); } else { pub("b"); }', {"a", "b"}),
+    "one of two names": ('pub(std::rand() > 5 ? "a" : "b");', {"a", "b"}),
+    "a catch": ('try { std::rand(); } catch (...) { pub("a"); }', {"a"}),
+    "a switch": ('switch (std::rand()) { case 1: pub("a"); break; case 2: pub("b"); }', {"a", "b"}),
+    "a loop": ('while (std::rand() > 5) { pub("a"); }', {"a"}),
+    "a second operand": ('std::rand() > 5 && (pub("a"), true);', {"a"}),
+}
+
+
+def certainties(system: InferredSystem) -> dict[str, Certainty]:
+    return {str(e.name): e.certainty for node in system.nodes for e in node.endpoints}
+
+
+@pytest.mark.parametrize(("body", "made"), UNDECIDED.values(), ids=UNDECIDED)
+def test_under_an_undecided_condition_the_name_is_exact(body: str, made: set[str], tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(body, PUB))
+    assert certainties(system) == dict.fromkeys(made, Certainty.EXACT)
+    assert gaps(system) == []
+
+
+def test_python_says_the_same(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    program.write_text(
+        "import random, rclpy\nfrom std_msgs.msg import String\nnode = rclpy.create_node('n')\n"
+        "if random.random() > 0.5:\n    node.create_publisher(String, 'a', 1)\n"
+        "node.create_publisher(String, 'b' if random.random() > 0.5 else 'c', 1)\n",
+        encoding="utf-8",
+    )
+    assert certainties(infer_paths([program])) == dict.fromkeys("abc", Certainty.EXACT)
+
+
+@pytest.mark.parametrize(
+    ("body", "certainty"),
+    [
+        ('if (std::rand() > 5) { pub("a_" + std::string(std::getenv("X"))); }', Certainty.PATTERN),
+        ('if (std::rand() > 5) { pub(std::getenv("X")); }', Certainty.UNKNOWN),
+    ],
+)
+def test_a_name_that_is_not_known_is_not_exact_there_either(
+    body: str, certainty: Certainty, tmp_path: Path
+) -> None:
+    system = infer(tmp_path, in_class(body, PUB))
+    assert set(certainties(system).values()) == {certainty}
+
+
+def test_what_a_decided_condition_leaves_out_is_not_listed(tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class('if (1 > 2) { pub("a"); } else { pub("b"); }', PUB))
+    assert set(certainties(system)) == {"b"}
