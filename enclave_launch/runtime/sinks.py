@@ -70,9 +70,10 @@ class FileSink:
     def write(self, data: bytes) -> None:
         try:
             self._reopen_if_moved()
-            if self._limit is not None:
-                self._begin_anew_at(self._limit - len(data))
-            _write_all(self._descriptor, data)
+            if self._limit is None:
+                _write_all(self._descriptor, data)
+            else:
+                self._write_below(self._limit, data)
         except OSError as error:  # a full disk must not end the launch
             if not self._broken:
                 self._tell(
@@ -89,11 +90,22 @@ class FileSink:
             os.close(self._descriptor)
             self._descriptor, self._identity = -1, None
 
-    def _begin_anew_at(self, size: int) -> None:
-        present = os.fstat(self._descriptor).st_size
-        if present and present > size:
-            self.path.replace(self.path.with_name(f"{self.path.name}.1"))
-            self._reopen_if_moved()
+    def _write_below(self, limit: int, data: bytes) -> None:
+        """A busy process gives megabytes at once: cut between lines; only a line may be longer than the limit."""
+        start = 0
+        while start < len(data):
+            present = os.fstat(self._descriptor).st_size
+            end = start + limit - present
+            if end < len(data):
+                end = data.rfind(b"\n", start, max(start, end)) + 1
+            if end <= start and present:
+                self.path.replace(self.path.with_name(f"{self.path.name}.1"))
+                self._reopen_if_moved()
+                continue
+            if end <= start:
+                end = data.find(b"\n", start) + 1 or len(data)
+            _write_all(self._descriptor, data[start:end])
+            start = end
 
     def _reopen_if_moved(self) -> None:
         try:

@@ -7,6 +7,8 @@ import threading
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from enclave_launch.runtime import sinks
 from enclave_launch.runtime.sinks import HIGH_WATER, FileSink, ScreenSink, SinkWriter
@@ -105,6 +107,28 @@ def test_a_log_with_a_limit_keeps_one_older_file_and_one_without_grows(tmp_path:
         "limited.log.1": "line3\n",
         "unlimited.log": "line0\nline1\nline2\nline3\nline4\n",
     }
+
+
+@given(
+    writes=st.lists(st.lists(st.integers(0, 30), max_size=20), max_size=6),
+    limit=st.integers(1, 60),
+)
+def test_no_file_grows_over_its_limit_however_much_comes_at_once(
+    writes: list[list[int]], limit: int, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    """Only a line that is longer than the limit has a file of its own; what is kept is the end of what came."""
+    path = tmp_path_factory.mktemp("limited") / "a.log"
+    sink = FileSink(path, limit=limit)
+    everything = b""
+    for lengths in writes:
+        data = b"".join(b"x" * length + b"\n" for length in lengths)
+        everything += data
+        sink.write(data)
+    sink.close()
+    kept = [file.read_bytes() for file in (path.with_name("a.log.1"), path) if file.exists()]
+    assert everything.endswith(b"".join(kept))
+    assert all(len(text) <= limit or text.count(b"\n") == 1 for text in kept)
+    assert not everything or kept[-1], "the newest lines are there"
 
 
 def test_a_non_blocking_standard_output_still_gets_everything() -> None:
