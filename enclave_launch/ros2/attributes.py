@@ -26,7 +26,6 @@ from launch.utilities import normalize_to_list_of_substitutions, perform_substit
 
 from enclave_launch.ros2.context import session_of
 from enclave_launch.ros_rules.namespaces import enclave_scope, push_enclave_scope
-from enclave_launch.security_environment import OVERRIDE
 
 ATTRIBUTE = "_enclave_launch_enclave"
 GRANT = "_enclave_launch_grant"
@@ -104,6 +103,7 @@ def _securing(prepare: Callable[..., None]) -> Callable[..., None]:
         session = session_of(context)
         if session is not None:
             from enclave_launch.ros2.observation import observe_executable
+            from enclave_launch.security_environment import OVERRIDE  # a plain launch does without the plan
 
             grant = getattr(action, GRANT, None) or session.enter(observe_executable(action, context))
             self.final_env.pop(OVERRIDE, None)  # rcl lets it win over --enclave
