@@ -19,8 +19,8 @@ import functools
 import re
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.analysis import is_node
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
@@ -87,13 +87,13 @@ def unsettled_places(
     return list(dict.fromkeys(audit.gaps))
 
 
-@dataclass
 class _Mentions:
     """What the executed code of all modules refers to."""
 
-    names: dict[str, set[str]] = field(default_factory=dict)  # by file
-    imported: dict[str, set[str]] = field(default_factory=dict)  # names that a file imports
-    texts: set[str] = field(default_factory=set)
+    def __init__(self) -> None:
+        self.names: dict[str, set[str]] = {}  # by file
+        self.imported: dict[str, set[str]] = {}  # names that a file imports
+        self.texts: set[str] = set()
 
     def name(self, name: str, file: str) -> bool:
         elsewhere = any(
@@ -194,8 +194,7 @@ def _last_name(function: ast.expr) -> str:
     return function.id if isinstance(function, ast.Name) else ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Place:
+class _Place(NamedTuple):
     """A mention of what makes interfaces, with the statements, classes and functions around it from outside in."""
 
     node: ast.AST

@@ -6,15 +6,13 @@ Everything here only grows, in whatever order branches and loops are analysed; `
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.values import BOTTOM, FieldCells, Unknown, Value, join
 from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef
 
 
-@dataclass(frozen=True, slots=True)
-class FoundEndpoint:
+class FoundEndpoint(NamedTuple):
     """One possible name (a ``str``, a ``Text`` or an ``Unknown``) of an endpoint, with where it is made."""
 
     kind: EndpointKind
@@ -24,24 +22,27 @@ class FoundEndpoint:
     qos: QosPolicies = ()
 
 
-@dataclass(eq=False)
 class NodeRecord:
     """A node under its allocation site."""
 
-    source: SourceRef
-    names: Value = BOTTOM
-    namespaces: Value = BOTTOM
-    lifecycle: bool = False
-    created: bool = False  # Node.__init__ was seen
-    communication_interface: bool = True
-    endpoints: dict[FoundEndpoint, None] = field(default_factory=dict)
-    parameters: dict[str, Value] = field(default_factory=dict)
-    assigned: dict[str, Value] = field(default_factory=dict)  # set by the program itself
-    arguments: Value = BOTTOM  # cli_args of the node
-    use_global_arguments: Value = (True,)
-    gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
-    class_key: object = None
-    cells: FieldCells = field(default_factory=FieldCells)  # parameters that the program sets itself
+    def __init__(self, source: SourceRef, *, class_key: object = None, lifecycle: bool = False) -> None:
+        self.source = source
+        self.class_key = class_key
+        self.lifecycle = lifecycle
+        self.names: Value = BOTTOM
+        self.namespaces: Value = BOTTOM
+        self.created = False  # Node.__init__ was seen
+        self.communication_interface = True
+        self.endpoints: dict[FoundEndpoint, None] = {}
+        self.parameters: dict[str, Value] = {}
+        self.assigned: dict[str, Value] = {}  # set by the program itself
+        self.arguments: Value = BOTTOM  # cli_args of the node
+        self.use_global_arguments: Value = (True,)
+        self.gaps: dict[tuple[SourceRef, str], None] = {}
+        self.cells = FieldCells()  # parameters that the program sets itself
+
+    def __repr__(self) -> str:
+        return f"NodeRecord({self.source})"
 
     def add_endpoint(self, endpoint: FoundEndpoint) -> None:
         self.endpoints.setdefault(endpoint)

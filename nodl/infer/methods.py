@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.values import BOTTOM, ClassValue, FunctionValue, HeapObject, Value
 
 
@@ -70,8 +69,7 @@ class ForeignMethod:
         return hash((self.path, id(self.receiver), self.name))
 
 
-@dataclass(frozen=True, slots=True)
-class Partial:
+class Partial(NamedTuple):
     """``functools.partial``: a callable with its first arguments and keywords given in advance."""
 
     function: Value
@@ -79,8 +77,7 @@ class Partial:
     keywords: tuple[tuple[str, Value], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Getter:
+class Getter(NamedTuple):
     """``operator.methodcaller``, ``attrgetter`` and ``itemgetter`` with what they were given."""
 
     kind: str
@@ -88,16 +85,14 @@ class Getter:
     keywords: tuple[tuple[str, Value], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class SuperProxy:
+class SuperProxy(NamedTuple):
     """``super()`` inside a method of ``owner`` for object ``receiver``."""
 
     owner: ClassValue
     receiver: object
 
 
-@dataclass(frozen=True, slots=True)
-class PropertyValue:
+class PropertyValue(NamedTuple):
     """``cached``: read once, then an attribute of the object."""
 
     getter: Value
@@ -105,27 +100,33 @@ class PropertyValue:
     deleter: Value = BOTTOM
     cached: bool = False
 
+    def with_accessor(self, name: str, function: Value) -> PropertyValue:
+        """The property after ``@x.setter``, ``@x.deleter`` or ``@x.getter``."""
+        if name == "getter":
+            return self._replace(getter=function)
+        return self._replace(setter=function) if name == "setter" else self._replace(deleter=function)
 
-@dataclass(frozen=True, slots=True)
-class ClassMethod:
+
+class ClassMethod(NamedTuple):
     """A function under ``@classmethod``, or under ``@staticmethod`` (``static``)."""
 
     function: Value
     static: bool
 
 
-@dataclass(frozen=True, slots=True)
-class PartialMethod:
+class PartialMethod(NamedTuple):
     """``functools.partialmethod``: bound like a function, with arguments of its own."""
 
     partial: Partial
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Variables:
     """The dictionary of an object's or a module's variables: ``vars(x)``, ``x.__dict__``, ``globals()``."""
 
-    owner: HeapObject
+    __slots__ = ("owner",)
+
+    def __init__(self, owner: HeapObject) -> None:
+        self.owner = owner
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Variables) and other.owner is self.owner

@@ -7,19 +7,18 @@ from __future__ import annotations
 
 import ast
 import re
-from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
 from enclave_launch.boundary.files import text_or_nothing
+from enclave_launch.boundary.named_tuple import NamedTuple
 
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _PROGRAMS = re.compile(r"install\s*\(\s*PROGRAMS(.*?)DESTINATION", re.S | re.I)
 
 
-@dataclass(frozen=True, slots=True)
-class EntryPoint:
+class EntryPoint(NamedTuple):
     """An entry point in setup.py or setup.cfg: an executable with the module and function it calls."""
 
     executable: str
@@ -27,14 +26,13 @@ class EntryPoint:
     function: str
 
 
-@dataclass(frozen=True)
-class Package:
+class Package(NamedTuple):
     """A source package: the folder with ``package.xml``."""
 
     name: str
     folder: str
     entry_points: tuple[EntryPoint, ...] = ()
-    installed_programs: frozenset[str] = field(default_factory=frozenset)
+    installed_programs: frozenset[str] = frozenset()
 
     def entry_points_of(self, module: str) -> list[EntryPoint]:
         return [entry for entry in self.entry_points if entry.module == module]

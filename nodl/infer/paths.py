@@ -8,8 +8,8 @@ launch to decide. More tests than ``MAX_FORKS`` in a row leave the joined run as
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord
 from nodl.infer.interpreter.conditions import OPPOSITE
 from nodl.infer.interpreter.decisions import Decisions, TooManyPaths
@@ -21,8 +21,7 @@ Guards = frozenset[tuple[str, str, tuple[str, ...]]]
 Follow = Callable[[Decisions], Run]
 
 
-@dataclass(slots=True)
-class Path:
+class Path(NamedTuple):
     """A run that followed one path through the program, with the outcomes that led it there."""
 
     run: Run
@@ -152,4 +151,4 @@ def _guarded(endpoint: FoundEndpoint, guards: Guards, record: NodeRecord) -> Fou
     if not own or len(own) < len(guards) or not isinstance(endpoint.name, str | Text):
         return endpoint
     conditions: list[Piece] = [Input(name, record, None, ((edit, given),)) for name, edit, given in own]
-    return replace(endpoint, name=make_text((*conditions, *pieces_of(endpoint.name))))
+    return endpoint._replace(name=make_text((*conditions, *pieces_of(endpoint.name))))

@@ -13,7 +13,6 @@ import os
 import re
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
 
 from enclave_launch.boundary.files import read_bytes
 from nodl.infer.cpp.cache.digests import digest, digest_of
@@ -34,18 +33,26 @@ MODELLED = frozenset(
 _INTERFACES = ("msg", "srv", "action")  # generated from interface files, so types and not programs
 
 
-@dataclass(eq=False)
 class SourceModule:
     """One parsed file. ``error`` says why it could not be parsed (``tree`` is then empty)."""
 
-    name: str
-    path: str
-    tree: ast.Module
-    text: str = ""
-    is_package: bool = False
-    error: str | None = None
-    error_line: int = 0
-    entry_functions: list[str] = field(default_factory=list)
+    def __init__(
+        self,
+        name: str,
+        path: str,
+        tree: ast.Module,
+        text: str = "",
+        is_package: bool = False,
+        error: str | None = None,
+        error_line: int = 0,
+    ) -> None:
+        self.name = name
+        self.path = path
+        self.tree = tree
+        self.text = text
+        self.is_package = is_package
+        self.error = error
+        self.error_line = error_line
 
     @functools.cached_property
     def has_yield(self) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from nodl.infer.analysis import start, start_function
+from nodl.infer.collector import without_collector
 from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.program import Program
 from nodl.infer.python_executable import ProgramTarget
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import LaunchKey
-from nodl.infer.system import without_collector
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 

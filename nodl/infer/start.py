@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Protocol
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 
-@dataclass(frozen=True)
-class LaunchKey:
+
+class LaunchKey(NamedTuple):
     """Under which name launch starts a program."""
 
     package: str | None = None

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import gc
-import itertools
 import os
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.analysis import analyse_rest, start
+from nodl.infer.collector import without_collector
 from nodl.infer.coverage import may_make_interfaces, unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.packages import EntryPoint, Package, find_package
@@ -25,13 +23,10 @@ CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".hpp", ".hh", ".hxx", ".h")
 _SKIPPED_FOLDERS = frozenset(
     {"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"}
 )
-_ANALYSES_A_COLLECTION = 100
-_analyses = itertools.count(1)
 _NOT_PROGRAMS = re.compile(r"(?:setup|conf|conftest)\.py\Z|.*launch\.py\Z")
 
 
-@dataclass(frozen=True, slots=True)
-class InferredSystem:
+class InferredSystem(NamedTuple):
     """``gaps`` belong to no single node; each node carries its own."""
 
     nodes: tuple[NodeInterface, ...]
@@ -114,23 +109,3 @@ def _source_files(path: Path) -> Iterator[str]:
         for name in sorted(names):
             if name.endswith(CPP_SUFFIXES) or (name.endswith(".py") and not _NOT_PROGRAMS.match(name)):
                 yield os.path.abspath(os.path.join(folder, name))
-
-
-@contextmanager
-def without_collector() -> Iterator[None]:
-    """Analysis makes many small objects that stay alive to its end; looking for garbage finds none.
-
-    What is left then counts as old, or the next new object would have all of it searched; now and then it is searched.
-    """
-    enabled = gc.isenabled()
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled and next(_analyses) % _ANALYSES_A_COLLECTION:
-            gc.freeze()
-            gc.unfreeze()  # puts everything into the oldest generation
-            gc.enable()
-        elif enabled:
-            gc.enable()
-            gc.collect()

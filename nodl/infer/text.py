@@ -8,7 +8,8 @@ common prefix and suffix around a hole; a text that is only a hole says no more 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+
+from enclave_launch.boundary.named_tuple import NamedTuple
 
 MAX_PARTS = 24
 MAX_PRODUCT = 64
@@ -22,8 +23,7 @@ DEFERRED_METHODS = frozenset(
 Edit = tuple[str, tuple[str, ...]]
 
 
-@dataclass(frozen=True, slots=True)
-class Input:
+class Input(NamedTuple):
     """The value of a named input of the program. ``item``: an index, or ``"each"`` element of a list."""
 
     name: str
@@ -32,18 +32,19 @@ class Input:
     edits: tuple[Edit, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class NodePart:
+class NodePart(NamedTuple):
     """The node's ``name``, ``namespace`` or ``fqn`` (fully qualified name), whatever launch makes of it."""
 
     what: str
 
 
-@dataclass(frozen=True, slots=True)
 class Hole:
     """A part of a text that is not known, and why; holes are equal whatever their reason."""
 
-    why: str
+    __slots__ = ("why",)
+
+    def __init__(self, why: str) -> None:
+        self.why = why
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Hole)
@@ -51,15 +52,23 @@ class Hole:
     def __hash__(self) -> int:
         return 7
 
+    def __repr__(self) -> str:
+        return f"Hole({self.why!r})"
+
 
 Piece = str | Input | NodePart | Hole
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Text:
     """Made by ``make_text`` only, so that equal texts are one object and compare at once."""
 
-    pieces: tuple[Piece, ...]
+    __slots__ = ("pieces",)
+
+    def __init__(self, pieces: tuple[Piece, ...]) -> None:
+        self.pieces = pieces
+
+    def __repr__(self) -> str:
+        return f"Text({self.pieces!r})"
 
     @property
     def is_hole(self) -> bool:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.node_interface import Gap, NodeInterface
 
 
-@dataclass(frozen=True)
-class Entry:
+class Entry(NamedTuple):
     """Where a program starts: ``main`` of its files, or the constructor of a class."""
 
     files: tuple[str, ...]
@@ -20,8 +19,7 @@ class Entry:
     place: str = ""  # the package's folder, for what has no file
 
 
-@dataclass(frozen=True)
-class Solved:
+class Solved(NamedTuple):
     """``gaps``: of the program, which its first node also has; ``dead``: places that make nothing, and why;
     ``classes``: of which it makes objects; ``consulted``: parameters of the launch decided what it makes."""
 

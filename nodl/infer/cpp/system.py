@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
@@ -179,7 +178,7 @@ def _component_entry(name: str, package: SourcePackage, workspace: Workspace, so
             if (i := sources.index(f, {}, False)) and name in registered_components(i)
         ]
         return Entry(tuple(files), cls=name, main=False, place=package.folder)
-    return dataclasses.replace(target_entry(target, package, workspace), cls=name, main=False)
+    return target_entry(target, package, workspace)._replace(cls=name, main=False)
 
 
 def _all_sources(package: SourcePackage) -> list[str]:

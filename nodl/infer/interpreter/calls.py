@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 from nodl.infer.interpreter import generators
 from nodl.infer.interpreter.binding import bind
@@ -33,17 +32,17 @@ MAX_RECURSION = 24  # calls of a function inside itself that are followed one by
 Body = Callable[[Run, FunctionValue, LocalCells, Call], Value]
 
 
-@dataclass
 class Summary:
     """A function that calls itself: its joined parameters and result, run to a fixpoint.
 
     ``active``: its body is running; a call of it then adds to the parameters and gets the result so far.
     """
 
-    parameters: dict[object, Value] = field(default_factory=dict)
-    result: Value = BOTTOM
-    active: bool = False
-    widened: int = 0
+    def __init__(self) -> None:
+        self.parameters: dict[object, Value] = {}
+        self.result: Value = BOTTOM
+        self.active = False
+        self.widened = 0
 
 
 def call_function(run: Run, function: FunctionValue, call: Call) -> Value:

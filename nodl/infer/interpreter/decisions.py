@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 MAX_FORKS = 4  # undecided tests of which each outcome is followed by itself
 
 
@@ -11,13 +9,13 @@ class TooManyPaths(Exception):
     """The program has more undecided tests in a row than are followed one by one."""
 
 
-@dataclass(slots=True)
 class Decisions:
     """Outcomes of the undecided tests on one path through the program, in their order."""
 
-    outcomes: list[bool]
-    conditions: list[object] = field(default_factory=list)  # what the test asks of a parameter, or None
-    taken: int = 0
+    def __init__(self, outcomes: list[bool]) -> None:
+        self.outcomes = outcomes
+        self.conditions: list[object] = []  # what the test asks of a parameter, or None
+        self.taken = 0
 
     def next(self, condition: object) -> bool:
         """The outcome of the next test. Raises ``TooManyPaths``."""

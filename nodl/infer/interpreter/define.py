@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-from dataclasses import replace
 
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import Run
@@ -84,7 +83,7 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
         found = run.evaluate(decorator.value, frame)
         if found and all(isinstance(atom, PropertyValue) for atom in found):
             return tuple(
-                _with_accessor(a, decorator.attr, value) for a in found if isinstance(a, PropertyValue)
+                a.with_accessor(decorator.attr, value) for a in found if isinstance(a, PropertyValue)
             )
     made_by_call = isinstance(decorator, ast.Call)
     callee = run.evaluate(decorator.func if isinstance(decorator, ast.Call) else decorator, frame)
@@ -113,12 +112,6 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
     if made_by_call:
         callee = run.evaluate(decorator, frame)
     return run.call(callee, Arguments([value]), decorator, frame)
-
-
-def _with_accessor(held: PropertyValue, accessor: str, function: Value) -> PropertyValue:
-    if accessor == "setter":
-        return replace(held, setter=function)
-    return replace(held, deleter=function) if accessor == "deleter" else replace(held, getter=function)
 
 
 def _take_name(run: Run, function: FunctionValue, decorator: ast.Call, frame: Frame) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 
 from nodl.infer.values import (
     BOTTOM,
@@ -74,14 +73,22 @@ class Frame:
             frame = frame.closure
 
 
-@dataclass(slots=True)
 class Arguments:
     """The arguments of a call. ``more``: further positional ones of unknown number."""
 
-    positional: list[Value] = field(default_factory=list)
-    keywords: dict[str, Value] = field(default_factory=dict)
-    more: Value = BOTTOM
-    more_keywords: Value = BOTTOM
+    __slots__ = ("keywords", "more", "more_keywords", "positional")
+
+    def __init__(
+        self,
+        positional: list[Value] | None = None,
+        keywords: dict[str, Value] | None = None,
+        more: Value = BOTTOM,
+        more_keywords: Value = BOTTOM,
+    ) -> None:
+        self.positional = [] if positional is None else positional
+        self.keywords = {} if keywords is None else keywords
+        self.more = more
+        self.more_keywords = more_keywords
 
     def at(self, index: int, name: str | None = None) -> Value | None:
         """The argument at ``index`` or called ``name``; ``None`` when it is not given."""
@@ -102,13 +109,15 @@ class Arguments:
         return (*self.positional, *self.keywords.values(), self.more, self.more_keywords)
 
 
-@dataclass(slots=True)
 class Call:
     """A call as the models of libraries see it."""
 
-    args: Arguments
-    node: ast.AST
-    frame: Frame
+    __slots__ = ("args", "frame", "node")
+
+    def __init__(self, args: Arguments, node: ast.AST, frame: Frame) -> None:
+        self.args = args
+        self.node = node
+        self.frame = frame
 
     @property
     def source(self) -> SourceRef:

@@ -9,9 +9,9 @@ from __future__ import annotations
 import ast
 import itertools
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.interpreter.decisions import Decisions
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
@@ -64,8 +64,7 @@ Caller = Callable[["Run", Any, Call], Value]
 AttributeReader = Callable[["Run", Any, str, ast.AST, Frame], Value]
 
 
-@dataclass(frozen=True)
-class Tables:
+class Tables(NamedTuple):
     """The handler of each kind of syntax, callable and attribute owner, and what is asked about libraries."""
 
     expressions: dict[type, Evaluator]

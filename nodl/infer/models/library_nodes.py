@@ -5,13 +5,11 @@ Source: nav2_simple_commander/robot_navigator.py (humble to rolling; the union, 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.models.signatures import ACTION_CLIENT, CLIENT, PUBLISHER, SUBSCRIPTION, FixedEndpoint
 
 
-@dataclass(frozen=True, slots=True)
-class LibraryNode:
+class LibraryNode(NamedTuple):
     """A node class of a library. ``name``: what the node is called unless its user says otherwise."""
 
     name: str

@@ -6,8 +6,7 @@ message_filters; diagnostic_updater; interactive_markers; image_transport_py. Po
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
+from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.node_interface import EndpointKind
 
 PUBLISHER = EndpointKind.PUBLISHER
@@ -18,24 +17,21 @@ ACTION_SERVER = EndpointKind.ACTION_SERVER
 ACTION_CLIENT = EndpointKind.ACTION_CLIENT
 
 
-@dataclass(frozen=True, slots=True)
-class Argument:
+class Argument(NamedTuple):
     """Where an argument stands: position (-1: keyword only) and keyword."""
 
     position: int
     keyword: str
 
 
-@dataclass(frozen=True, slots=True)
-class CallbackArgument:
+class CallbackArgument(NamedTuple):
     """An argument that is called later, with ``arity`` arguments (``None``: any number)."""
 
     argument: Argument
     arity: int | None
 
 
-@dataclass(frozen=True, slots=True)
-class EndpointCall:
+class EndpointCall(NamedTuple):
     """A call that makes one endpoint; ``node`` is ``None`` for methods of the node itself; ``qos``: position of
     ``qos_profile``, 0 where there is none."""
 
@@ -47,8 +43,7 @@ class EndpointCall:
     qos: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class FixedEndpoint:
+class FixedEndpoint(NamedTuple):
     """An endpoint whose name and type are fixed by the library."""
 
     kind: EndpointKind
@@ -58,8 +53,7 @@ class FixedEndpoint:
     below: Argument | None = None  # what this argument gives stands before the name
 
 
-@dataclass(frozen=True, slots=True)
-class Helper:
+class Helper(NamedTuple):
     """A class or function of a library that makes endpoints with fixed names on the node it is given."""
 
     node: Argument

@@ -1,12 +1,11 @@
-"""Answers as JSON and back: named tuples, frozen dataclasses and enumerations of a fixed list, nothing else. Pure.
+"""Answers as JSON and back: named tuples and enumerations of a fixed list, nothing else. Pure.
 
 Not ``pickle``: what is read must never be able to run code.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from enum import Enum
 from typing import Any
 
@@ -37,18 +36,13 @@ def encoded(value: object) -> object:
         return value
     name = type(value).__name__
     if name in _RECORDS:
-        return {"record": name, "fields": [encoded(each) for each in _fields(value)]}
+        assert isinstance(value, tuple)
+        return {"record": name, "fields": [encoded(each) for each in value]}
     if isinstance(value, Mapping):
         return {"mapping": [[encoded(key), encoded(each)] for key, each in value.items()]}
     if isinstance(value, tuple | list) and not hasattr(value, "_fields"):  # a record that is not listed
         return [encoded(each) for each in value]
     raise TypeError(f"{name} is not kept")
-
-
-def _fields(value: Any) -> Sequence[object]:
-    if dataclasses.is_dataclass(value):
-        return [getattr(value, each.name) for each in dataclasses.fields(value)]
-    return tuple(value)
 
 
 def decoded(value: object) -> Any:
