@@ -66,8 +66,18 @@ class Absent:
 ABSENT: Value = (Absent(),)
 
 
-class FieldCells(dict[object, Value]):
+class ObjectCells(dict[object, Value]):
+    """The contents of an object. ``born``: in which period of the run it was made, 0 where that is not known."""
+
+    born = 0
+
+
+class FieldCells(ObjectCells):
     """The cells of an instance; the state notes when one may be absent."""
+
+
+class AttributeCells(FieldCells):
+    """Those of an object of the program, which are read by their names; the state notes which were set."""
 
 
 class External:
@@ -121,7 +131,7 @@ class HeapObject:
     __slots__ = ("cells", "escaped", "summary")
 
     def __init__(self) -> None:
-        self.cells: Cells = {}
+        self.cells = ObjectCells()
         self.summary = False
         self.escaped = False
 
@@ -308,7 +318,7 @@ class Instance(HeapObject):
 
     def __init__(self, cls: ClassValue | External, site: tuple[str, int]):
         super().__init__()
-        self.cells = FieldCells()
+        self.cells = AttributeCells() if isinstance(cls, ClassValue) else FieldCells()
         self.cls = cls
         self.node: NodeRecord | None = None
         self.site = site

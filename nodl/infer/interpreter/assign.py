@@ -269,6 +269,7 @@ def _delete_known(run: Run, owner: Sequence, part: Value | slice | None) -> bool
 
 def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: ast.AST, frame: Frame) -> None:
     if isinstance(owner, Instance):
+        run.state.reads.attributes.add(name)
         hook = special.method(owner, "__delattr__")
         if hook:
             run.call(hook, Arguments([(name,)]), node, frame)

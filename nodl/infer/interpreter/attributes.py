@@ -59,6 +59,7 @@ def plain_attribute(
     run: Run, obj: Instance, cls: ClassValue, name: str, node: ast.AST, frame: Frame
 ) -> Value:
     """What ``object.__getattribute__`` finds, and after it ``__getattr__``."""
+    run.state.reads.attributes.add(name)
     held = obj.cells.get(name)
     if held is not None:
         if not obj.summary and ABSENT[0] not in held:
@@ -69,6 +70,7 @@ def plain_attribute(
     if name == "__class__":
         return (cls,)
     if name == "__dict__":
+        run.state.reflected = True
         return (Variables(obj),)
     found = _class_attribute(run, obj, linearized(cls), name, node, frame)
     if found is not None:

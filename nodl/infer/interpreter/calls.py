@@ -133,10 +133,17 @@ def _remembered(
     known = run.memo.get(key)
     version = (*run.state.version(), run.state.pulled, run.rounds)
     if known is not None and known[0] == version:
+        run.state.reads.attributes |= known[2]
         return known[1]
-    result = (body or _run_body)(run, function, cells, call)
-    if (*run.state.version(), run.state.pulled, run.rounds) == version:
-        run.memo[key] = (version, result)
+    reads = run.state.reads
+    around, reads.attributes = reads.attributes, set()
+    try:
+        result = (body or _run_body)(run, function, cells, call)
+        if (*run.state.version(), run.state.pulled, run.rounds) == version:
+            run.memo[key] = (version, result, reads.attributes)
+    finally:
+        around |= reads.attributes
+        reads.attributes = around
     return result
 
 

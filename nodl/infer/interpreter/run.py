@@ -13,11 +13,12 @@ from typing import Any
 
 from enclave_launch.boundary.named_tuple import NamedTuple
 from nodl.infer.findings import Findings, OptionDefaults
+from nodl.infer.interpreter.allocations import Allocations
 from nodl.infer.interpreter.decisions import Decisions
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy, Variables
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.state import ProgramState
+from nodl.infer.state import ProgramState, WhatWasRead
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
@@ -27,7 +28,6 @@ from nodl.infer.values import (
     External,
     FieldCells,
     FunctionValue,
-    HeapObject,
     Instance,
     Items,
     LocalCells,
@@ -76,7 +76,7 @@ class Tables(NamedTuple):
     creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
 
 
-class Run:
+class Run(Allocations):
     """One analysis from one entry point: state, findings and what is still to be called."""
 
     def __init__(self, program: Program, tables: Tables, main: SourceModule):
@@ -86,7 +86,7 @@ class Run:
         self.tables = tables
         self._expressions = tables.expressions
         self._statements = tables.statements
-        self.state = ProgramState()
+        super().__init__(ProgramState())
         self.findings = Findings()
         self.state.found = lambda: self.findings.count()
         self.modules: dict[str, ModuleValue] = {}
@@ -118,15 +118,17 @@ class Run:
         self.templates: dict[object, ast.ClassDef] = {}  # classes that a library writes for the program
         self.shares: dict[str, None] = {}  # share directories that the program asked for by a known name
         self.environment = FieldCells()  # variables that the program sets itself
-        self.memo: dict[tuple[object, ...], tuple[tuple[int, ...], Value]] = {}
+        # Calls that left the state as it was: at which version, with what result, which attributes they read.
+        self.memo: dict[tuple[object, ...], tuple[tuple[object, ...], Value, set[object]]] = {}
         self.unstable = False  # a recursion learned something new since its outermost call asked
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
-        # Versions of the state that callbacks left as they were.
-        self.in_vain: dict[tuple[object, int | None], tuple[int, int]] = {}
+        self.called_back: dict[
+            tuple[object, int | None], WhatWasRead
+        ] = {}  # what callbacks read when they last ran
         self.turns = MAX_TURNS
         self.undecided = 0  # tests outside of any undecided branch or repetition
         self.conditional = False  # one of them asks for the value of a parameter
@@ -136,12 +138,6 @@ class Run:
         self.risks = 0  # what may have raised an exception, counted inside of them
         # Forks and repetition when a function was last entered.
         self.entries: dict[ast.AST, tuple[int, int]] = {}
-        self.context = 0
-        self._contexts: dict[tuple[int, object], int] = {}
-        self._context_ids = itertools.count(1)
-        self._tuples: dict[object, Value] = {}
-        self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
-        self._allocated: dict[tuple[object, ...], HeapObject] = {}
 
     @property
     def fuel(self) -> int:
@@ -290,44 +286,6 @@ class Run:
             self.steps += len(result)
         return result or ANY
 
-    # --- heap -------------------------------------------------------------------------------------------
-
-    def enter(self, key: object) -> int:
-        """Go into the calling context ``key``; returns the context to go back to."""
-        previous = self.context
-        place = (previous, key)
-        inner = self._contexts.get(place)
-        if inner is None:
-            inner = self._contexts[place] = next(self._context_ids)
-        self.context = inner
-        return previous
-
-    def allocate(self, node: ast.AST, kind: str, make: Callable[[], HeapObject]) -> HeapObject:
-        """The object made at ``node`` in this calling context; made twice it stands for all of them."""
-        key = (self.context, id(node), kind)
-        found = self._allocated.get(key)
-        if found is None:
-            found = self._allocated[key] = make()
-        else:
-            found.summary = True  # what was stored before is still there: weak updates only add to it
-        return found
-
-    def tuple_of(self, parts: tuple[Value, ...]) -> Value:
-        """A tuple; it never changes, so equal ones are one object and need no allocation site."""
-        key = (parts, tuple(type(part[0]) if part else None for part in parts))
-        found = self._tuples.get(key)
-        if found is None:
-            found = self._tuples[key] = (Sequence("tuple", Items(parts)),)
-        return found
-
-    def sequence(self, node: ast.AST, kind: str, items: Items) -> Value:
-        if kind == "tuple" and items.exact is not None:
-            return self.tuple_of(items.exact)
-        obj = self.allocate(node, kind, lambda: Sequence(kind, items))
-        if obj.summary:
-            self.state.store(obj, "[items]", (items,))
-        return (obj,)
-
     # --- the world outside ------------------------------------------------------------------------------
 
     def register_callback(self, value: Value, arity: int | None) -> None:
@@ -387,9 +345,10 @@ class Run:
             self.state.learned += 1
 
     def _escape_container(self, obj: Sequence | Dictionary, opened: bool, objects: bool, depth: int) -> None:
-        if opened and not obj.escaped:
+        if opened and not obj.escaped and not (isinstance(obj, Sequence) and obj.kind == "tuple"):
             obj.escaped = True
             self.state.learned += 1
+            self.state.opened += obj.cells.born != self.state.period
         if depth < 3 and len(obj.cells) < 64:
             for value in list(obj.cells.values()):
                 for atom in value:

@@ -379,6 +379,7 @@ def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
     if owner.escaped and not copied.escaped:
         copied.escaped = True
         run.state.learned += 1
+        run.state.opened += copied.cells.born != run.state.period
     return (copied,)
 
 

@@ -60,6 +60,7 @@ def call_getattr(run: Run, call: Call) -> Value:
 
 def _any_method(run: Run, owner: Value, names: Value) -> None:
     """``getattr(self, 'on_' + x)``: any method whose name fits may be meant."""
+    run.state.reflected = True
     prefixes = [text.pieces[0] if isinstance(text, Text) else "" for text in names]
     for atom in owner:
         if isinstance(atom, ModuleValue | ClassValue):
@@ -92,6 +93,7 @@ def call_setattr(run: Run, call: Call) -> Value:
         store_attribute(run, owner, name, value, call.node, call.frame)
     if len(known) < len(names):
         run.escape_value(value)
+        run.state.reflected = True
         for atom in owner:
             if isinstance(atom, Instance):
                 for cell, old in list(atom.cells.items()):
@@ -111,6 +113,7 @@ def has_attribute(run: Run, owner: object, name: object) -> bool | None:
     """Whether the attribute is there. Once callbacks are registered, they may still set what is missing."""
     if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
         return None
+    run.state.reads.attributes.add(name)
     held = owner.cells.get(name)
     if held:
         return True if present(held) is held and not owner.summary else None
@@ -193,6 +196,7 @@ def call_vars(run: Run, call: Call) -> Value:
     if found is None:
         return call_globals(run, call) if call.frame.function is None else unknown("the local variables")
     if all(isinstance(atom, Instance | ClassValue | ModuleValue) for atom in found):
+        run.state.reflected = True
         return tuple(Variables(atom) for atom in found if isinstance(atom, HeapObject))
     return unknown("a dictionary of variables")
 

@@ -1,0 +1,146 @@
+"""Callbacks: what the world outside may call, called until nothing changes.
+
+Subscriptions, timers, threads and hooks of foreign classes run in any order and any number of times: the state after
+each call is joined with the one before, to a fixpoint. One that read nothing of what has changed is not called again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+
+from nodl.infer.interpreter.define import linearized, methods_in
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter.raising import Raised
+from nodl.infer.interpreter.run import Run
+from nodl.infer.state import WhatWasRead
+from nodl.infer.values import ClassValue, Instance, ModuleValue, unknown
+from nodl.source_ref import SourceRef
+
+MAX_ROUNDS = 12
+WIDEN_TEXTS_FROM = 4
+
+
+def settle(run: Run, at_end: bool = True) -> None:
+    """Call all callbacks until neither state nor findings change; ``at_end``: the program itself has ended."""
+    run.repeated += 1
+    outermost = run.settle is not _no_settling
+    run.settle = _no_settling
+    tries, run.tries = (
+        run.tries,
+        0,
+    )  # what a callback raises ends it, or the call that waits: one risk of a ``try``
+    expected: set[object] = set()
+    for turn in range(MAX_ROUNDS):
+        _expect_escaped(run, expected)
+        before = run.state.version(), dict(run.callbacks)
+        for callback, arity in before[1].items():
+            if not _is_settled(run, callback, arity):
+                if at_end:
+                    run.state.forget()
+                _call_back(run, callback, arity, turn >= WIDEN_TEXTS_FROM)
+        if before == (run.state.version(), run.callbacks) and expected.issuperset(run.escaped):
+            break
+    else:
+        run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
+    run.repeated -= 1
+    run.tries = tries
+    run.risks += 1
+    run.settle = settle_meanwhile if outermost else _no_settling
+
+
+def settle_meanwhile(run: Run) -> None:
+    """Call all callbacks where the program waits for them."""
+    settle(run, at_end=False)
+
+
+def _no_settling(run: Run) -> None:
+    """Callbacks are running already."""
+
+
+def _is_settled(run: Run, callback: object, arity: int | None) -> bool:
+    """Whether the callback would do again what it did: nothing that it read has changed since."""
+    before = run.called_back.get((callback, arity))
+    return before is not None and not run.state.touched(before)
+
+
+def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool) -> None:
+    """Call it once, and note what it read. What it made stands for what each of its calls makes."""
+    _begin_period(run)
+    around, reads = run.state.reads, WhatWasRead(run.state)
+    run.state.reads = reads
+    run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
+    run.called_back[callback, arity] = reads
+    run.state.reads = around
+    around.attributes |= reads.attributes
+    for made in run.born:
+        made.summary = True
+    _begin_period(run)
+
+
+def _begin_period(run: Run) -> None:
+    run.state.period += 1
+    run.born = []
+
+
+def _expect_escaped(run: Run, expected: set[object]) -> None:
+    """Code that was handed a class or an object may make objects of it and call its methods, in any order."""
+    for atom in list(run.escaped):
+        if atom in expected:
+            continue
+        expected.add(atom)
+        if isinstance(atom, ClassValue):
+            run.callbacks.setdefault(atom, None)
+        else:
+            expect_methods(run, (atom,))
+
+
+def expect_methods(run: Run, value: Iterable[object]) -> None:
+    """Register the methods of the program's objects in ``value``: others may call them."""
+    for instance in value:
+        if not isinstance(instance, Instance) or not isinstance(instance.cls, ClassValue):
+            continue
+        for base in linearized(instance.cls):
+            if not isinstance(base, ClassValue):
+                continue
+            for name in list(base.cells):
+                if isinstance(name, str) and name not in _NOT_CALLED and not name.startswith("["):
+                    bound = methods_in(base.cells.get(name, ()), instance, instance.cls)
+                    run.register_callback(bound, None)
+
+
+_NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_getitem__", "__set_name__"})
+
+
+def _called_from_outside(run: Run, callback: object, arity: int | None) -> Callable[[], bool]:
+    made = unknown("an argument given by code that is not analysed")
+    args = Arguments(more=made) if arity is None else Arguments([made] * arity)
+    module = next(iter(run.modules.values()))
+
+    def call() -> bool:
+        made = call_from_outside(run, module, callback, args)
+        if isinstance(callback, ClassValue):
+            run.escape_value(made)
+        return True
+
+    return call
+
+
+def call_from_outside(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple[object, ...]:
+    """Call ``atom`` as nobody in the program does; what it gives, nothing where an exception ends it."""
+    frame = Frame(module, {}, None, run.state.depth)
+    results: list[tuple[object, ...]] = []
+    completed(run, lambda: results.append(run.call_atom(atom, Call(args, module.source.tree, frame))))
+    return results[0] if results else ()
+
+
+def completed(run: Run, body: Callable[[], object]) -> None:
+    """Run ``body`` to its end, or to the exception that ends the program there; what it registered stays."""
+    state = run.state
+    before = len(run.stack), run.context, state.depth, run.unrolled
+    try:
+        body()
+    except Raised:
+        size, run.context, state.depth, run.unrolled = before
+        del run.stack[size:]
+        run.tries = 0
+        run.try_forks = 0
