@@ -220,7 +220,10 @@ def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
     stops_at = isinstance(node.op, ast.Or)
     result: Value = BOTTOM
     for index, operand in enumerate(node.values):
-        value = run.evaluate(operand, frame) if index == 0 else _perhaps(run, operand, frame)
+        before = node.values[:index]
+        value = (
+            _perhaps(run, operand, before, not stops_at, frame) if before else run.evaluate(operand, frame)
+        )
         if index == len(node.values) - 1:
             return join(result, value)
         tested = special.tested(run, value, operand, frame)
@@ -234,12 +237,15 @@ def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
     return result
 
 
-def _perhaps(run: Run, operand: ast.expr, frame: Frame) -> Value:
-    if isinstance(operand, ast.Constant | ast.Name):
+def _perhaps(run: Run, operand: ast.expr, before: list[ast.expr], held: bool, frame: Frame) -> Value:
+    """What ``operand`` gives where those ``before`` it were all true, or (unless ``held``) all false."""
+    if isinstance(operand, ast.Constant):
         return run.evaluate(operand, frame)
     results: list[Value] = []
 
     def evaluate() -> bool:
+        for test in before:
+            narrowed(run, test, held, frame)
         results.append(run.evaluate(operand, frame))
         return True
 
