@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import gc
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -96,4 +95,4 @@ def _under(key: LaunchKey, component: Made, sources: Sources, executable: Entry)
         for node in solved.nodes
     )
     read = {**component.files, **{name: sources.digests[name] for name in executable.files}}
-    return Made(dataclasses.replace(solved, nodes=nodes), read)
+    return Made(solved._replace(nodes=nodes), read)
