@@ -93,7 +93,7 @@ def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
     for index in files:
         functions = sorted(index.all_functions, key=lambda f: f.node.start_byte)
         starts = [function.node.start_byte for function in functions]
-        handled = sorted(run.handled.get(index.file, ()))
+        handled = run.handled.get(index.file, set())
         for site in sites_of(index):
             answer = _answer(run, index, site, functions, starts, handled, reachable)
             if answer is not None:
@@ -102,7 +102,7 @@ def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
 
 
 def _answer(
-    run: Machine, index: FileIndex, site: Site, functions: list[Function], starts: list[int], handled: list[int],
+    run: Machine, index: FileIndex, site: Site, functions: list[Function], starts: list[int], handled: set[int],
     reachable: set[Function],
 ) -> SiteAnswer | None:  # fmt: skip
     function = _around(site.offset, functions, starts)
@@ -110,7 +110,7 @@ def _answer(
         if _is_declaration(index, site) or _is_handled(index, site, handled):
             return None
         owner = _class_around(index, site)
-        made = [c for obj in run.made_objects() if obj.cls is not None for c in run.names.ancestry(obj.cls)]
+        made = (each for cls in run.made_classes() for each in run.names.ancestry(cls))
         if owner is not None and owner not in made:
             return SiteAnswer(site, True, f"the program makes no object of {owner}")
         return SiteAnswer(site, False, f"{site.word} stands where it is not understood")
@@ -149,7 +149,7 @@ def _is_overridden(run: Machine, function: Function) -> bool:
         return False
     last = function.owner.rpartition("::")[2]
     holders = [
-        o.cls for o in run.made_objects() if o.cls and any(c.name == last for c in run.names.ancestry(o.cls))
+        cls for cls in run.made_classes() if any(each.name == last for each in run.names.ancestry(cls))
     ]
     if not holders or any(function in run.names.find_methods(cls, function.name) for cls in holders):
         return False
@@ -170,16 +170,15 @@ def _around(offset: int, functions: list[Function], starts: list[int]) -> Functi
     return best
 
 
-def _is_handled(index: FileIndex, site: Site, handled: list[int]) -> bool:
+def _is_handled(index: FileIndex, site: Site, handled: set[int]) -> bool:
     """A call whose name is this word had its result: the call begins before it and its arguments behind it."""
     node = index.tree.root_node.descendant_for_byte_range(site.offset, site.offset + 1)
-    starts = set(handled)
     while node is not None and node.type not in (
         "compound_statement",
         "function_definition",
         "argument_list",
     ):
-        if node.type in _MAKING and node.start_byte in starts:
+        if node.type in _MAKING and node.start_byte in handled:
             return True
         node = node.parent
     return False

@@ -305,7 +305,7 @@ def _findings(run: Machine, sources: Sources) -> Findings:
         _text_gaps(run, index, findings)
     for file, why in sources.unreadable.items():
         findings.gaps.setdefault((SourceRef(file), why))
-    findings.classes = {obj.cls.qualified for obj in run.made_objects() if obj.cls is not None}
+    findings.classes = {cls.qualified for cls in run.made_classes()}
     findings.files = tuple(run.names.files)
     findings.consulted = dict(run.consulted)
     findings.from_default = tuple(run.from_default)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING
@@ -47,6 +48,14 @@ def parse_expression(source: str) -> Node | None:
 def text(node: Node | None) -> str:
     """What the source says; the empty text for no node."""
     return node.text.decode("utf-8", "replace") if node is not None and node.text is not None else ""
+
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+
+
+def words_in(node: Node) -> frozenset[str]:
+    """Every identifier and keyword below ``node``, those in literals included."""
+    return frozenset(_WORD.findall(text(node)))
 
 
 def line_of(node: Node) -> int:

@@ -172,4 +172,4 @@ def function_declarator(node: Node) -> Node | None:
 
 def type_text(node: Node) -> str:
     """The type as written, on one line, without ``const``, ``&`` and ``*`` around it; may be empty."""
-    return re.sub(r"\s+", " ", text(node.child_by_field_name("type")))
+    return " ".join(text(node.child_by_field_name("type")).split())

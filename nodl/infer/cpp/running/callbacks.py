@@ -12,7 +12,7 @@ from nodl.infer.cpp.ledger import Reach
 from nodl.infer.cpp.reading.writes import Writes, writes_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
-from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, WORD, Machine
+from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, Machine
 from nodl.infer.cpp.running.store import Cell, Reads
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -29,7 +29,7 @@ from nodl.infer.cpp.running.values import (
     open_sequence,
     unknown,
 )
-from nodl.infer.cpp.syntax import text
+from nodl.infer.cpp.syntax import words_in
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -169,7 +169,7 @@ def _writes(rounds: _Rounds, atom: object) -> Writes:
     key = (atom.node.id if isinstance(atom, Lambda) else atom.function, len(run.used_classes()))
     if key not in rounds.writes:
         if isinstance(atom, Lambda):
-            own, words = writes_of(atom.node), frozenset(WORD.findall(text(atom.node)))
+            own, words = writes_of(atom.node), words_in(atom.node)
         else:
             own, words = _written(atom.function), atom.function.words
         rounds.writes[key] = own.union(map(_written, Reach(run).from_words(words)))

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import Machine, template_arguments
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.syntax import text
 
 if TYPE_CHECKING:
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 def callee_name(callee: Node) -> str:
     """The name of a callee without its template arguments."""
-    whole = re.sub(r"\s+", "", text(callee))
+    whole = "".join(text(callee).split())
     if not whole.endswith(">"):
         return whole.lstrip(":")
     depth = 0
@@ -31,7 +30,20 @@ def callee_name(callee: Node) -> str:
 
 def types_of(run: Machine, callee: Node, frame: Frame) -> list[Type]:
     """The template arguments that a call writes out; empty when it leaves them to deduction."""
-    return [run.type_of(text(each), frame) for each in template_arguments(callee)]
+    return [run.type_of(text(each), frame) for each in _template_arguments(callee)]
+
+
+def _template_arguments(node: Node | None) -> list[Node]:
+    """Those of ``f<A, B>`` and ``x.f<A>`` and ``a::f<A>``."""
+    while node is not None and node.type in ("field_expression", "qualified_identifier", "dependent_name"):
+        inner = node.child_by_field_name("field") or node.child_by_field_name("name")
+        node = inner if inner is not None else (node.named_children[0] if node.named_children else None)
+    listed = (
+        node.child_by_field_name("arguments")
+        if node is not None and node.type.startswith("template_")
+        else None
+    )
+    return [child for child in listed.named_children if child.type != "comment"] if listed is not None else []
 
 
 def is_only_declared(run: Machine, cls: Class, name: str) -> bool:

@@ -353,6 +353,8 @@ def _deduced(
     run: Machine, function: Function, values: Sequence[Value], types: Sequence[Type]
 ) -> dict[str, Type]:
     """Template parameters: as given, else from the types of the arguments."""
+    if not function.templates:
+        return {}
     bound = dict(zip(function.templates, types, strict=False))
     for parameter, value in zip(function.parameters, values, strict=False):
         name = re.sub(r"\b(?:const|typename)\b|[&*\s]", "", parameter.type)

@@ -6,7 +6,6 @@ libraries. A place that was run is noted; the ledger later asks about every othe
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -34,7 +33,7 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.syntax import line_of, text
+from nodl.infer.cpp.syntax import line_of, words_in
 from nodl.infer.start import Start
 from nodl.name_template import ParameterPart, UnknownPart
 from nodl.node_interface import EndpointKind
@@ -110,17 +109,13 @@ class Machine:
         self.dead: dict[tuple[str, int, int], str] = {}
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[Function] = []
-        self.left: object = (
-            None  # the last call that certainly came to no end: it threw, or ended the program
-        )
+        self.left: object = None  # the last call that certainly threw, or ended the program
         self.steps = 0
         self.limit = MAX_STEPS
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
         self.plugins_used: dict[str, None] = {}
-        self.unset: dict[
-            tuple[str, int], tuple[SourceRef, str, str]
-        ] = {}  # calls on pointers that hold nothing
+        self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
         self.shared: dict[Cell, None] = {}  # plain variables that an object keeps a reference to
         self._used: set[str] = set()
         self._known: set[Class] = set()
@@ -158,9 +153,7 @@ class Machine:
             raise BudgetExceeded
 
     def execute(self, node: Node, frame: Frame) -> int:
-        self.steps += 1
-        if self.steps > self.limit:
-            raise BudgetExceeded
+        self.count(1)
         self.ran.setdefault(frame.file.file, set()).add(node.start_byte)
         handler = STATEMENTS.get(node.type)
         if handler is None:
@@ -301,6 +294,9 @@ class Machine:
     def made_objects(self) -> list[Obj]:
         return list(self.objects.values())
 
+    def made_classes(self) -> set[Class]:
+        return {each.cls for each in self.objects.values() if each.cls is not None}
+
     def version(self) -> int:
         """Grows with whatever is found."""
         return sum(len(record.endpoints) + len(record.gaps) for record in self.nodes) + len(self.gaps)
@@ -385,7 +381,7 @@ class Machine:
         return bool(CREATES.fullmatch(function.name)) or self._leads(function, function.words)
 
     def subtree_matters(self, node: Node) -> bool:
-        return self._leads(node.id, frozenset(WORD.findall(text(node))))
+        return self._leads(node.id, words_in(node))
 
     def _leads(self, key: object, words: frozenset[str]) -> bool:
         known = (key, len(self.used_classes()))
@@ -405,7 +401,6 @@ class Machine:
 
 
 _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})
-WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 def _static_name(record: NodeRecord) -> str | None:
@@ -416,16 +411,3 @@ def _static_name(record: NodeRecord) -> str | None:
 def _static_namespace(record: NodeRecord) -> str | None:
     spaces = [plain(each) for each in record.namespaces] or [""]
     return "/" + (spaces[0] or "").lstrip("/") if len(spaces) == 1 and spaces[0] is not None else None
-
-
-def template_arguments(node: Node | None) -> list[Node]:
-    """Those of ``f<A, B>`` and ``x.f<A>`` and ``a::f<A>``."""
-    while node is not None and node.type in ("field_expression", "qualified_identifier", "dependent_name"):
-        inner = node.child_by_field_name("field") or node.child_by_field_name("name")
-        node = inner if inner is not None else (node.named_children[0] if node.named_children else None)
-    listed = (
-        node.child_by_field_name("arguments")
-        if node is not None and node.type.startswith("template_")
-        else None
-    )
-    return [child for child in listed.named_children if child.type != "comment"] if listed is not None else []
