@@ -47,7 +47,8 @@ def parse_expression(source: str) -> Node | None:
 
 def text(node: Node | None) -> str:
     """What the source says; the empty text for no node."""
-    return node.text.decode("utf-8", "replace") if node is not None and node.text is not None else ""
+    found = node.text if node is not None else None  # cut out of the source anew each time
+    return found.decode("utf-8", "replace") if found is not None else ""
 
 
 _WORD = re.compile(r"[A-Za-z_]\w*")

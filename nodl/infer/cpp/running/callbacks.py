@@ -184,8 +184,9 @@ def _written(function: Function) -> Writes:
 
 def _widen(run: Machine, mark: int, give_up: bool) -> None:
     """Lists that grow lose their order and length; in the end what still changes is not known."""
+    earlier = run.store.before(mark)
     for cell, value in run.store.changes(mark).items():
-        before = run.store.before(cell, mark)
+        before = earlier[cell]
         if set(before) == set(value):
             continue
         if any(isinstance(atom, Seq) for atom in value):

@@ -221,7 +221,7 @@ def _repeated(
         outcome = run.branches([once, lambda: NEXT])
         returns |= outcome & RETURN
         changes = run.store.changes(mark)
-        before = {cell: run.store.before(cell, mark) for cell in changes}
+        before = run.store.before(mark)
         moved = {cell: value for cell, value in changes.items() if set(before[cell]) != set(value)}
         if not moved:
             break

@@ -90,12 +90,12 @@ class AbstractStore:
             if cell in cells and not getattr(cell[0], "finished", False)
         }
 
-    def before(self, cell: Cell, mark: int) -> Value:
-        """The value that ``cell`` had at ``mark``."""
-        for each, old in self._trail[mark:]:
-            if each == cell:
-                return BOTTOM if old is _ABSENT else old
-        return self._cells.get(cell, BOTTOM)
+    def before(self, mark: int) -> Changes:
+        """The values at ``mark`` of all cells that were written since."""
+        found: Changes = {}
+        for cell, old in self._trail[mark:]:
+            found.setdefault(cell, BOTTOM if old is _ABSENT else old)
+        return found
 
     def undo(self, mark: int) -> None:
         while len(self._trail) > mark:
