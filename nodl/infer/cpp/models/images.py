@@ -10,6 +10,7 @@ from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call, library_class, libra
 from nodl.infer.cpp.models.table import PUB, SUB, owner_in, texts_in
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.launch_values import given_by_launch
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     DerivedName,
@@ -158,7 +159,7 @@ def _chosen_by(run: Machine, owner: Obj, base: Value, call: Call, chosen: Param)
         run.endpoint(owner.node, SUB, name, _IMAGE, call.node, call.frame, raw)
     for transport in _TRANSPORTS:
         _transported_subscription(run, owner, base, call, transport, chosen.name, default)
-    given = run.given(chosen.record, chosen.name)
+    given = given_by_launch(run, chosen.record, chosen.name)
     if (default if given is None else given) not in ("raw", *_TRANSPORTS):
         why = f"the image transport {given or default} (parameter {chosen.name}) is not in the table"
         run.gap(call.node, call.frame, why, owner.node)
@@ -180,7 +181,7 @@ def _transported_subscription(
 def chosen_transport(run: Machine, chosen: Param, known: Sequence[str]) -> str | None:
     """The default of a parameter that names a transport; ``None`` unless it, and what launch gives, is in the table."""
     default = _only_text(chosen) or ""
-    given = run.given(chosen.record, chosen.name)
+    given = given_by_launch(run, chosen.record, chosen.name)
     run.from_default.pop(chosen.name, None)  # its values are all listed
     return default if (default if given is None else given) in known else None
 

@@ -20,6 +20,7 @@ from nodl.infer.cpp.libraries import (
 )
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -143,7 +144,7 @@ def _asked_for(run: Machine, record: NodeRecord, options: Obj, node: Node, frame
 
 def _word(run: Machine, item: Value) -> str | None:
     """An argument as text; names of other nodes are those of this start."""
-    return run.text_of(item[0]) if len(item) == 1 else None
+    return text_of(run, item[0]) if len(item) == 1 else None
 
 
 def _override(record: NodeRecord, item: Value) -> None:

@@ -12,6 +12,7 @@ from nodl.infer.cpp.libraries import Call, library_class, library_function, libr
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -41,7 +42,7 @@ _TYPES = frozenset({"ParameterType", "PARAMETER_STRING", "PARAMETER_STRING_ARRAY
 
 def parameter_names(run: Machine, value: Value) -> list[str | None]:
     """The texts that name a parameter; those made of parameters by what the launch file, else the default, gives."""
-    return [run.text_of(atom) for atom in value]
+    return [text_of(run, atom) for atom in value]
 
 
 def read(run: Machine, record: NodeRecord, name: Value, default: Value = BOTTOM) -> Value:

@@ -12,7 +12,7 @@ from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import cell_of
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, WORD, Machine
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
 from nodl.infer.cpp.running.objects import (
     MAPS,
     SEQUENCES,
@@ -364,7 +364,7 @@ def _class_of_parameter(
     """The class of a parameter that is an object, where an object is given."""
     if not any(isinstance(atom, Obj) and atom.cls is not None for atom in value):
         return None
-    if inner.function is not None and not {*WORD.findall(parameter.type)}.isdisjoint(
+    if inner.function is not None and not {*re.findall(r"\w+", parameter.type)}.isdisjoint(
         inner.function.templates
     ):
         return None  # may be a pointer

@@ -10,6 +10,7 @@ from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.numbers import added
 from nodl.infer.cpp.running.objects import ORDERED, SETS, as_set, made
@@ -386,7 +387,7 @@ def _text_call(
         if name == "str" and values and receiver is not None:
             assign(run, receiver, values[0], frame)
         return (atom,)
-    known = run.settled_text(atom)
+    known = settled_text(run, atom)
     if name in texts.CHANGES and receiver is not None:
         after = texts.changed(known, name, values) if known is not None else None
         if after is None and name in ("append", "push_back") and len(values) == 1:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import cell_of
+from nodl.infer.cpp.running.launch_values import given_by_launch
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -166,7 +167,7 @@ def items_of(run: Machine, atom: object) -> tuple[list[Value], bool]:
 
 def parameter_items(run: Machine, atom: Param) -> tuple[list[Value], bool]:
     """The elements of a list that a parameter gives: those of the launch file, else of its default."""
-    given = run.given(atom.record, atom.name)
+    given = given_by_launch(run, atom.record, atom.name)
     if isinstance(given, list | tuple):
         return [(Param(atom.record, atom.name, i, literal(str(each))),) for i, each in enumerate(given)], True
     default = tuple(each for each in atom.default if isinstance(each, Seq) and not each.open)

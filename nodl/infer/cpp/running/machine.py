@@ -24,18 +24,15 @@ from nodl.infer.cpp.running.values import (
     Bound,
     DerivedName,
     Lambda,
-    NodePart,
     Obj,
-    Param,
     Text,
     Value,
     concatenated,
-    plain,
     unknown,
 )
 from nodl.infer.cpp.syntax import line_of, words_in
 from nodl.infer.start import Start
-from nodl.name_template import ParameterPart, UnknownPart
+from nodl.name_template import UnknownPart
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
 
@@ -297,72 +294,6 @@ class Machine:
     def made_classes(self) -> set[Class]:
         return {each.cls for each in self.objects.values() if each.cls is not None}
 
-    def version(self) -> int:
-        """Grows with whatever is found."""
-        return sum(len(record.endpoints) + len(record.gaps) for record in self.nodes) + len(self.gaps)
-
-    # --- parameters ---------------------------------------------------------------------------------------
-
-    def text_of(self, atom: Atom) -> str | None:
-        """The text that a value stands for in this run: that of a parameter as launch sets it, else its default."""
-        known = plain(atom)
-        if known is not None or not isinstance(atom, Text | Param):
-            return known
-        if isinstance(atom, Param):
-            return self.parameter_text(atom)
-        pieces = [part if isinstance(part, str) else self.part_text(part) for part in atom.parts]
-        return None if None in pieces else "".join(piece for piece in pieces if piece is not None)
-
-    def settled_text(self, atom: Atom) -> str | None:
-        """``text_of`` where a launch has settled it; a parameter that only has its default is open."""
-        if self.settings.start is None:
-            parts = atom.parts if isinstance(atom, Text) else ()
-            if isinstance(atom, Param) or any(isinstance(part, ParameterPart) for part in parts):
-                return None
-        return self.text_of(atom)
-
-    def given(self, record: NodeRecord, name: str) -> object | None:
-        """What the launch file sets; a value that decides what is made is remembered."""
-        if self.settings.start is None:
-            self.from_default[name] = None
-            return None
-        value = self.settings.start.parameters(_static_name(record)).get(name)
-        self.consulted[name] = value
-        return value
-
-    def parameter_text(self, param: Param) -> str | None:
-        value = self.given(param.record, param.name)
-        if value is not None and param.item is not None and isinstance(value, list | tuple):
-            return str(value[param.item]) if param.item < len(value) else None
-        if value is not None:
-            return str(value)
-        texts = [plain(each) for each in param.default]
-        return texts[0] if len(texts) == 1 else None
-
-    def part_text(self, part: object) -> str | None:
-        """The same for a piece of a text."""
-        if isinstance(part, ParameterPart):
-            return self._parameter_part(part)
-        if not isinstance(part, NodePart):
-            return None
-        if self.settings.start is not None:
-            name, namespace = self.settings.start.final_name(_static_name(part.record))
-        else:
-            self.from_default[f"the {part.what} of node {_static_name(part.record)}"] = None
-            name, namespace = _static_name(part.record), _static_namespace(part.record)
-        if name is None or namespace is None:
-            return None
-        return {"name": name, "ns": namespace}.get(part.what, f"{namespace.rstrip('/')}/{name}")
-
-    def _parameter_part(self, part: ParameterPart) -> str | None:
-        self.size.get("nodes")
-        for record in self.nodes:
-            if part.name in record.parameters:
-                value = self.given(record, part.name)
-                texts = part.texts({} if value is None else {part.name: value})
-                return texts[0] if len(texts) == 1 else None
-        return None
-
     # --- who matters --------------------------------------------------------------------------------------
 
     def used_classes(self) -> set[str]:
@@ -401,13 +332,3 @@ class Machine:
 
 
 _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})
-
-
-def _static_name(record: NodeRecord) -> str | None:
-    names = [plain(each) for each in record.names]
-    return names[0] if len(names) == 1 else None
-
-
-def _static_namespace(record: NodeRecord) -> str | None:
-    spaces = [plain(each) for each in record.namespaces] or [""]
-    return "/" + (spaces[0] or "").lstrip("/") if len(spaces) == 1 and spaces[0] is not None else None

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.contents import copied, items_of
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.numbers import as_type
 from nodl.infer.cpp.running.references import keep_references
@@ -212,7 +213,7 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
             only if not any(isinstance(atom, int | float | Seq) for atom in only) else unknown("a made text")
         )
     known = [
-        run.settled_text(value[0]) if len(value) == 1 and isinstance(value[0], Text) else None
+        settled_text(run, value[0]) if len(value) == 1 and isinstance(value[0], Text) else None
         for value in values
     ]
     numbers = [value[0] if len(value) == 1 and isinstance(value[0], int) else -1 for value in values]

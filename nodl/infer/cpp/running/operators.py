@@ -11,6 +11,7 @@ from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import class_of_member
 from nodl.infer.cpp.running.invocation import pointed_to
+from nodl.infer.cpp.running.launch_values import settled_text, text_of
 from nodl.infer.cpp.running.machine import NEXT, Machine, expression
 from nodl.infer.cpp.running.numbers import added, arithmetic
 from nodl.infer.cpp.running.values import (
@@ -174,7 +175,7 @@ def _streamed(
 
 def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | None, frame: Frame) -> Value:
     """``stream >> word``: the first word of a text that is known, and the rest stays."""
-    words = [run.text_of(atom) for atom in left]
+    words = [text_of(run, atom) for atom in left]
     if len(words) != 1 or words[0] is None or stream is None or right is None:
         if right is not None:
             assign(run, right, unknown("a word that is read from a stream"), frame)
@@ -286,7 +287,7 @@ def element(run: Machine, atom: object, key: Value) -> Value:
         return join(*items) if items else unknown("an element of a list")
     if isinstance(atom, Unknown):
         return (atom,)
-    written = run.settled_text(atom) if isinstance(atom, Text) else None
+    written = settled_text(run, atom) if isinstance(atom, Text) else None
     if written is not None and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(written):
         return literal(written[key[0]])
     return unknown("an element of something that is not known")

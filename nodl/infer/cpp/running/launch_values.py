@@ -1,0 +1,87 @@
+"""What a value stands for in this run: parameters and names of nodes as the launch sets them, else their defaults.
+
+Notes in the machine which of them decided what is made.
+"""
+
+from __future__ import annotations
+
+from nodl.infer.cpp.findings import NodeRecord
+from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.values import Atom, NodePart, Param, Text, plain
+from nodl.name_template import ParameterPart
+
+
+def text_of(run: Machine, atom: Atom) -> str | None:
+    """The text that a value stands for in this run: that of a parameter as launch sets it, else its default."""
+    known = plain(atom)
+    if known is not None or not isinstance(atom, Text | Param):
+        return known
+    if isinstance(atom, Param):
+        return _parameter_text(run, atom)
+    pieces = [part if isinstance(part, str) else _part_text(run, part) for part in atom.parts]
+    return None if None in pieces else "".join(piece for piece in pieces if piece is not None)
+
+
+def settled_text(run: Machine, atom: Atom) -> str | None:
+    """``text_of`` where a launch has settled it; a parameter that only has its default is open."""
+    if run.settings.start is None:
+        parts = atom.parts if isinstance(atom, Text) else ()
+        if isinstance(atom, Param) or any(isinstance(part, ParameterPart) for part in parts):
+            return None
+    return text_of(run, atom)
+
+
+def given_by_launch(run: Machine, record: NodeRecord, name: str) -> object | None:
+    """What the launch file sets; a value that decides what is made is remembered."""
+    if run.settings.start is None:
+        run.from_default[name] = None
+        return None
+    value = run.settings.start.parameters(_static_name(record)).get(name)
+    run.consulted[name] = value
+    return value
+
+
+def _parameter_text(run: Machine, param: Param) -> str | None:
+    value = given_by_launch(run, param.record, param.name)
+    if value is not None and param.item is not None and isinstance(value, list | tuple):
+        return str(value[param.item]) if param.item < len(value) else None
+    if value is not None:
+        return str(value)
+    texts = [plain(each) for each in param.default]
+    return texts[0] if len(texts) == 1 else None
+
+
+def _part_text(run: Machine, part: object) -> str | None:
+    """The same for a piece of a text."""
+    if isinstance(part, ParameterPart):
+        return _parameter_part(run, part)
+    if not isinstance(part, NodePart):
+        return None
+    if run.settings.start is not None:
+        name, namespace = run.settings.start.final_name(_static_name(part.record))
+    else:
+        run.from_default[f"the {part.what} of node {_static_name(part.record)}"] = None
+        name, namespace = _static_name(part.record), _static_namespace(part.record)
+    if name is None or namespace is None:
+        return None
+    return {"name": name, "ns": namespace}.get(part.what, f"{namespace.rstrip('/')}/{name}")
+
+
+def _parameter_part(run: Machine, part: ParameterPart) -> str | None:
+    run.size.get("nodes")
+    for record in run.nodes:
+        if part.name in record.parameters:
+            value = given_by_launch(run, record, part.name)
+            texts = part.texts({} if value is None else {part.name: value})
+            return texts[0] if len(texts) == 1 else None
+    return None
+
+
+def _static_name(record: NodeRecord) -> str | None:
+    names = [plain(each) for each in record.names]
+    return names[0] if len(names) == 1 else None
+
+
+def _static_namespace(record: NodeRecord) -> str | None:
+    spaces = [plain(each) for each in record.namespaces] or [""]
+    return "/" + (spaces[0] or "").lstrip("/") if len(spaces) == 1 and spaces[0] is not None else None
