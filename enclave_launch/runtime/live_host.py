@@ -190,9 +190,8 @@ class LiveHost(BaseHost):
                 self.failed.append(name)
         except EnclaveLaunchError as error:
             self._fail(error)
-        except (
-            Exception
-        ) as error:  # whatever it is: a process that did not run must not pass for one that did
+        except Exception as error:
+            # Whatever it is: a process that did not run must not pass for one that did.
             self._fail(RuntimeFailure(f"{name}: {type(error).__name__}: {error}"))
         finally:
             self._observe(ProcessOver(name, failed))

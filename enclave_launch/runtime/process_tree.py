@@ -208,9 +208,8 @@ class ProcessTree:
         self._count = 0
         self._holds: set[Hold] = set()
         self.lost: asyncio.Future[None] | None = None
-        self.on_interrupt: Callable[[], None] = lambda: (
-            None
-        )  # Ctrl-C, given to the child that had the terminal
+        # Ctrl-C, given to the child that had the terminal
+        self.on_interrupt: Callable[[], None] = lambda: None
 
     async def __aenter__(self) -> ProcessTree:
         self.lost = asyncio.get_running_loop().create_future()

@@ -61,9 +61,8 @@ class RosServices:
                 self._node = rclpy.create_node(
                     LAUNCHER_NODE, context=self._ros
                 )  # the name its permissions are for
-            except (
-                Exception
-            ) as error:  # a half installed ROS, a middleware that refuses: rclpy has no common class
+            except Exception as error:
+                # A half installed ROS, a middleware that refuses: rclpy has no common class.
                 raise RuntimeFailure(
                     f"rclpy cannot make the launcher's own node, which this launch file needs: {error}"
                 ) from error

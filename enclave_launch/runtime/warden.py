@@ -26,6 +26,7 @@ Messages are marshalled tuples behind a four-byte length. ``id`` is the launcher
                          ("signal_one", id, number)      to the child alone
                          ("sweep", id, pid)              SIGKILL to what it left running when it ended
     warden -> launcher   ("started", id, pid) | ("failed", id, errno, file) | ("exited", id, returncode)
+                         ("interrupted", id)             Ctrl-C was given to the child that had the terminal
 """
 
 from __future__ import annotations
@@ -317,9 +318,8 @@ def become(
         os.execvpe(argv[0], argv, env)
     except OSError as error:
         os.write(report, marshal.dumps((error.errno or errno.EIO, path)))
-    except (
-        ValueError
-    ):  # the launcher looks for what no exec takes; whatever it missed must not pass for a start
+    except ValueError:
+        # The launcher looks for what no exec takes; whatever it missed must not pass for a start.
         os.write(report, marshal.dumps((errno.EINVAL, path)))
     finally:
         os._exit(127)

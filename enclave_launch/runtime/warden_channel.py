@@ -31,9 +31,8 @@ class WardenChannel:
         self._socket = connection
         self._on_message, self._on_lost = on_message, on_lost
         self._received = b""
-        self._waiting: deque[tuple[bytes, Sequence[int]]] = (
-            deque()
-        )  # bytes, and descriptors to go with their first
+        # Bytes, and the descriptors that go with the first of them.
+        self._waiting: deque[tuple[bytes, Sequence[int]]] = deque()
         self._loop: asyncio.AbstractEventLoop | None = None
 
     def open(self) -> None:

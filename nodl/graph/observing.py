@@ -68,9 +68,8 @@ def observer(where: Where, environment: Mapping[str, str]) -> Iterator[Observer]
         with environment_with(_ros_variables(where)):
             try:
                 up = RclpyObserver()
-            except (
-                Exception
-            ) as error:  # a half installed ROS, a middleware that refuses: rclpy has no common class
+            except Exception as error:
+                # A half installed ROS, a middleware that refuses: rclpy has no common class.
                 raise ObserverError(f"rclpy cannot observe the domain: {error}; {_OF_RCLPY}") from error
     else:
         up = CycloneObserver(where.domain_id, environment, where.enclave_directory)

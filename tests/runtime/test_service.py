@@ -336,6 +336,21 @@ def test_other_signals_shut_down_in_order_and_leave_nobody(number: signal.Signal
     assert not alive(read_pid(tmp_path / "pid"))
 
 
+def test_under_nohup_the_end_of_the_terminal_ends_neither_launch_nor_children(tmp_path: Path) -> None:
+    asked = f"trap 'exit 3' USR1; echo $$ > {tmp_path}/pid; echo up; while true; do sleep 0.05; done"
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # what nohup does, and what exec keeps
+    try:
+        launch = Launch(tmp_path, f'sh("{asked}")')
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    launch.until("[a-1] up")
+    for pid in (read_pid(tmp_path / "pid"), launch.process.pid):
+        os.kill(pid, signal.SIGHUP)
+    os.kill(read_pid(tmp_path / "pid"), signal.SIGUSR1)
+    assert launch.wait() == 1
+    assert "exit code 3" in launch.screen and "SIGHUP" not in launch.screen
+
+
 def test_a_child_that_ignores_sigint_is_escalated(tmp_path: Path) -> None:
     launch = Launch(
         tmp_path,
