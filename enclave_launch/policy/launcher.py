@@ -22,9 +22,7 @@ _CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 _TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
 
 
-def launcher_node(
-    calls: Sequence[LauncherCall], *, enclave: str = LAUNCHER_ENCLAVE, name: str = LAUNCHER_NODE
-) -> RunningNode:
+def launcher_node(calls: Sequence[LauncherCall]) -> RunningNode:
     """The node that makes ``calls`` (at least one).
 
     Who asks a node for transitions also follows its ``transition_event`` (launch_ros lifecycle_node.py).
@@ -37,6 +35,7 @@ def launcher_node(
         if service == "change_state" and call.type == _CHANGE_STATE:
             event = f"{node}/transition_event"
             endpoints.append(_endpoint(EndpointKind.SUBSCRIPTION, event, _TRANSITION_EVENT, source))
+    name, place = LAUNCHER_NODE, calls[0].location
     interface = NodeInterface(
         package=None,
         executable=name,
@@ -44,12 +43,10 @@ def launcher_node(
         name=name,
         namespace="/",
         endpoints=tuple(dict.fromkeys(endpoints)),
-        source=SourceRef(calls[0].location.file, calls[0].location.line),
+        source=SourceRef(place.file, place.line),
         library=ClientLibrary.RCLPY,
     )
-    return RunningNode(
-        interface, name, name, "/", RemapRules(), {}, enclave, calls[0].location, role="launcher"
-    )
+    return RunningNode(interface, name, name, "/", RemapRules(), {}, LAUNCHER_ENCLAVE, place, role="launcher")
 
 
 def _endpoint(kind: EndpointKind, name: str, type_name: str, source: SourceRef) -> Endpoint:

@@ -91,16 +91,14 @@ class Quiet:
     """Done when nothing has changed, and nothing is half open, for ``settle`` seconds; at the latest after
     ``longest``. An empty domain is not quiet: somebody may be about to be discovered."""
 
-    def __init__(
-        self, up: Observer, settle: float, longest: float, clock: Callable[[], float] = time.monotonic
-    ) -> None:
-        self._up, self._settle, self._clock = up, settle, clock
-        self._end = clock() + longest
-        self._since = clock()
+    def __init__(self, up: Observer, settle: float, longest: float) -> None:
+        self._up, self._settle = up, settle
+        self._since = time.monotonic()
+        self._end = self._since + longest
         self._changes = -1
 
     def __call__(self) -> bool:
-        now, changes = self._clock(), self._up.look()
+        now, changes = time.monotonic(), self._up.look()
         graph = self._up.graph()
         if changes != self._changes or graph.half_open or not graph.processes:
             self._changes = changes
