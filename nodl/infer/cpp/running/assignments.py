@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.contents import copied, overwrite
 from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.hiding import cell_of, class_of_member, lexical_class, seen_class
+from nodl.infer.cpp.running.hiding import cell_of, class_of_member, lexical_class, seen_class, seen_type
 from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.numbers import added, as_type
 from nodl.infer.cpp.running.references import is_plain, through, told
@@ -27,7 +27,7 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.running.variables import current_object, declared_type, static_member
+from nodl.infer.cpp.running.variables import current_object, declared_type, static_by_name, static_member
 from nodl.infer.cpp.syntax import children, text, unwrapped
 from nodl.name_template import UnknownPart
 
@@ -59,7 +59,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
         objects = bool(before) and all(isinstance(atom, Obj) and atom.cls is not None for atom in before)
         if objects and _assigned(run, before, value, node, frame):
             return before
-        value = copied(run, value, node, frame)
+        value = copied(run, value, node, frame, cls)
     elif operator == "+=":
         before = run.evaluate(left, frame)
         if has_text(before) and any(isinstance(atom, int | float) for atom in value):
@@ -139,6 +139,9 @@ def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
     inner = unwrapped(left)
     if inner is not None and inner.type == "pointer_expression":
         return seen_class(run, inner, frame)
+    if inner is not None and inner.type in ("subscript_expression", "field_expression"):
+        kind = seen_type(run, inner, frame)
+        return None if kind.pointer else run.names.class_of(kind, frame.scope, frame.file)
     found = declared_type(run, inner, frame) if inner is not None else None
     if (
         inner is None
@@ -267,6 +270,11 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
                 before = static_member(run, each, name) if each.templates else BOTTOM
                 run.store.set((each, name), join(before, value) if each.templates else value)
                 return
+    static = static_by_name(run, name, frame)
+    if static is not None:
+        before = static_member(run, *static) if static[0].templates else BOTTOM
+        run.store.set(static, join(before, value) if static[0].templates else value)
+        return
     outside = run.names.find_global(name, frame.scope, frame.file)
     if outside is not None:
         run.store.set((outside, ""), value)

@@ -30,7 +30,7 @@ from nodl.infer.cpp.syntax import children
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.reading.declarations import Class, Function, FunctionParameter
+    from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
     from nodl.infer.cpp.reading.type_names import Type
 
 
@@ -289,7 +289,9 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: 
         if member.static:
             continue
         if name in known:
-            run.store.set((this, cell_of(run, this, name, cls)), known[name])
+            run.store.set(
+                (this, cell_of(run, this, name, cls)), _given(run, this, cls, member, known[name], inner)
+            )
             continue
         where = given.get(name)
         frame = (
@@ -343,10 +345,7 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
             value = arguments[index]
             if function.variadic and index + 1 == len(function.parameters) < len(arguments):
                 value = unknown("several arguments of a parameter pack")
-            if not parameter.type.rstrip().endswith(("&", "*")):
-                value = copied(
-                    run, value, function.node, inner, _class_of_parameter(run, parameter, value, inner)
-                )
+            value = as_parameter(run, parameter, value, function.node, inner)
         else:
             value = unknown(f"the argument {parameter.name}")
             if parameter.default is not None:
@@ -356,6 +355,21 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
                 value = run.evaluate(parameter.default, place)
         if parameter.name:
             run.local(inner, parameter.name, value, parameter.type)
+
+
+def _given(run: Machine, this: Obj, cls: Class, member: Field, value: Value, inner: Frame) -> Value:
+    """A member that braces fill: an object of its class."""
+    kind = run.names.resolve(member.type, cls.scope, cls.file, this.bindings.get(cls))
+    if member.pointer or kind.pointer:
+        return value
+    return copied(run, value, member.node, inner, run.names.class_of(kind, cls.scope, cls.file))
+
+
+def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node: Node, inner: Frame) -> Value:
+    """An argument as its parameter has it: an object of the parameter's class unless it is a reference or pointer."""
+    if parameter.type.rstrip().endswith(("&", "*")):
+        return value
+    return copied(run, value, node, inner, _class_of_parameter(run, parameter, value, inner))
 
 
 def _class_of_parameter(

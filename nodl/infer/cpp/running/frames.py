@@ -45,7 +45,7 @@ class Frame:
     exit_values: list[Value] = field(default_factory=list)
     mark: int = 0
     loops: list[Loop] = field(default_factory=list)
-    blocks: list[dict[str, tuple[bool, Value, str | None]]] = field(default_factory=list)
+    blocks: list[dict[str, tuple[bool, Value, str | None, Node | None]]] = field(default_factory=list)
     """For each block that runs: what names that it declares stood for before."""
     kept: dict[str, Frame] = field(
         default_factory=dict

@@ -44,7 +44,7 @@ def lexical_class(run: Machine, this: Obj, frame: Frame) -> Class | None:
 
 def seen_class(run: Machine, node: Node | None, frame: Frame) -> Class | None:
     """The class that an expression has, or points to, at compile time; ``None`` where that is not known."""
-    kind = _seen(run, node, frame)
+    kind = seen_type(run, node, frame)
     return run.names.class_of(kind, frame.scope, frame.file) if kind.name else None
 
 
@@ -73,16 +73,17 @@ def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Fra
     return atom.cls
 
 
-def _seen(run: Machine, node: Node | None, frame: Frame) -> Type:
+def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
+    """The type that an expression has at compile time; ``NO_TYPE`` where that is not known."""
     node = unwrapped(node)
     if node is None:
         return NO_TYPE
     if node.type == "pointer_expression":
-        return _seen(run, node.child_by_field_name("argument"), frame)
+        return seen_type(run, node.child_by_field_name("argument"), frame)
     if node.type in ("compound_literal_expression", "new_expression", "cast_expression"):
         return run.type_of(text(node.child_by_field_name("type")), frame)
     if node.type == "subscript_expression":
-        return _element(_seen(run, node.child_by_field_name("argument"), frame))
+        return _element(seen_type(run, node.child_by_field_name("argument"), frame))
     if node.type == "this":
         return _of_this(run, frame)
     if node.type == "field_expression":
@@ -109,7 +110,8 @@ def _of_member(run: Machine, node: Node, frame: Frame) -> Type:
     name = text(node.child_by_field_name("field"))
     for each in run.names.ancestry(owner) if owner is not None else ():
         if name in each.fields:
-            return run.names.resolve(each.fields[name].type, each.scope, each.file)
+            kind = run.names.resolve(each.fields[name].type, each.scope, each.file)
+            return kind._replace(pointer=kind.pointer or each.fields[name].pointer)
     return NO_TYPE
 
 
@@ -125,14 +127,14 @@ def _of_call(run: Machine, node: Node, frame: Frame) -> Type:
     if callee is None:
         return NO_TYPE
     if callee.type == "field_expression":
-        inner = _seen(run, callee.child_by_field_name("argument"), frame)
+        inner = seen_type(run, callee.child_by_field_name("argument"), frame)
         name = callee_name(callee.child_by_field_name("field") or callee)
         if name in _GIVES_INNER | _GIVES_ELEMENT:
             return inner if name in _GIVES_INNER else _element(inner)
         return _returned(run, inner, name, frame)
     name, given = callee_name(callee), children(node.child_by_field_name("arguments"))
     if name in _KEEPS and given:
-        return _seen(run, given[0], frame)
+        return seen_type(run, given[0], frame)
     if re.search(r"_cast$|(?:^|::)make_(?:shared|unique)$", name):
         return next(iter(types_of(run, callee, frame)), NO_TYPE)
     made = run.type_of(text(callee), frame)
@@ -171,10 +173,10 @@ def _initialised(run: Machine, name: str, around: Node, frame: Frame) -> Type:
     for each in walk(around):
         if each.type == "declaration":
             values = [value for declared, value, *_ in declared_names(each) if declared == name]
-            found |= {_seen(run, value, frame) for value in values}
+            found |= {seen_type(run, value, frame) for value in values}
         elif (
             each.type == "for_range_loop"
             and text(each.child_by_field_name("declarator")).lstrip("& *") == name
         ):
-            found.add(_element(_seen(run, each.child_by_field_name("right"), frame)))
+            found.add(_element(seen_type(run, each.child_by_field_name("right"), frame)))
     return found.pop() if len(found) == 1 else NO_TYPE

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
 from nodl.infer.cpp.reading.collect import parameters_of
+from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.constructors import bind_parameters, is_written_back
-from nodl.infer.cpp.running.contents import handed_over
+from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
+from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome
@@ -115,7 +116,9 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     declarator = atom.node.child_by_field_name("declarator")
     for index, parameter in enumerate(parameters_of(declarator) if declarator is not None else ()):
         value = values[index] if index < len(values) else unknown(f"the argument {parameter.name}")
-        run.local(inner, parameter.name, value, parameter.type)
+        run.local(
+            inner, parameter.name, as_parameter(run, parameter, value, atom.node, inner), parameter.type
+        )
     body = atom.node.child_by_field_name("body")
     outcome = run.execute(body, inner) if body is not None else NEXT
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
@@ -301,7 +304,19 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
     left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if is_written_back(p)}
     ends = not outcome & NEXT and not inner.exits
     inner.active, inner.finished = False, not inner.captured
-    return CallOutcome(inner.returned, left, ends)
+    return CallOutcome(_as_returned(run, function, inner), left, ends)
+
+
+def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
+    """What a function gives back, of an object of a derived class what the type it returns has of it."""
+    declarator = function.node.child_by_field_name("declarator")
+    if declarator is None or declarator.type != "function_declarator":
+        return inner.returned  # a reference or pointer
+    if not any(isinstance(atom, Obj) and atom.cls is not None and atom.cls.bases for atom in inner.returned):
+        return inner.returned
+    kind = run.type_of(type_text(function.node), inner)
+    cls = None if kind.pointer else run.names.class_of(kind, inner.scope, inner.file)
+    return copied(run, inner.returned, function.node, inner, cls) if cls is not None else inner.returned
 
 
 # Transitions of a lifecycle node (rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp).

@@ -44,7 +44,10 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
             bind_names(run, [text(name) for name in names], item, frame)
         elif names:
             by_value = "&" not in text(declarator)
-            run.local(frame, text(names[0]), copied(run, item, node, frame) if by_value else item, written)
+            kind = run.type_of(written, frame)
+            cls = None if kind.pointer else run.names.class_of(kind, frame.scope, frame.file)
+            own = copied(run, item, node, frame, cls) if by_value else item
+            run.local(frame, text(names[0]), own, written)
 
     outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame)
     is_reference = (

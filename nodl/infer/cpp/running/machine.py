@@ -204,13 +204,14 @@ class Machine:
     # --- variables ----------------------------------------------------------------------------------------
 
     def local(self, frame: Frame, name: str, value: Value, written_type: str = "") -> None:
+        if frame.blocks and name not in frame.blocks[-1]:
+            before = self.store.get((frame, name)) or BOTTOM
+            alias = frame.aliases.get(name)
+            frame.blocks[-1][name] = (name in frame.names, before, frame.types.get(name), alias)
         if frame.aliases:
             from nodl.infer.cpp.running.references import forget_shadowed
 
             forget_shadowed(self, name, frame)
-        if frame.blocks and name not in frame.blocks[-1]:
-            before = self.store.get((frame, name)) or BOTTOM
-            frame.blocks[-1][name] = (name in frame.names, before, frame.types.get(name))
         frame.names.add(name)
         if written_type:
             frame.types[name] = written_type

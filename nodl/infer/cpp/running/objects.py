@@ -76,6 +76,8 @@ def declared_value(
         return BOTTOM if pointer or kind.pointer else default_value(run, node, kind, frame)
     if pointer or kind.pointer or _is_auto(written) or kind.name in _SCALARS:
         found = initial_value(run, value, frame, pointer or (_is_auto(written) and "&" in written))
+        if "optional" in written and not pointer:
+            found = copied(run, found, node, frame, run.names.class_of(kind, frame.scope, frame.file))
         return found if pointer or kind.pointer else as_type(kind.name, found)
     if value.type not in ("argument_list", "initializer_list"):
         return converted(run, kind, run.evaluate(value, frame), node, frame)

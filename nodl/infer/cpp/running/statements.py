@@ -26,7 +26,10 @@ def in_a_block(handler: StatementHandler) -> StatementHandler:
         loops = [(loop, len(loop.breaks), len(loop.continues)) for loop in frame.loops]
         frame.blocks.append({})
         outcome = handler(run, node, frame)
-        for name, (existed, value, written) in frame.blocks.pop().items():
+        for name, (existed, value, written, alias) in frame.blocks.pop().items():
+            frame.aliases.pop(name, None)
+            if alias is not None:
+                frame.aliases[name] = alias
             if not existed:
                 frame.names.discard(name)
                 continue

@@ -113,6 +113,9 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
     """Global, static member, enumerator or functions of that name; ``None`` if none is found."""
     from nodl.infer.cpp.running.objects import default_value
 
+    static = static_by_name(run, name, frame)
+    if static is not None:
+        return static_member(run, *static)
     cell_owner = run.names.find_global(name, frame.scope, frame.file)
     if cell_owner is not None:
         cell = (cell_owner, "")
@@ -132,12 +135,6 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
             run.store.set(cell, known)
         return known
     head, separator, last = name.rpartition("::")
-    if separator:
-        kind = run.type_of(head, frame)
-        cls = run.names.class_of(kind, frame.scope, frame.file)
-        for each in run.names.ancestry(cls) if cls is not None else ():
-            if last in each.fields and each.fields[last].static:
-                return static_member(run, each, last)
     for key in (name, f"{head.rpartition('::')[2]}::{last}" if separator else name):
         full = run.names.enumerators.get(key)
         if full is not None:
@@ -145,6 +142,19 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
     function = run.names.find_functions(name, frame.scope, frame.file)
     if function:
         return tuple(Bound(each, None) for each in function)
+    return None
+
+
+def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] | None:
+    """The class that ``Foo::x`` is a static member of; of ``x`` alone, where a class has one outside of its methods."""
+    head, separator, last = name.rpartition("::")
+    if separator:
+        cls = run.names.class_of(run.type_of(head, frame), frame.scope, frame.file)
+    else:
+        cls = run.names.find_class("::".join(frame.scope), (), frame.file) if frame.scope else None
+    for each in run.names.ancestry(cls) if cls is not None else ():
+        if last in each.fields and each.fields[last].static:
+            return each, last
     return None
 
 
