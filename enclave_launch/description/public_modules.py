@@ -25,7 +25,11 @@ class UpstreamModule(NamedTuple):
     own: tuple[str, ...]
 
     def names(self) -> tuple[str, ...]:
-        return (*self.shared, *self.own)
+        """``*`` stands for all public names that our module has."""
+        if self.own != ("*",):
+            return (*self.shared, *self.own)
+        public = (name for name in dir(import_module(_OURS + self.module)) if not name.startswith("_"))
+        return (*self.shared, *public)
 
 
 def exists(name: str) -> bool:
@@ -51,7 +55,8 @@ def public_module(name: str) -> ModuleType:
             return value
         if attribute in below:
             return public_module(f"{name}.{attribute}")
-        if name not in PATHS and attribute in _unambiguous_names():
+        special = attribute.startswith("__")  # ``__path__``: the import system asks every module for it
+        if name not in PATHS and not special and attribute in _unambiguous_names():
             return getattr(import_module(_OURS + _unambiguous_names()[attribute]), attribute)
         raise AttributeError(f"module {name!r} has no attribute {attribute!r}")
 
@@ -98,8 +103,6 @@ def _unambiguous_names() -> dict[str, str]:
 def _row(text: str) -> UpstreamModule:
     module, _, names = text.partition(": ")
     shared, _, own = names.partition("|")
-    if own.strip() == "*":
-        own = " ".join(name for name in dir(import_module(_OURS + module)) if not name.startswith("_"))
     return UpstreamModule(module, tuple(shared.split()), tuple(own.split()))
 
 

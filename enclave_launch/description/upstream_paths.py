@@ -6,7 +6,7 @@ builds modules of these names from this table; nothing else in this package care
 
 from __future__ import annotations
 
-from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.distro import Feature, Since
 
 # package -> module below it -> "our module: names the package has as well | names of that module only".
 # The module "" are names that only the package has; "*" is every public name of our module.
@@ -261,7 +261,7 @@ PATHS: dict[str, dict[str, str]] = {
 }
 
 # Names that a package has only from a feature on; the module below it always has them.
-GATES: dict[str, Feature] = {
+GATES: dict[str, Since] = {
     "AllSubstitution": Feature.EQUALS_IF,
     "AnySubstitution": Feature.EQUALS_IF,
     "ComposableLifecycleNode": Feature.LIFECYCLE_TAGS,

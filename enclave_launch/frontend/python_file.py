@@ -11,6 +11,7 @@ from functools import lru_cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from types import CodeType, ModuleType
+from typing import Any
 
 from enclave_launch.boundary.files import check_regular, read_bytes
 from enclave_launch.frontend.error_location import frames
@@ -48,14 +49,22 @@ def user_frame(error: BaseException, path: str) -> SourceLocation | None:
 
 
 class _Loader(SourceFileLoader):
-    """Compiles in memory, and once for each version of a file."""
+    """Takes each version of a file once: from the ``__pycache__`` that ``ros2 launch`` left beside it, as upstream
+    does, else compiled in memory."""
 
     def get_code(self, fullname: str) -> CodeType:
         status = os.stat(self.path)
-        return _compile(self.path, status.st_ino, status.st_mtime_ns, status.st_size)
+        return _code(self.path, status.st_ino, status.st_mtime_ns, status.st_size)
+
+    def get_data(self, path: str) -> bytes:
+        return read_bytes(path)
+
+    def set_data(self, path: str, data: Any, *, _mode: int = 0) -> None:
+        """Nothing is written."""
 
 
 @lru_cache(maxsize=512)
-def _compile(path: str, *_version: int) -> CodeType:
-    code: CodeType = compile(read_bytes(path), path, "exec", dont_inherit=True)
+def _code(path: str, *_version: int) -> CodeType:
+    code = SourceFileLoader.get_code(_Loader(MODULE_NAME, path), MODULE_NAME)
+    assert code is not None  # only packages without a file have none
     return code

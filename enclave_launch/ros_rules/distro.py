@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from enum import Enum
 from functools import lru_cache
 
@@ -51,7 +51,14 @@ _LAUNCH_LOG = "launch/CHANGELOG.rst"
 _LAUNCH_ROS_LOG = "launch_ros/CHANGELOG.rst"
 
 
-class Feature(Enum):
+class _Table(type):
+    """``Enum`` would do; it takes four million instructions to define this one."""
+
+    def __iter__(cls) -> Iterator[Since]:
+        return (row for row in vars(cls).values() if isinstance(row, Since))
+
+
+class Feature(metaclass=_Table):
     """Each row: what it switches, since when, and where that is known from."""
 
     BOOLEAN_DIGITS = Since("typed booleans accept 1 and 0", humble=(1, 0, 9))
@@ -151,9 +158,9 @@ class Release(NamedTuple):
     distro: Distro
     launch: Version
     launch_ros: Version
-    features: frozenset[Feature]
+    features: frozenset[Since]
 
-    def has(self, feature: Feature) -> bool:
+    def has(self, feature: Since) -> bool:
         return feature in self.features
 
 
@@ -165,7 +172,7 @@ def release_of(distro: Distro, launch: Version | None = None, launch_ros: Versio
     features = frozenset(
         feature
         for feature in Feature
-        if _has(feature.value, distro, launch_ros if feature.value.package == "launch_ros" else launch)
+        if _has(feature, distro, launch_ros if feature.package == "launch_ros" else launch)
     )
     return Release(distro, launch, launch_ros, features)
 

@@ -22,6 +22,7 @@ _DOUBLE = late_pattern(
     re.IGNORECASE | re.ASCII,
 )
 _NAMED_DOUBLE = late_pattern(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
+_BEGIN_NUMBERS = frozenset("+-.0123456789iInN \t\n\v\f\r")
 _MOST_DIGITS = 25  # of a number in 64 bits, in whichever base
 _KINDS: tuple[type, ...] = (bool, int, float, str)
 
@@ -37,6 +38,8 @@ def plain_scalar(text: str) -> Scalar:
     """A plain YAML scalar by the rules of rcl's parser (``parse.c``, ``get_value``), which are not YAML 1.1's."""
     if text in _BOOLEANS:
         return _BOOLEANS[text]
+    if text[:1] not in _BEGIN_NUMBERS:
+        return text
     number = _strtoll(text) if _INTEGER.fullmatch(text) else None
     return _strtod(text) if number is None else number
 
@@ -58,7 +61,7 @@ def _strtod(text: str) -> float | str:
     if not _DOUBLE.fullmatch(text):
         return text
     number = float(text)
-    if "n" in text.lower():  # inf, nan
+    if 0 < abs(number) < math.inf or "n" in text.lower():  # inf, nan
         return number
     has_digits = any(digit in "123456789" for digit in text.lower().partition("e")[0])
-    return number if 0 < abs(number) < math.inf or not has_digits else text
+    return text if has_digits else number

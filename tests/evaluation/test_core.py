@@ -14,7 +14,7 @@ from enclave_launch.description.events.event import Event
 from enclave_launch.description.events.handlers import EventHandler
 from enclave_launch.host.environment import Environment, environment_untouched
 from enclave_launch.host.virtual_loop import VirtualLoop
-from enclave_launch.ros_rules.distro import Distro, Feature, choose_release, release_of
+from enclave_launch.ros_rules.distro import Distro, Feature, Since, choose_release, release_of
 
 NAMES = st.text("ABC", min_size=1, max_size=2).map(lambda name: f"ENCLAVE_LAUNCH_TEST_{name}")
 
@@ -136,7 +136,7 @@ def test_an_installed_launch_of_the_same_series_decides_the_version(tmp_path: Pa
 
 
 @pytest.mark.parametrize("feature", list(Feature))
-def test_later_releases_of_a_series_lose_nothing(feature: Feature) -> None:
+def test_later_releases_of_a_series_lose_nothing(feature: Since) -> None:
     for distro in Distro:
         old, new = release_of(distro), release_of(distro, (99,), (99,))
         assert new.has(feature) or not old.has(feature)

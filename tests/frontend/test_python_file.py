@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import py_compile
 import sys
 from pathlib import Path
 
@@ -27,6 +28,17 @@ def test_the_module_is_new_and_unknown_to_sys_modules(tmp_path: Path) -> None:
 def test_no_bytecode_is_written(tmp_path: Path) -> None:
     python_file.run(write(tmp_path / "a.launch.py", "x = 1\n"), allowed=True)
     assert os.listdir(tmp_path) == ["a.launch.py"]
+
+
+def test_bytecode_that_upstream_left_is_used_while_the_file_is_unchanged(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.launch.py", "x = 'source'\n")
+    compiled = Path(py_compile.compile(path) or "")
+    code = compiled.read_bytes()
+    compiled.write_bytes(code.replace(b"source", b"SOURCE"))  # to tell them apart
+    assert python_file.run(path, allowed=True).x == "SOURCE"
+    write(tmp_path / "a.launch.py", "x = 'a change'\n")
+    assert python_file.run(path, allowed=True).x == "a change"
+    assert compiled.read_bytes() == code.replace(b"source", b"SOURCE")
 
 
 def test_the_file_runs_each_time_and_a_changed_file_anew(tmp_path: Path) -> None:

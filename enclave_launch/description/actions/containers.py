@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.files import as_path
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.components import ComposableLifecycleNode, ComposableNode
 from enclave_launch.description.actions.nodes import Node
@@ -212,7 +212,7 @@ def _global_parameters(context: LaunchContext) -> Iterator[Any]:
         if isinstance(item, tuple):
             yield normalize_parameter_dict({item[0]: item[1]})
             continue
-        path = Path(item).resolve()
+        path = as_path(item).resolve()
         if not path.is_file() and not context.host.allow_missing_packages:
             raise AssertionError(f"the file of set_parameters_from_file does not exist: {path}")
         yield ParameterFile(path)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from enclave_launch.description.markup import extensions
 from enclave_launch.frontend import error_location
 from enclave_launch.host.current import current_release
-from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.distro import Since
 
 if TYPE_CHECKING:
     from enclave_launch.description.action import Action
@@ -34,7 +34,7 @@ substitution_parse_methods: dict[str, ParseMethod] = {}
 # Names that not every release has; kept beside the registries, which third parties may read and which map to
 # plain callables upstream.
 _METHODS = {"action": action_parse_methods, "substitution": substitution_parse_methods}
-_GATES: dict[str, dict[str, Feature]] = {"action": {}, "substitution": {}}
+_GATES: dict[str, dict[str, Since]] = {"action": {}, "substitution": {}}
 
 
 def instantiate_action(entity: Entity, parser: Parser) -> Action:
@@ -76,7 +76,7 @@ def is_ours(name: str) -> bool:
     return method is None or method.__module__.startswith(_OUR_PACKAGE)
 
 
-def expose_action(name: str, *, feature: Feature | None = None) -> Callable[[Exposed], Exposed]:
+def expose_action(name: str, *, feature: Since | None = None) -> Callable[[Exposed], Exposed]:
     """Register a class with a ``parse`` class method, or a parse function, as element ``name``.
 
     ``feature`` (ours): the element is unknown to releases without it.
@@ -84,7 +84,7 @@ def expose_action(name: str, *, feature: Feature | None = None) -> Callable[[Exp
     return _exposer("action", name, feature)
 
 
-def expose_substitution(name: str, *, feature: Feature | None = None) -> Callable[[Exposed], Exposed]:
+def expose_substitution(name: str, *, feature: Since | None = None) -> Callable[[Exposed], Exposed]:
     """Register a class with a ``parse`` class method, or a parse function, as ``$(name ...)``.
 
     ``feature`` (ours): the substitution is unknown to releases without it.
@@ -109,7 +109,7 @@ def _import_and_lookup(kind: str, name: str) -> ParseMethod | None:
     return None
 
 
-def _exposer(kind: str, name: str, gate: Feature | None) -> Callable[[Exposed], Exposed]:
+def _exposer(kind: str, name: str, gate: Since | None) -> Callable[[Exposed], Exposed]:
     methods = _METHODS[kind]
 
     def expose(exposed: Exposed) -> Exposed:

@@ -107,11 +107,11 @@ class ParameterFile:
         else:
             self.__param_file = param_file
         self.__allow_substs = bool(allow_substs)
-        self.__evaluated: Path | None = None
+        self.__evaluated: str | None = None
 
     @property
     def param_file(self) -> list[Substitution] | os.PathLike[str]:
-        return self.__param_file if self.__evaluated is None else self.__evaluated
+        return self.__param_file if self.__evaluated is None else as_path(self.__evaluated)
 
     @property
     def allow_substs(self) -> bool:
@@ -129,28 +129,35 @@ class ParameterFile:
         Raises ``FileNotFoundError`` for a missing file that is to be substituted, ``SubstitutionFailure``
         when it is not YAML afterwards.
         """
+        return as_path(self.path_text(context))
+
+    def path_text(self, context: LaunchContext) -> str:
+        """As ``evaluate``, as text."""
         if self.__evaluated is None:
-            path = self.__path(context)
+            given = self.__param_file
+            path = _path_text(perform_substitutions(context, given) if isinstance(given, list) else given)
             self.__evaluated = _substituted(context, path) if self.__allow_substs else path
         return self.__evaluated
-
-    def __path(self, context: LaunchContext) -> Path:
-        if isinstance(self.__param_file, list):
-            return as_path(perform_substitutions(context, self.__param_file))
-        return as_path(self.__param_file)
 
     def cleanup(self) -> None:
         """Forget the generated copy; the host removes its files itself."""
         self.__evaluated = None
 
 
-def _substituted(context: LaunchContext, path: Path) -> Path:
+def _path_text(path: str | os.PathLike[str]) -> str:
+    """``str(Path(path))``; nearly every path stays as it is written, for which nobody needs ``pathlib``."""
+    if isinstance(path, str) and path and "." not in (parts := path.split("/")) and "" not in parts[1:]:
+        return path
+    return str(as_path(path))
+
+
+def _substituted(context: LaunchContext, path: str) -> str:
     import yaml
 
     from enclave_launch.description.parameters import yaml_text
     from enclave_launch.frontend.fast_yaml import was_written
 
-    if context.host.allow_missing_packages and not path.is_file():
+    if context.host.allow_missing_packages and not os.path.isfile(path):
         return path  # told where it is used
     text = perform_substitutions(context, parse_substitution(read_text(path)))
     try:
@@ -158,4 +165,4 @@ def _substituted(context: LaunchContext, path: Path) -> Path:
             yaml_text.load_shared(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
-    return as_path(context.host.write_parameter_file(text))
+    return str(context.host.write_parameter_file(text))

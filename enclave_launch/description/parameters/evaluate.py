@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.files import as_path
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters import yaml_text
@@ -26,15 +27,22 @@ _SCALARS = (bool, int, float, str)
 
 def evaluate_parameters(context: LaunchContext, parameters: Parameters) -> EvaluatedParameters:
     """Files as paths, dicts with their values, ``Parameter`` descriptions unchanged, in the given order."""
+    evaluated = evaluated_parameters(context, parameters)
+    return tuple(as_path(item) if isinstance(item, str) else item for item in evaluated)
+
+
+def evaluated_parameters(context: LaunchContext, parameters: Parameters) -> list[Any]:
+    """As ``evaluate_parameters``, files as the text of their paths."""
     evaluated: list[Any] = []
     for item in parameters:
         if isinstance(item, ParameterFile):
-            evaluated.append(item.evaluate(context))
+            ours = type(item).evaluate is ParameterFile.evaluate
+            evaluated.append(item.path_text(context) if ours else str(item.evaluate(context)))
         elif isinstance(item, Parameter):
             evaluated.append(item)
         elif isinstance(item, Mapping):
             evaluated.append(evaluate_parameter_dict(context, item))
-    return tuple(evaluated)
+    return evaluated
 
 
 def evaluate_parameter_dict(

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.descriptions import Parameter
-from enclave_launch.description.parameters.evaluate import evaluate_parameters
+from enclave_launch.description.parameters.evaluate import evaluated_parameters
 from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.parameter_value import ParameterValue
@@ -37,7 +37,7 @@ class NodeParameters:
     def write(self, context: LaunchContext, section: str) -> list[str]:
         """Words to append to the command line. ``section`` is the node's full name, or ``/**``."""
         words = [word for pair in _global_words(context) for word in pair]
-        for item in evaluate_parameters(context, self.__own):
+        for item in evaluated_parameters(context, self.__own):
             words += self.__own_words(context, section, item)
         return words
 
@@ -45,8 +45,8 @@ class NodeParameters:
         if isinstance(item, Parameter):
             name, value = item.evaluate(context)
             return ("-p", f"{name}:={yaml_text.dump(value)}")
-        if isinstance(item, os.PathLike):
-            return self.__file_words(context, str(item))
+        if isinstance(item, str):
+            return self.__file_words(context, item)
         return ("--params-file", self.__write_file(context, section, item))
 
     def __file_words(self, context: LaunchContext, path: str) -> Sequence[str]:
