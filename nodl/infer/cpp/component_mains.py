@@ -11,12 +11,13 @@ from collections.abc import Iterable
 from enclave_launch.boundary.files import text_or_nothing
 from nodl.infer.cpp.entry import Entry
 from nodl.infer.cpp.program import Sources
-from nodl.infer.cpp.reading.declarations import FileIndex, Function
+from nodl.infer.cpp.reading.declarations import FileIndex, Function, FunctionParameter
 from nodl.infer.cpp.syntax import text
 
 _MAIN = re.compile(
     r"\{rclcpp::init\((?P<arguments>\w+,\w+)\);"
-    r"auto(?P<node>\w+)=std::make_shared<(?P<component>[\w:]+)>\((?:rclcpp::NodeOptions\(\))?\);"
+    r"(?:rclcpp::NodeOptions(?P<options>\w+);)?"
+    r"auto(?P<node>\w+)=std::make_shared<(?P<component>[\w:]+)>\((?P<given>rclcpp::NodeOptions\(\)|(?P=options))?\);"
     r"rclcpp::spin\((?P=node)(?:->get_node_base_interface\(\))?\);"
     r"(?:rclcpp::shutdown\(\);)?(?:return(?:0|EXIT_SUCCESS);)?\}"
 )  # without white space
@@ -41,16 +42,18 @@ def only_makes(executable: Entry, component: Entry, sources: Sources) -> bool:
     """Whether ``executable`` makes ``component``, as a container would, and nothing else."""
     file, symbols = _main_beside(executable, component), dict(component.symbols)
     index = sources.index(file, symbols, component.complete) if file is not None else None
-    if index is None or _component_made(index) != component.cls:
+    made = _made(index) if index is not None else None
+    if index is None or made is None or made["component"] != component.cls:
         return False
     reached = sources.closure(component.files, symbols, component.complete)
-    return {each.file for each in reached}.issuperset(index.source.includes) and _takes_options_alone(
-        component.cls, reached
-    )
+    takes = _options_alone(component.cls, reached)
+    default = text(takes.default) if takes is not None else ""
+    called_alike = takes is not None and (made["given"] or "".join(default.split()) in _DEFAULTS)
+    return bool(called_alike) and {each.file for each in reached}.issuperset(index.source.includes)
 
 
-def _component_made(index: FileIndex) -> str | None:
-    """The class, where the file has nothing but such a ``main``."""
+def _made(index: FileIndex) -> re.Match[str] | None:
+    """What such a ``main`` makes, where the file has nothing else."""
     others = (
         index.classes, index.globals, index.aliases, index.using, index.enums, index.declared, index.errors,
         index.source.uncertain, index.source.unknown_macros,
@@ -58,23 +61,19 @@ def _component_made(index: FileIndex) -> str | None:
     mains = index.functions.get("main", ())
     if any(others) or len(index.all_functions) != 1 or len(mains) != 1:
         return None
-    match = _MAIN.fullmatch(re.sub(r"\s+", "", text(mains[0].body)))
+    match = _MAIN.fullmatch("".join(text(mains[0].body).split()))
     given = ",".join(each.name for each in mains[0].parameters)
-    return match["component"] if match and match["arguments"] == given else None
+    return match if match is not None and match["arguments"] == given else None
 
 
-def _takes_options_alone(component: str, files: Iterable[FileIndex]) -> bool:
-    """One constructor takes options and has them as default: a container and ``main`` call the same."""
+def _options_alone(component: str, files: Iterable[FileIndex]) -> FunctionParameter | None:
+    """The parameter of the one constructor that takes options, and takes nothing else; ``main`` can call no other."""
     name = component.rpartition("::")[2]
     found: list[Function] = []
     for cls in (
         each for index in files for each in index.classes.get(name, ()) if each.qualified == component
     ):
         found += (*cls.methods.get(name, ()), *cls.declared.get(name, ()))
-    given = [each.parameters for each in found if any("NodeOptions" in p.type for p in each.parameters)]
-    return (
-        len(given) == 1
-        and len(given[0]) == 1
-        and re.sub(r"\s+", "", text(given[0][0].default)) in _DEFAULTS
-        and all(each.parameters for each in found)
-    )
+    taking = [each.parameters for each in found if any("NodeOptions" in p.type for p in each.parameters)]
+    alone = len(taking) == 1 == len(taking[0]) and all(each.parameters for each in found)
+    return taking[0][0] if alone else None

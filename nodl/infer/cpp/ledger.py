@@ -66,24 +66,22 @@ class SiteAnswer(NamedTuple):
         return SourceRef(self.site.file, self.site.line)
 
 
-def sites_of(index: FileIndex) -> list[Site]:
+def sites_of(index: FileIndex) -> tuple[Site, ...]:
     """The places of one file, by the words in its preprocessed text."""
-    found = []
+    if index.sites is None:
+        index.sites = tuple(_found_in(index))
+    return index.sites
+
+
+def _found_in(index: FileIndex) -> Iterator[Site]:
     source = index.source.text
     if not _SITE.search(source):
-        return []
+        return
     blanked = _STRINGS.sub(lambda m: '"' + "_" * (len(m[0]) - 2) + '"', source)
     for match in _SITE.finditer(blanked):
         offset = len(source[: match.start()].encode())
-        found.append(
-            Site(
-                index.file,
-                offset,
-                source.count("\n", 0, match.start()) + 1,
-                next(filter(None, match.groups())),
-            )
-        )
-    return found
+        line = source.count("\n", 0, match.start()) + 1
+        yield Site(index.file, offset, line, next(filter(None, match.groups())))
 
 
 def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:

@@ -13,6 +13,8 @@ from nodl.infer.cpp.syntax import line_of, text
 if TYPE_CHECKING:
     from tree_sitter import Node, Tree
 
+    from nodl.infer.cpp.ledger import Site
+
 
 _LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
 Scope = tuple[str, ...]  # namespaces and classes around a declaration
@@ -152,6 +154,7 @@ class FileIndex:
     enumerator_numbers: dict[str, int] = field(default_factory=dict)  # by qualified name
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
+    sites: tuple[Site, ...] | None = None  # where it may make interfaces, when asked
     maybe: list[Global] = field(default_factory=list)  # declarations that read as functions, too
 
 

@@ -80,6 +80,10 @@ def listed(node: NodeInterface) -> list[str]:
     [
         ("as it is", "as it is"),
         ("Talker>()", "Talker>(rclcpp::NodeOptions())"),
+        (
+            "  auto node = std::make_shared<demo::Talker>()",
+            "  rclcpp::NodeOptions o; auto node = std::make_shared<demo::Talker>(o)",
+        ),
         ("->get_node_base_interface()", ""),
         ("return 0;", "return EXIT_SUCCESS;"),
         ("  rclcpp::shutdown();\n  return 0;\n", ""),
@@ -99,6 +103,7 @@ def test_one_that_only_makes_the_component_is_what_the_component_is(
     ("written", "instead", "made"),
     [
         ("rclcpp::spin", 'node->create_publisher<std_msgs::msg::String>("more", 1);\n  rclcpp::spin', "publisher more"),
+        ("Talker>()", "Talker>(more)", "publisher chatter"),
         ("rclcpp::init(argc, argv)", "rclcpp::init(0, nullptr)", "publisher chatter"),
         ("Talker>()", 'Talker>(rclcpp::NodeOptions().arguments({"-r", "chatter:=x"}))', "publisher chatter"),
         ("int main", 'auto other = std::make_shared<rclcpp::Node>("other");\nint main', "publisher chatter"),
