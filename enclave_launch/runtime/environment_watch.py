@@ -17,6 +17,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
 from enclave_launch.boundary.files import read_bytes
+from enclave_launch.runtime.warden import children_by_parent, descendants, proc_is_ours
 
 FIRST_LOOK = 0.25  # seconds after a start; then ever rarer
 RAREST_LOOK = 15.0
@@ -47,9 +48,9 @@ class Unplanned(NamedTuple):
         )
 
 
-def unplanned(watched: Watched, children: Mapping[int, list[int]]) -> Iterator[Unplanned]:
+def unplanned(watched: Watched, children: Mapping[int, set[int]]) -> Iterator[Unplanned]:
     """What of one process and its descendants has other variables. ``children``: by the pid of the parent."""
-    for pid in (watched.pid, *_descendants(watched.pid, children)):
+    for pid in (watched.pid, *descendants(watched.pid, children)):
         if pid == watched.pid or _speaks_dds(pid):
             environment = environment_of(pid)
             why = None if environment is None else _difference(environment, watched.planned)
@@ -59,7 +60,9 @@ def unplanned(watched: Watched, children: Mapping[int, list[int]]) -> Iterator[U
 
 def environment_of(pid: int) -> dict[str, str] | None:
     """As the program was started with it; None where that cannot be told: the process has ended, belongs to somebody
-    else, or has written over it (as those do that change their title)."""
+    else, or has written over it (as those do that change their title); /proc is of another PID namespace."""
+    if not proc_is_ours():
+        return None
     try:
         entries = [entry for entry in read_bytes(f"/proc/{pid}/environ").split(b"\0") if entry]
     except OSError:
@@ -68,19 +71,6 @@ def environment_of(pid: int) -> dict[str, str] | None:
         return None
     pairs = (os.fsdecode(entry).partition("=") for entry in entries)
     return {name: value for name, _, value in pairs}
-
-
-def children_by_parent() -> dict[int, list[int]]:
-    """All processes of this system that can be seen; empty without /proc."""
-    children: dict[int, list[int]] = {}
-    with contextlib.suppress(OSError):
-        for entry in os.listdir("/proc"):
-            if entry.isdigit():
-                with contextlib.suppress(OSError):
-                    # "pid (name) state ppid": the name may hold spaces and parentheses
-                    fields = read_bytes(f"/proc/{entry}/stat").rpartition(b")")[2].split()
-                    children.setdefault(int(fields[1]), []).append(int(entry))
-    return children
 
 
 class EnvironmentWatch:
@@ -117,14 +107,6 @@ class EnvironmentWatch:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
                     os.kill(found.pid, signal.SIGKILL)
                     self._ended(found)
-
-
-def _descendants(root: int, children: Mapping[int, list[int]]) -> Iterator[int]:
-    waiting = list(children.get(root, ()))
-    while waiting:
-        pid = waiting.pop()
-        yield pid
-        waiting.extend(children.get(pid, ()))
 
 
 def _speaks_dds(pid: int) -> bool:

@@ -52,6 +52,8 @@ class Survivors:
         if self._cgroup is not None:
             self._cgroup.kill()
         deadline = time.monotonic() + CLEARING
+        while time.monotonic() < deadline and not _has_ended(self._warden):
+            time.sleep(0.005)  # its end of the socket closes before its children become ours
         while time.monotonic() < deadline and (adopted := self._adopted()):
             kill_all({pid for one in adopted for pid in (one, *descendants(one))}, signal.SIGKILL)
             time.sleep(0.005)
@@ -69,6 +71,14 @@ class Survivors:
     def _adopted(self) -> set[int]:
         children = children_by_parent().get(os.getpid(), set()) - self._own - _wardens
         return {pid for pid in children if session_of(pid) not in (os.getsid(0), -1)}
+
+
+def _has_ended(child: int) -> bool:
+    """Has ``child`` ended, whoever has reaped it or will? It stays as it is."""
+    try:
+        return os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
+    except ChildProcessError:
+        return True
 
 
 _wardens: set[int] = set()  # of every launch that runs in this program

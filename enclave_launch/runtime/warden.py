@@ -47,6 +47,7 @@ import time
 
 TYPE_CHECKING = False  # ``typing`` costs start-up time and is not needed to run
 if TYPE_CHECKING:
+    from collections.abc import Mapping
     from typing import Any
 
 HEADER = struct.Struct("!I")
@@ -357,13 +358,9 @@ def kill_all(pids: set[int], number: int) -> None:
 
 
 def children_by_parent() -> dict[int, set[int]]:
-    """Every live process of the machine below its parent, from /proc; empty where there is none."""
+    """Every live process of the machine below its parent, from /proc; empty where there is none of ours."""
     children: dict[int, set[int]] = {}
-    try:
-        entries = os.listdir("/proc")
-    except OSError:
-        return children
-    for entry in entries:
+    for entry in os.listdir("/proc") if proc_is_ours() else ():
         if entry.isdigit():
             with contextlib.suppress(OSError):
                 with open(f"/proc/{entry}/stat", "rb") as stat:
@@ -373,9 +370,17 @@ def children_by_parent() -> dict[int, set[int]]:
     return children
 
 
-def descendants(root: int) -> set[int]:
-    """All live processes below ``root``."""
-    children = children_by_parent()
+def proc_is_ours() -> bool:
+    """Does /proc show our PID namespace? In a new one it may still be that of the old, where numbers mean others."""
+    try:
+        return os.readlink("/proc/self") == str(os.getpid())
+    except OSError:
+        return False
+
+
+def descendants(root: int, children: Mapping[int, set[int]] | None = None) -> set[int]:
+    """All live processes below ``root``, among ``children_by_parent`` of this moment or a little before."""
+    children = children_by_parent() if children is None else children
     found: set[int] = set()
     waiting = [root]
     while waiting:

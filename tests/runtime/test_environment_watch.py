@@ -12,10 +12,10 @@ import pytest
 
 from enclave_launch.runtime.environment_watch import (
     Watched,
-    children_by_parent,
     environment_of,
     unplanned,
 )
+from enclave_launch.runtime.warden import children_by_parent
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="there is no /proc")
 
@@ -125,3 +125,25 @@ def test_a_node_whose_prefix_drops_its_enclave_is_ended(tmp_path: Path) -> None:
     kept = run("env MORE=1")
     assert kept.returncode == 0, kept.stdout
     assert "was ended" not in kept.stdout
+
+
+FOREIGN = """
+import subprocess, sys
+from enclave_launch.runtime.environment_watch import Watched, unplanned
+from enclave_launch.runtime.warden import children_by_parent, descendants
+with subprocess.Popen(["sleep", "60"], env={"ROS_SECURITY_ENABLE": "true"}) as child:
+    found = list(unplanned(Watched("a", child.pid, {"ROS_SECURITY_ENABLE": "true"}), children_by_parent()))
+    print(found, children_by_parent(), descendants(1))
+    child.kill()
+"""
+
+
+def test_the_proc_of_another_pid_namespace_is_not_believed() -> None:
+    """As in a sandbox that makes a PID namespace and mounts no /proc in it: numbers there are of other processes."""
+    namespace = ["unshare", "--user", "--map-root-user", "--pid", "--fork"]
+    if subprocess.run([*namespace, "true"], capture_output=True, check=False).returncode != 0:
+        pytest.skip("this machine permits no namespaces")
+    told = subprocess.run(
+        [*namespace, sys.executable, "-c", FOREIGN], capture_output=True, text=True, check=False
+    )
+    assert (told.stdout, told.stderr) == ("[] {} set()\n", "")
