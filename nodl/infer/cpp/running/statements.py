@@ -296,18 +296,16 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
     for declarator in node.children_by_field_name("declarator"):
         if declarator.type == "function_declarator":
             _vexing(run, node, declarator, written, frame)
+    structured = _structured(node)
+    if structured is not None:
+        names = [text(each) for each in children(structured[0]) if each.type == "identifier"]
+        bind_names(run, names, run.evaluate(structured[1], frame), frame)
+        return NEXT
+    functions = [d for d in node.children_by_field_name("declarator") if d.type == "function_declarator"]
     path, several = frame.path, len(node.children_by_field_name("declarator")) > 1
     for name, value, pointer, written in declared_names(node):
-        if any(
-            d.type == "function_declarator" and text(d).startswith(name)
-            for d in node.children_by_field_name("declarator")
-        ):
+        if any(text(each).startswith(name) for each in functions):
             continue
-        structured = next((n for n in walk(node) if n.type == "structured_binding_declarator"), None)
-        if structured is not None:
-            names = [text(n) for n in structured.named_children if n.type == "identifier"]
-            bind_names(run, names, run.evaluate(value, frame), frame)
-            break
         kind = written + (("*" if _points(node) else "&") if pointer else "")
         initial = partial(declared_value, run, node, written, value, pointer, frame)
         if _is_static(node):
@@ -317,13 +315,22 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
             run.local(frame, name, initial(), kind)
             frame.path = path
             bind_reference(run, name, kind, value, frame)
-    structured = next((n for n in node.named_children if n.type == "init_declarator"
-                       and any(c.type == "structured_binding_declarator" for c in walk(n))), None)  # fmt: skip
-    if structured is not None:
-        names = [text(n) for n in walk(structured) if n.type == "identifier" and n.parent is not None
-                 and n.parent.type == "structured_binding_declarator"]  # fmt: skip
-        bind_names(run, names, run.evaluate(structured.child_by_field_name("value"), frame), frame)
     return NEXT
+
+
+def _structured(node: Node) -> tuple[Node, Node | None] | None:
+    """The names of ``auto & [a, b] = value`` and the value."""
+    for declarator in node.children_by_field_name("declarator"):
+        inner = (
+            declarator.child_by_field_name("declarator")
+            if declarator.type == "init_declarator"
+            else declarator
+        )
+        while inner is not None and inner.type == "reference_declarator":
+            inner = children(inner)[-1]
+        if inner is not None and inner.type == "structured_binding_declarator":
+            return inner, declarator.child_by_field_name("value")
+    return None
 
 
 def _points(node: Node) -> bool:

@@ -118,6 +118,19 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'try { fail(); pub("dead"); } catch (...) { pub("caught"); }',
         'void fail() { throw std::runtime_error("x"); }', "", {"caught"}, {"dead"},
     ),
+    "the value of structured names is computed once": (
+        'auto [x, y] = std::make_pair(next(), 1); pub(x); pub(next() + "_then");',
+        'int i = 0; std::string next() { return "s" + std::to_string(++i); }', "", {"s1", "s2_then"}, {"s2", "s3_then"},
+    ),
+    "structured names in a closure are those of the closure": (
+        'auto f = [this]() { const auto & [a, b] = std::make_pair(std::string("in"), 1); pub(a);'
+        'return std::string("out"); }; pub(f());',
+        "", "", {"in", "out"}, set(),
+    ),
+    "a macro's argument is expanded before it is filled in": (
+        'pub("m" TEXT(NUMBER)); pub(TEXT_(NUMBER));', "",
+        "#define NUMBER 42\n#define TEXT_(x) #x\n#define TEXT(x) TEXT_(x)\n", {"m42", "NUMBER"}, {"mNUMBER"},
+    ),
     "members of an aggregate use those before them": (
         'Agg a{this}; Agg b{this, "given"};', "",
         'struct Agg { rclcpp::Node * n; std::string t = "default";\n'
