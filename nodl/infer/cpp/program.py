@@ -17,7 +17,7 @@ from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account
 from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
-from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global
+from nodl.infer.cpp.reading.declarations import FileIndex, Function, Global
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
@@ -27,7 +27,7 @@ from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import BudgetExceeded, Machine, Settings
-from nodl.infer.cpp.running.values import BOTTOM, Obj, Seq, Value, unknown
+from nodl.infer.cpp.running.values import Seq, Value, unknown
 from nodl.infer.cpp.syntax import children, line_of, text
 from nodl.source_ref import SourceRef
 
@@ -140,6 +140,7 @@ _CORE = frozenset({
 
 
 def library_sources(package: SourcePackage) -> list[str]:
+    """What the libraries of a package are built from."""
     libraries = [t for t in package.build.targets.values() if not t.executable]
     return list(dict.fromkeys(file for target in libraries for file in target.sources))
 
@@ -296,7 +297,7 @@ def _findings(run: Machine, sources: Sources) -> Findings:
             findings.gaps.setdefault(
                 (source, f"{what} was never seen to be set: what {name}() makes is not known")
             )
-    for kind, cls in run.names.doubts.items():
+    for kind, cls in run.names.specialisations.doubts.items():
         why = f"which specialisation of {cls.qualified} is meant by {kind} is not known"
         findings.gaps.setdefault((SourceRef(cls.file.file, cls.line), why))
     own = list(run.names.files.values())
@@ -341,6 +342,3 @@ def target_entry(target: Target, package: SourcePackage, workspace: Workspace) -
     known = next((commands[os.path.realpath(f)] for f in files if os.path.realpath(f) in commands), None)
     symbols = known if known is not None else target.definitions
     return Entry(tuple(files), symbols=tuple(sorted(symbols.items())), complete=known is not None)
-
-
-__all__ = ["BOTTOM", "Class", "Obj", "line_of"]

@@ -1,4 +1,4 @@
-"""Types of C headers: a structure of C has no base and no constructor, so it is no node and makes no interface. Pure.
+"""Types of C headers: making a structure of C runs no code, so that it makes no interface. Pure.
 
 Sources: POSIX.1-2017 (headers of the base definitions), Linux uapi headers, SDL 2, libusb 1.0, FFmpeg, libcurl.
 """

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
 
 from nodl.infer.cpp.reading.c_headers import is_of_c
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
-from nodl.infer.cpp.reading.specialisations import Chosen, specialised
+from nodl.infer.cpp.reading.specialisations import Specialisations
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 
 if TYPE_CHECKING:
@@ -62,16 +62,11 @@ class Names:
         self.enums: set[str] = set()
         self._bases: dict[str, tuple[str, ...]] = {}
         self.hidden: dict[Class, frozenset[str]] = {}  # what ``inheritance.hidden`` found
-        self.doubts: dict[
-            Type, Class
-        ] = {}  # types of which several specialisations may be meant, one of them
         self.depends: frozenset[str] = frozenset()  # what the packages of the program depend on
         self.plugins: dict[str, str] = {}  # lookup name or class -> class
         for index in self.files.values():
             self._add(index)
-        self._special: dict[str, list[Class]] = {}
-        for each in (c for listed in self.classes.values() for c in listed if c.specialises is not None):
-            self._special.setdefault(each.qualified, []).append(each)
+        self.specialisations = Specialisations(self)
         self._attach()
 
     def _add(self, index: FileIndex) -> None:
@@ -100,21 +95,11 @@ class Names:
                         function.file,
                     )
                     if cls is not None:
-                        cls = self._specialisation(cls, function)
+                        cls = self.specialisations.of_method(cls, function)
                         self.methods[cls].setdefault(name, []).append(function)
                         _complete(function, cls.declared.get(name, ()))
                 else:
                     _complete(function, self.declared.get(name, ()))
-
-    def _specialisation(self, cls: Class, function: Function) -> Class:
-        """The specialisation of ``cls`` whose method this is; else the class itself."""
-        same = [
-            c for c in self.classes[cls.name] if c.specialises is not None and c.qualified == cls.qualified
-        ]
-        found = next((c for c in same if c.specialises == function.specialises), None)
-        if found is not None:
-            function.specialises = None
-        return found or cls
 
     @_once
     def visible(self, file: str) -> frozenset[str]:
@@ -248,32 +233,7 @@ class Names:
     def class_of(self, kind: Type, scope: Scope, file: FileIndex) -> Class | None:
         """The class of a type, of a template the specialisation for its arguments; doubts are noted."""
         cls = self.find_class(kind.name, scope, file)
-        return cls if cls is None or cls.qualified not in self._special else self._chosen(cls, kind).cls
-
-    def bindings(self, cls: Class, kind: Type) -> dict[str, Type]:
-        """What the parameters of the template ``cls`` stand for in ``kind``; those of a partial one by its pattern."""
-        if cls.specialises is not None:
-            return dict(self._chosen(cls, kind).bindings)
-        return self._with_defaults(cls, dict(zip(cls.templates, kind.arguments, strict=False)))
-
-    def _with_defaults(self, cls: Class, bound: dict[str, Type]) -> dict[str, Type]:
-        for name, default in cls.template_defaults.items():
-            bound.setdefault(name, self.resolve(default, cls.scope, cls.file, bound))
-        return bound
-
-    def _chosen(self, cls: Class, kind: Type) -> Chosen:
-        listed = self._special[cls.qualified]
-        primary = next(
-            (c for c in self.classes[cls.name] if c.qualified == cls.qualified and not c.specialises), cls
-        )
-        bound = self._with_defaults(primary, dict(zip(primary.templates, kind.arguments, strict=False)))
-        given = [bound[name] for name in primary.templates if name in bound] or kind.arguments
-        found = specialised(primary, listed, given, lambda t: self.resolve(t, cls.scope, cls.file))
-        if not found.certain and any(
-            c.fields or c.declared or self.methods.get(c) for c in (primary, *listed)
-        ):
-            self.doubts.setdefault(kind, found.cls)
-        return found
+        return cls if cls is None else self.specialisations.meant(cls, kind)
 
     @_once
     def ancestry(self, cls: Class) -> list[Class]:
@@ -432,7 +392,7 @@ class Names:
         cls = self.find_class(outer.name, scope, file)
         if cls is not None:
             cls = self.class_of(outer, scope, file) or cls
-            bound = self.bindings(cls, outer)
+            bound = self.specialisations.bindings(cls, outer)
             return self.resolve(rest, cls.scope, cls.file, bound)._replace(pointer=pointer)
         return Type(f"{outer.name}::{rest}", (), pointer)
 

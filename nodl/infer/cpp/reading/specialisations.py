@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, NamedTuple
 from nodl.infer.cpp.reading.type_names import Type, split_type
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Class
+    from nodl.infer.cpp.reading.declarations import Class, Function
+    from nodl.infer.cpp.reading.names import Names
 
 Resolve = Callable[[str], Type]
 _CHANGED = re.compile(r"[&*]|\b(?:const|volatile)\b|\(|\.\.\.")
@@ -24,6 +25,53 @@ class Chosen(NamedTuple):
     cls: Class
     bindings: Mapping[str, Type]
     certain: bool = True
+
+
+class Specialisations:
+    """Those of a program's class templates. ``doubts``: types of which several may be meant, with one of them."""
+
+    def __init__(self, names: Names):
+        self._names = names
+        self.doubts: dict[Type, Class] = {}
+        self._of: dict[str, list[Class]] = {}
+        for each in (c for listed in names.classes.values() for c in listed if c.specialises is not None):
+            self._of.setdefault(each.qualified, []).append(each)
+
+    def of_method(self, cls: Class, function: Function) -> Class:
+        """The specialisation of ``cls`` whose method this is; else the class itself."""
+        listed = self._of.get(cls.qualified, ())
+        found = next((c for c in listed if c.specialises == function.specialises), None)
+        if found is not None:
+            function.specialises = None
+        return found or cls
+
+    def meant(self, cls: Class, kind: Type) -> Class:
+        """Of the template ``cls`` the class for the arguments of ``kind``; a doubt is noted."""
+        return self._chosen(cls, kind).cls if cls.qualified in self._of else cls
+
+    def bindings(self, cls: Class, kind: Type) -> dict[str, Type]:
+        """What the parameters of the template ``cls`` stand for; those of a partial specialisation by its pattern."""
+        if cls.specialises is not None:
+            return dict(self._chosen(cls, kind).bindings)
+        return self._with_defaults(cls, kind)
+
+    def _with_defaults(self, cls: Class, kind: Type) -> dict[str, Type]:
+        bound = dict(zip(cls.templates, kind.arguments, strict=False))
+        for name, default in cls.template_defaults.items():
+            bound.setdefault(name, self._names.resolve(default, cls.scope, cls.file, bound))
+        return bound
+
+    def _chosen(self, cls: Class, kind: Type) -> Chosen:
+        listed, names = self._of[cls.qualified], self._names
+        same = [c for c in names.classes[cls.name] if c.qualified == cls.qualified and not c.specialises]
+        primary = same[0] if same else cls
+        bound = self._with_defaults(primary, kind)
+        given = [bound[name] for name in primary.templates if name in bound] or kind.arguments
+        found = specialised(primary, listed, given, lambda t: names.resolve(t, cls.scope, cls.file))
+        has_parts = any(c.fields or c.declared or names.methods.get(c) for c in (primary, *listed))
+        if not found.certain and has_parts:
+            self.doubts.setdefault(kind, found.cls)
+        return found
 
 
 def specialised(

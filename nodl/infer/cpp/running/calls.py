@@ -247,7 +247,7 @@ def _static_method(
             frame,
             types_of(run, callee, frame),
             exactly=True,
-            bindings=run.names.bindings(cls, kind),
+            bindings=run.names.specialisations.bindings(cls, kind),
         )
     if is_only_declared(run, cls, last):
         return without_source(run, f"{cls.name}::{last}", values, node, frame, None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
@@ -126,7 +127,7 @@ def construct_class(
     run: Machine, this: Obj, cls: Class, kind: Type, arguments: Sequence[Value], node: Node, frame: Frame
 ) -> None:
     """Run the constructor of ``cls`` (a base or the class itself) on ``this``."""
-    this.bindings[cls] = run.names.bindings(cls, kind)
+    this.bindings[cls] = run.names.specialisations.bindings(cls, kind)
     constructor = chosen(
         run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
     )
@@ -285,6 +286,9 @@ def foreign_base(
 
 def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: Node, inner: Frame) -> None:
     known: Mapping[str, Value] = this.data.get("members", {})  # of an aggregate
+    of_class = Frame(
+        cls.file, cls.scope, None, this, inner.bindings, path=inner.path, conditions=inner.conditions, depth=inner.depth
+    )  # fmt: skip
     for name, member in cls.fields.items():
         if member.static:
             continue
@@ -294,20 +298,7 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: 
             )
             continue
         where = given.get(name)
-        frame = (
-            inner
-            if where is not None
-            else Frame(
-                cls.file,
-                cls.scope,
-                None,
-                this,
-                inner.bindings,
-                path=inner.path,
-                conditions=inner.conditions,
-                depth=inner.depth,
-            )
-        )
+        frame = inner if where is not None else of_class
         value = where if where is not None else member.default
         if value is not None:
             run.handle(value, frame)
@@ -323,16 +314,7 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: 
         elif pointer:
             found = BOTTOM
         else:
-            keyed = Frame(
-                cls.file,
-                cls.scope,
-                None,
-                this,
-                inner.bindings,
-                path=(*inner.path, name),
-                depth=inner.depth,
-                conditions=inner.conditions,
-            )
+            keyed = replace(of_class, path=(*inner.path, name))
             found = default_value(run, member.node, kind, keyed)
         run.store.set((this, cell_of(run, this, name, cls)), found)
 

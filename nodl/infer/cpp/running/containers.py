@@ -329,28 +329,7 @@ def _sequence_call(
     elif name == "count" and exact and values and len(values[0]) == 1 and plain(values[0][0]) is not None:
         listed = [plain(item[0]) if len(item) == 1 else None for item in atom.items]
         return unknown("a count") if None in listed else (listed.count(plain(values[0][0])),)
-    elif (
-        name
-        in (
-            "erase",
-            "resize",
-            "pop_back",
-            "pop_front",
-            "assign",
-            "swap",
-            "pop",
-            "remove",
-            "unique",
-            "sort",
-            "reverse",
-            "splice",
-            "merge",
-            "remove_if",
-            "extract",
-        )
-        and receiver is not None
-        and isinstance(atom, Seq)
-    ):
+    elif name in _REARRANGES and receiver is not None and isinstance(atom, Seq):
         more = (
             (unknown("an element of a list"),)
             if name in ("resize", "assign", "swap", "splice", "merge")

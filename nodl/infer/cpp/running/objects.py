@@ -269,7 +269,7 @@ def _aggregate(
     from nodl.infer.cpp.running.constructors import construct
 
     names = fields_of(cls)
-    bindings = run.names.bindings(cls, kind)
+    bindings = run.names.specialisations.bindings(cls, kind)
     members: dict[str, Value] = {}
     for position, item in enumerate(given):
         name, value = names[position] if position < len(names) else "", item

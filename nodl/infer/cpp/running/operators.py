@@ -269,17 +269,12 @@ def subscript(run: Machine, node: Node, frame: Frame) -> Value:
 
 def element(run: Machine, atom: object, key: Value) -> Value:
     """``container[key]``."""
-    if not isinstance(atom, Map):
-        key = tuple(map(number_of, key))
     if isinstance(atom, Map):
         definite = [value for known, value in atom.entries if len(key) == 1 and known == key]
         if definite and not atom.open:
             return definite[-1]
-        return (
-            join(*(value for _, value in atom.entries), unknown("an element of a map"))
-            if atom.open or not definite
-            else definite[-1]
-        )
+        return join(*(value for _, value in atom.entries), unknown("an element of a map"))
+    key = tuple(map(number_of, key))
     if isinstance(atom, Seq | Group | Param):
         items, exact = items_of(run, atom)
         if exact and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(items):

@@ -84,7 +84,6 @@ def unknown_call(
             for atom in value:
                 run.later(atom, frame)
         return unknown(f"the result of {name}()")
-    run.handle(node, frame) if CREATES.fullmatch(last) else None
     handed_over(run, f"{name}()", values, node, frame)
     if receiver is None or receiver.cls is not None:
         _may_be_written(run, name, given, frame)

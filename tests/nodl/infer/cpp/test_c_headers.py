@@ -1,4 +1,4 @@
-"""A structure of C is no node: what a header of C defines is no gap; what nobody knows stays one."""
+"""What a header of C defines is made without a gap; a class that nobody knows is one."""
 
 from __future__ import annotations
 
