@@ -3,12 +3,14 @@
 A plan must know what an event would start, so functions that an event or a timer calls are called for the plan. They
 ask about that moment: what they gave is taken at the event only where all that they looked at is as it was: launch
 configurations, environment, files and folders, and the files named on the command lines of programs that they ran. What
-looked at the event itself, or asked the network, is called again.
+looked at the event itself, or at what leaves no trace when it changes (the network, another process, ``/proc`` and
+``/sys``, a device), is called again.
 """
 
 from __future__ import annotations
 
 import os
+import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -61,6 +63,11 @@ class Looks:
         if isinstance(path, (str, bytes, os.PathLike)):
             self.paths.add(os.path.abspath(os.fsdecode(path)))
 
+    def read(self, path: object) -> None:
+        self.look(path)
+        if isinstance(path, (str, bytes, os.PathLike)):
+            self.elsewhere = self.elsewhere or _changes_unseen(os.path.abspath(os.fsdecode(path)))
+
     def run(self, words: object) -> None:
         """A program reads what its command line names; more of it nobody can know."""
         for word in words if isinstance(words, (list, tuple)) else (words,):
@@ -72,6 +79,9 @@ class Looks:
 
 _WRITTEN = late_pattern(r">+\s*[^\s;&|>]+")  # by a shell: what it writes, it does not look at
 _SEPARATORS = late_pattern(r"[\s;&|<>()'\"`]+")
+_OF_PROCESSES = ("os.kill", "os.killpg")  # does it still run?
+_OF_THIS_MACHINE = ("socket.__new__", "socket.gethostname")
+_WITHOUT_CONTENT = ("/dev/null", "/dev/zero", "/dev/random", "/dev/urandom")
 _looks: Looks | None = None
 _listening = False
 
@@ -118,14 +128,16 @@ def _hear(event: str, args: tuple[Any, ...]) -> None:
         return
     if event == "open":
         if _reads(args[1], args[2]):
-            _looks.look(args[0])
+            _looks.read(args[0])
     elif event in ("os.listdir", "os.scandir"):
         _looks.look(args[0] if args[0] is not None else ".")
+    elif event in ("os.getxattr", "os.listxattr", "sqlite3.connect"):
+        _looks.look(args[0])
     elif event in ("subprocess.Popen", "os.posix_spawn"):
         _looks.run(args[1])
     elif event in ("os.system", "os.exec"):
         _looks.run(args[0])
-    elif event == "socket.connect":
+    elif event in _OF_PROCESSES or (event.startswith("socket.") and event not in _OF_THIS_MACHINE):
         _looks.elsewhere = True
 
 
@@ -133,6 +145,15 @@ def _reads(mode: object, flags: object) -> bool:
     if isinstance(mode, str):
         return "r" in mode or "+" in mode
     return isinstance(flags, int) and flags & os.O_ACCMODE != os.O_WRONLY
+
+
+def _changes_unseen(path: str) -> bool:
+    """Is it something whose content changes while size and time do not?"""
+    if path.startswith(("/proc/", "/sys/")):
+        return True
+    state = _file_state(path)
+    regular = state is None or stat.S_ISREG(state[3]) or stat.S_ISDIR(state[3])
+    return not regular and path not in _WITHOUT_CONTENT
 
 
 def _file_state(path: str) -> FileState:

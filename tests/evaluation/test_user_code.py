@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import os
+import socket
 import subprocess
 import sys
 from collections.abc import Callable
@@ -12,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.host.moment import Looks, looked_at
+from enclave_launch.host.moment import looked_at
 from enclave_launch.host.user_code import only_acts
 
 _SEEN: list[int] = []
@@ -121,11 +122,42 @@ def test_the_environment_counts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path)
     assert not moment.holds(None)
 
 
-def test_what_asked_the_network_holds_for_no_other_moment() -> None:
-    with looked_at(None) as looks:
-        sys.audit("socket.connect", None, ("127.0.0.1", 1))
-    assert looks.moment(None) is None
-    assert Looks().moment(None) is not None
+def _binds(path: Path) -> None:
+    with socket.socket(socket.AF_UNIX) as one:
+        one.bind(str(path))
+
+
+def _reads_fifo(path: Path) -> None:
+    os.mkfifo(path)
+    os.close(os.open(path, os.O_RDONLY | os.O_NONBLOCK))
+
+
+LEAVES_NO_TRACE: dict[str, Deed] = {
+    "the network": lambda path: sys.audit("socket.connect", None, ("127.0.0.1", 1)),
+    "a name in the network": lambda path: socket.getaddrinfo("localhost", 1),
+    "whether a port is free": _binds,
+    "whether a process runs": lambda path: os.kill(os.getpid(), 0),
+    "the kernel's files": lambda path: Path("/proc/loadavg").read_text(),
+    "a device": _reads_fifo,
+}
+LEAVES_ONE: dict[str, Deed] = {
+    "nothing": lambda path: None,
+    "this machine's name": lambda path: socket.gethostname(),
+    "a program without input": lambda path: subprocess.run(["true"], stdin=subprocess.DEVNULL, check=True),
+    "a file": lambda path: Path(__file__).read_text(),
+}
+
+
+@pytest.mark.parametrize("deed", LEAVES_NO_TRACE.values(), ids=LEAVES_NO_TRACE)
+def test_what_looked_at_something_that_changes_unseen_holds_for_no_other_moment(
+    deed: Deed, tmp_path: Path
+) -> None:
+    assert moment_of(deed, tmp_path / "path") is None
+
+
+@pytest.mark.parametrize("deed", LEAVES_ONE.values(), ids=LEAVES_ONE)
+def test_what_can_be_looked_at_again_holds(deed: Deed, tmp_path: Path) -> None:
+    assert moment_of(deed, tmp_path / "path").holds(None)
 
 
 def test_what_was_put_in_the_place_of_os_functions_is_gone_afterwards(tmp_path: Path) -> None:
