@@ -16,7 +16,6 @@ from enclave_launch.errors import UsageError
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
-from enclave_launch.policy.conditions import ALSO
 from keystore.errors import KeystoreError
 
 if TYPE_CHECKING:
@@ -78,12 +77,20 @@ class ResolveOptions(_ResolveOptions):
     def plan_options(self) -> PlanOptions:
         """Raises ``UsageError`` for a policy file that cannot be used."""
         document = _read_policy(self.policy) if self.policy else None
-        unknown = [name for name in self.also if name not in ALSO]
-        if unknown:
-            raise UsageError(f"--also {unknown[0]}: choose from {', '.join(ALSO)}")
+        _check_also(self.also)
         policy = PolicyOptions(self.accept_patterns, document, also=frozenset(self.also))
         admission = AdmissionOptions(frozenset(self.accept_prefixes), frozenset(self.accept_middlewares))
         return PlanOptions(self.enclave_scope, policy, admission)
+
+
+def _check_also(names: tuple[str, ...]) -> None:
+    if not names:
+        return
+    from enclave_launch.policy.conditions import ALSO
+
+    unknown = [name for name in names if name not in ALSO]
+    if unknown:
+        raise UsageError(f"--also {unknown[0]}: choose from {', '.join(ALSO)}")
 
 
 def _several(given: Any) -> tuple[Any, ...]:

@@ -37,7 +37,6 @@ from enclave_launch.plan import (
 )
 from enclave_launch.policy import DerivedPolicy, RunningNode
 from enclave_launch.source_location import SourceLocation
-from keystore.formats.subject import common_name
 
 
 def problems(
@@ -153,6 +152,10 @@ def shared_domains(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
 def failing_handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
     """Enclaves on two DDS implementations that cannot authenticate each other under the subjects they get here."""
     pairs = mixed_enclaves(processes)
+    if not pairs:
+        return
+    from keystore.formats.subject import common_name
+
     subjects = {path: common_name(path) for pair in pairs for path in pair}
     for pair in failing(pairs, subjects):
         yield handshake_fails(*pair, planned=True)

@@ -15,9 +15,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from enum import Enum
+from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.named_tuple import NamedTuple
-from keystore.formats.subject import Half, guid_prefix
+
+if TYPE_CHECKING:
+    from keystore.formats.subject import Half
 
 VARIABLE = "RMW_IMPLEMENTATION"
 DEFAULT = "rmw_fastrtps_cpp"
@@ -96,6 +99,8 @@ def mixed_pairs(members: Iterable[EnclaveProcess]) -> tuple[Pair, ...]:
 def failing(pairs: Iterable[Pair], subjects: Mapping[str, str]) -> Iterator[Pair]:
     """Those that never authenticate, or only by chance. ``subjects``: common name by enclave; a pair of which one is
     not known counts as good."""
+    from keystore.formats.subject import guid_prefix
+
     for pair in pairs:
         fast, cyclone = subjects.get(pair.fast), subjects.get(pair.cyclone)
         if pair.fast == pair.cyclone or (fast and cyclone and guid_prefix(fast) <= guid_prefix(cyclone)):
@@ -104,6 +109,8 @@ def failing(pairs: Iterable[Pair], subjects: Mapping[str, str]) -> Iterator[Pair
 
 def halves(pairs: Iterable[Pair]) -> dict[str, Half]:
     """Where each enclave should sort so that Cyclone begins every handshake; none for enclaves of both."""
+    from keystore.formats.subject import Half
+
     found = tuple(pair for pair in pairs if pair.fast != pair.cyclone)
     fast, cyclone = {pair.fast for pair in found}, {pair.cyclone for pair in found}
     return {**dict.fromkeys(fast - cyclone, Half.HIGH), **dict.fromkeys(cyclone - fast, Half.LOW)}

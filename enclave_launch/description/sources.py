@@ -16,7 +16,7 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.frontend import error_location, python_file
+from enclave_launch.frontend import error_location
 from enclave_launch.host.current import current_host
 
 if TYPE_CHECKING:
@@ -104,6 +104,8 @@ class InvalidPythonLaunchFileError(Exception):
 
 def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleType:
     """Execute the file as a module that ``sys.modules`` does not hold; raises whatever it raises."""
+    from enclave_launch.frontend import python_file
+
     return python_file.run(python_launch_file_path, allowed=not current_host().no_python)
 
 
@@ -130,6 +132,8 @@ def _run_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
             )
         description: LaunchDescription = module.generate_launch_description()
     except Exception as error:  # foreign code may raise anything; it goes on, with its place noted
+        from enclave_launch.frontend import python_file
+
         error_location.mark_at(error, python_file.user_frame(error, python_launch_file_path))
         raise
     return description

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import gc
 import os
+import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
@@ -150,9 +151,10 @@ def _collector_paused() -> Iterator[None]:
 def forget_elements_of_launch_files() -> None:
     """What a launch file exposed (``expose_action``) is its own."""
     from enclave_launch.description.markup import expose
-    from enclave_launch.frontend.python_file import MODULE_NAME
 
-    expose.forget(MODULE_NAME)
+    python_file = sys.modules.get("enclave_launch.frontend.python_file")
+    if python_file is not None:  # else none was run
+        expose.forget(python_file.MODULE_NAME)
 
 
 def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:

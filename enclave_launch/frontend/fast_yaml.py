@@ -18,7 +18,6 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from functools import lru_cache
 from importlib.machinery import ModuleSpec
-from importlib.util import find_spec
 from types import ModuleType
 from typing import Any
 
@@ -67,6 +66,8 @@ class _OnImport:
     def find_spec(self, fullname: str, path: object, target: object = None) -> ModuleSpec | None:
         if fullname != "yaml":
             return None
+        from importlib.util import find_spec
+
         self.withdraw()
         spec = find_spec(fullname)
         if spec is not None and spec.loader is not None:

@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import permissions_large, policy_answers
-from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 
 if TYPE_CHECKING:
+    from enclave_launch.policy.node_permissions import NodePermissions, Reason
     from keystore.formats.policy_xml import PolicyDocument
+
+    Reasons = dict[Rule, list[Reason]]
 
 # How the operations are called where names are listed for people and programs.
 LIST_NAMES: dict[Operation, str] = {
@@ -45,8 +47,6 @@ def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:
 
 # Below that, even actions with names of the greatest length stay under the sizes that matter.
 _MANY_RULES = 20
-
-Reasons = dict[Rule, list[Reason]]
 
 ProfileKey = tuple[str, str]  # namespace and node name
 
@@ -101,6 +101,10 @@ def derive_policy(
     whole = chosen.actions_as_a_whole
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
+        from enclave_launch.policy.node_permissions import (
+            node_permissions,  # where nothing is known, not needed
+        )
+
         collection.add(
             node_permissions(
                 node,
