@@ -231,13 +231,8 @@ AS_UPSTREAM_HAS_IT = {  # launch, launch_ros and the NoDL v1 API name both so, a
     "Action", "Entity", "IncludeLaunchDescription", "Node", "Parameter", "Parser", "PushRosEnclave", "Shutdown",
     "ProcessExited", "ProcessStarted",  # the events of launch, and what a library user hears of them
 }  # fmt: skip
-AS_THE_PLAN_HAS_IT = {
-    "Diagnostic",
-    "LauncherCall",
-    "Node",
-    "Reaction",
-    "Respawn",
-}  # report/contract.py: their JSON
+# report/contract.py: their JSON
+AS_THE_PLAN_HAS_IT = {"Diagnostic", "LauncherCall", "Node", "Reaction", "Respawn"}
 IN_BOTH_KINDS_OF_INFERENCE = {  # of Python in nodl/infer/, of C++ in nodl/infer/cpp/
     "BudgetExceeded", "Call", "Findings", "FoundEndpoint", "Frame", "NodePart", "NodeRecord", "Text", "Unknown",
 }  # fmt: skip
