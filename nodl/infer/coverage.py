@@ -27,7 +27,7 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
 from nodl.infer.models.signatures import NODE_ENDPOINTS
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.values import ModuleValue
+from nodl.infer.values import FunctionValue, ModuleValue
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 
@@ -127,8 +127,13 @@ class _Audit:
     def _place(self, place: _Place) -> None:
         """Follow what surrounds the place from outside in, to where control does not go on, or to the place."""
         cls: ast.ClassDef | None = None
+        function: Function | None = None
         for around in place.around:
             if isinstance(around, ast.stmt) and around not in self._run.executed:
+                if isinstance(function, ast.FunctionDef) and self._was_handed(function):
+                    self._gap(
+                        place.node, f"{function.name} {_LOST}"
+                    )  # a generator, whoever has it may run it
                 return  # control certainly does not get there
             if isinstance(around, ast.ClassDef):
                 cls = around
@@ -137,10 +142,18 @@ class _Audit:
                     if self._may_be_called(around, cls):
                         self._gap(place.node, f"{getattr(around, 'name', 'a lambda')} {_LOST}")
                     return
-                cls = None
+                cls, function = None, around
         node = place.node
         if isinstance(node, ast.Call) and node in self._run.evaluated and node not in self._run.understood:
             self._gap(node, f"{_last_name(node.func)}() is called on something that is not understood")
+
+    def _was_handed(self, function: ast.FunctionDef) -> bool:
+        """Whether others call the function and what it does was not seen: they get a generator."""
+        handed = (
+            getattr(each, "function", each) for each in self._run.callbacks
+        )  # a bound method has its own
+        is_handed = any(isinstance(each, FunctionValue) and each.node is function for each in handed)
+        return is_handed and function.body[0] not in self._run.executed
 
     # --- code that was not reached ----------------------------------------------------------------------
 

@@ -285,7 +285,7 @@ class NativeObject:
     where branches may be undone. ``sources`` went into it; ``fallback`` gives what it may yield after all.
     """
 
-    __slots__ = ("fallback", "forks", "lost", "object", "sources")
+    __slots__ = ("fallback", "forks", "given", "lost", "object", "place", "sources")
 
     def __init__(self, found: object, forks: int, sources: tuple[Value, ...] = ()):
         self.object = found
@@ -293,6 +293,8 @@ class NativeObject:
         self.lost = False
         self.sources = sources
         self.fallback: Callable[[], Value] | None = None
+        self.given: Cells = {}  # of a generator of the program: its arguments, and the call that made it
+        self.place: object = None
 
 
 class ClassValue(HeapObject):

@@ -19,6 +19,7 @@ from nodl.infer.values import (
     External,
     FunctionValue,
     Instance,
+    NativeObject,
     Unknown,
     Value,
 )
@@ -71,6 +72,13 @@ def _call_class_method(run: Run, method: ClassMethod, call: Call) -> Value:
     return run.call(method.function, call.args, call.node, call.frame)
 
 
+def _run_generator(run: Run, atom: NativeObject, call: Call) -> Value:
+    """What others do who have a generator: its body runs to the end, and they get what it yields."""
+    if atom.place is not None and atom.fallback is not None:
+        run.escape_value(atom.fallback())
+    return ANY
+
+
 def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
     if atom.why == TOO_MANY:
         run.gap(call.node, call.frame, "one of too many functions is called here")
@@ -97,4 +105,5 @@ CALLABLES: dict[type, Caller] = {
     External: foreign.call_external,
     ForeignMethod: foreign.call_foreign_method,
     NativeMethod: foreign.call_native,
+    NativeObject: _run_generator,
 }

@@ -110,6 +110,8 @@ def _generator(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
         return elements(run, found, call.node, call.frame).any_element()
 
     made.fallback = as_a_whole
+    made.given = given
+    made.place = function.node, call.node
     run.state.pulled += 1
     return (made,)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable
 
+from nodl.infer.interpreter import special
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.frames import Frame
@@ -60,7 +61,7 @@ def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
 def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
     """``obj[key] = value`` for a dictionary."""
     assert isinstance(obj, Dictionary)
-    if len(key) == 1 and isinstance(key[0], str | int | float | bool | type(None)):
+    if len(key) == 1 and special.is_key(key[0]):
         cell = Key(key[0])
         if not run.repeated and obj.cells.get(cell) == ABSENT:
             del obj.cells[cell]  # it comes last again; undone, it is as absent as before

@@ -91,7 +91,7 @@ def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Fr
         run.unrolled = unrolled if certain else unrolled * (index + 1)
         try:
             element = next(source, None) if index < limit else _stop()
-        except (NotConcrete, TypeError):
+        except NotConcrete:
             _rest(run, node, iterated, seen, frame)
             break
         if element is None:

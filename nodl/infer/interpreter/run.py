@@ -32,6 +32,7 @@ from nodl.infer.values import (
     Items,
     LocalCells,
     ModuleValue,
+    NativeObject,
     Sequence,
     Unknown,
     Value,
@@ -126,6 +127,7 @@ class Run(Allocations):
         self.steps = 0
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
+        self.generators: dict[object, NativeObject] = {}  # in the hands of others, by the call that made them
         self.called_back: dict[
             tuple[object, int | None], WhatWasRead
         ] = {}  # what callbacks read when they last ran
@@ -323,9 +325,21 @@ class Run(Allocations):
             elif kind is ForeignMethod or kind is External:
                 if self.tables.creates(atom):
                     self.callbacks.setdefault(atom, None)
+            elif isinstance(atom, NativeObject):
+                if atom.place is not None:
+                    self._escape_generator(atom)
             elif isinstance(atom, (Variables, SuperProxy)) and objects:
                 held = atom.owner if isinstance(atom, Variables) else atom.receiver
                 self.escape_value((held,), opened, objects, depth + 1)
+
+    def _escape_generator(self, made: NativeObject) -> None:
+        """Others may run it to its end. What one call makes is one callback; other arguments make them unknown."""
+        first = self.generators.setdefault(made.place, made)
+        self.callbacks.setdefault(first, 0)
+        for name, value in made.given.items():
+            if join(first.given[name], value) is not first.given[name]:
+                first.given[name] = ANY
+                self.state.opened += 1
 
     def escape_object(self, atom: ClassValue | Instance, trusted: bool = False) -> None:
         """Code that is not analysed has the class or object: it may make objects and call methods.

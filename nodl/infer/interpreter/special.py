@@ -8,7 +8,17 @@ from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import BoundMethod
-from nodl.infer.values import ANY, BOTTOM, ClassValue, FunctionValue, Instance, Value, join
+from nodl.infer.values import (
+    ANY,
+    BOTTOM,
+    ClassValue,
+    External,
+    FunctionValue,
+    Instance,
+    Sequence,
+    Value,
+    join,
+)
 
 OPERATORS: dict[type, str] = {
     ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.Div: "truediv", ast.FloorDiv: "floordiv", ast.Mod: "mod",
@@ -143,3 +153,34 @@ def spoken_each(run: Run, args: Arguments, node: ast.AST, frame: Frame) -> Argum
     positional = [spoken(run, value, node, frame, empty) for value in args.positional]
     keywords = {name: spoken(run, value, node, frame, empty) for name, value in args.keywords.items()}
     return Arguments(positional, keywords, args.more, args.more_keywords)
+
+
+def is_constant(atom: object) -> bool:
+    """Whether ``atom`` is a constant that a dictionary can have as a key."""
+    return isinstance(atom, str | int | float | bool | type(None))
+
+
+def is_key(atom: object) -> bool:
+    """Whether a dictionary finds ``atom`` by what it is: a constant, tuples of such, what equals itself only."""
+    if isinstance(atom, External):
+        return "(" not in atom.path  # else it stands for whatever a library gives
+    if isinstance(atom, Sequence):
+        exact = atom.items.exact if atom.kind == "tuple" else None
+        return exact is not None and all(len(part) == 1 and type(part[0]) in (str, int) for part in exact)
+    if isinstance(atom, Instance):
+        return isinstance(atom.cls, ClassValue) and not atom.summary and _equals_itself_only(atom.cls)
+    if isinstance(atom, FunctionValue):
+        return not atom.shared
+    return is_constant(atom) or (isinstance(atom, ClassValue) and not atom.summary)
+
+
+_COMPARED_BY_IDENTITY = frozenset({"builtins.object", "enum.Enum", "enum.Flag", "abc.ABC", "rclpy.node.Node"})
+
+
+def _equals_itself_only(cls: ClassValue) -> bool:
+    return all(
+        base.path in _COMPARED_BY_IDENTITY
+        if isinstance(base, External)
+        else isinstance(base, ClassValue) and base.fields is None and "__eq__" not in base.cells
+        for base in linearized(cls)
+    )

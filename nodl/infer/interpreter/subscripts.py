@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 
+from nodl.infer.interpreter import special
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.iterate import values_of
 from nodl.infer.interpreter.raising import throw
@@ -112,12 +113,10 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
     everything = False
     everywhere = not obj.escaped
     for atom in key:
-        if isinstance(atom, str | int | float | bool | type(None)):
-            held, certain = obj.held(atom)
-            result = join(result, held)
-            everywhere = everywhere and certain
-        else:
-            everything = True
+        held, certain = obj.held(atom) if special.is_key(atom) else (BOTTOM, False)
+        result = join(result, held)
+        everywhere = everywhere and certain
+        everything = everything or not (held or special.is_constant(atom))
     if everything:
         run.spend(len(obj.cells))
         result = join(result, values_of(obj).any_element())

@@ -166,6 +166,8 @@ def _real_dictionary(run: Run, atom: Dictionary, value: Value, call: Call, deep:
     entries = atom.entries()
     if atom.is_open or atom.summary or level > 20 or not all(certain for _, _, certain in entries):
         return Opaque(value)
+    if not all(isinstance(key.constant, CONSTANTS) for key, _, _ in entries):
+        return Opaque(value)
     run.spend(len(entries))
     real = {key.constant: to_python(run, held, call, deep, level + 1) for key, held, _ in entries}
     return collections.Counter(real) if atom.kind == "Counter" else real
@@ -240,6 +242,16 @@ def _from_dictionary(run: Run, found: dict[Any, Any], call: Call, place: str) ->
 # --- computing ----------------------------------------------------------------------------------------------
 
 
+_ERRORS = (
+    ValueError,
+    TypeError,
+    LookupError,
+    ArithmeticError,
+    AttributeError,
+    re.error,
+)  # of a pure function
+
+
 def compute(
     run: Run,
     function: Callable[..., Any],
@@ -266,15 +278,7 @@ def compute(
         return from_python(run, function(*positional, **keywords), call)
     except (NotConcrete, RecursionError, MemoryError):
         return None
-    except (
-        ValueError,
-        TypeError,
-        LookupError,
-        ArithmeticError,
-        AttributeError,
-        StopIteration,
-        re.error,
-    ) as error:
+    except (*_ERRORS, StopIteration) as error:
         if _holds_opaque((*positional, *keywords.values(), owner)):
             return None  # it may be about what is not known
         throw(run, type(error) if type(error).__module__ == "builtins" else "ValueError", str(error))
@@ -307,10 +311,14 @@ def _check_size(given: tuple[object, ...]) -> None:
 
 
 def pulled(run: Run, obj: NativeObject, call: Call) -> Iterator[Value]:
-    """The elements of a real iterable, one by one. Raises ``NotConcrete``."""
+    """The elements of a real iterable, one by one. Raises ``NotConcrete``, also where the iterable itself raises."""
     iterable: Any = obj.object
-    for index, each in enumerate(iter(iterable)):
-        yield from_python(run, each, call, f"pulled {index}")
+    try:
+        for index, each in enumerate(iterable):
+            yield from_python(run, each, call, f"pulled {index}")
+    except _ERRORS as error:
+        run.risks += 1
+        raise NotConcrete from error
 
 
 def lose(run: Run, obj: NativeObject) -> Value:

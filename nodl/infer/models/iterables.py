@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from nodl.infer.interpreter import special
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.expressions import copy_dictionary
 from nodl.infer.interpreter.frames import Arguments, Call
@@ -165,7 +166,7 @@ def _store_pairs(run: Run, obj: object, items: Items, call: Call) -> None:
     for pair in items.exact if items.exact is not None else (items.any_element(),):
         parts = elements(run, pair, call.node, call.frame).exact
         key = sole(parts[0]) if parts and len(parts) == 2 else None
-        if parts and isinstance(key, str | int):
+        if parts and len(parts) == 2 and special.is_key(key):
             run.state.store(obj, Key(key), parts[1])
         else:
             value = parts[1] if parts and len(parts) == 2 else ANY

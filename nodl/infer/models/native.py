@@ -24,6 +24,7 @@ from nodl.infer.values import (
     ITEMS,
     NONE,
     OTHER,
+    OTHER_KEYS,
     Dictionary,
     Instance,
     Items,
@@ -285,12 +286,10 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     found = present(owner.cells.get(OTHER, BOTTOM))
     missing = False
     for atom in key:
-        if isinstance(atom, str | int | float | bool | type(None)):
-            held, certain = owner.held(atom)
-            missing = missing or not certain
-            found = join(found, held)
-        else:
-            missing = True
+        held, certain = owner.held(atom) if special.is_key(atom) else (BOTTOM, False)
+        missing = missing or not certain
+        found = join(found, held)
+        if not held and not special.is_constant(atom):
             found = join(found, values_of(owner).any_element())
     if missing or owner.is_open:
         found = join(found, call.args.at(1, "default") or NONE)
@@ -316,8 +315,10 @@ def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
     if keys.exact is not None and values.exact is not None:
         pairs = tuple(run.tuple_of((key, value)) for key, value in zip(keys.exact, values.exact, strict=True))
         return run.sequence(call.node, "list", Items(pairs))
-    pair = run.tuple_of((keys.any_element() or ANY, values.any_element() or ANY))
-    return run.sequence(call.node, "list", Items(None, pair))
+    key, value = keys.any_element() or ANY, values.any_element() or ANY
+    if len(owner.cells.get(OTHER_KEYS, BOTTOM)) > 1 and len(value) > 1:
+        key = ANY  # which of them goes with which value was not kept
+    return run.sequence(call.node, "list", Items(None, run.tuple_of((key, value))))
 
 
 def _update(run: Run, owner: Dictionary, call: Call) -> Value:
