@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -219,8 +220,15 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
                 model(run, Call(call, frame, [value], (), (), atom))
     elif owner is not None and name in ("at", "front", "back") and holders:
         assign(run, owner, tuple(_one_of(atom, value) for atom in holders), frame)
-    elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value):
+    elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value) or _gives_reference(run, function):
         run.gap(call, frame, f"what {text(call)[:60]} = ... writes to is not known")
+
+
+def _gives_reference(run: Machine, callee: Node | None) -> bool:
+    """Whether a function of the program gives a reference."""
+    listed = run.names.functions_by_name.get(text(callee).partition("<")[0].rpartition("::")[2], ())
+    declarators = [each.node.child_by_field_name("declarator") for each in listed]
+    return any(each is not None and each.type == "reference_declarator" for each in declarators)
 
 
 def _one_of(atom: object, value: Value) -> object:
@@ -286,6 +294,8 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     owners = run.evaluate(node.child_by_field_name("argument"), frame)
     name = text(node.child_by_field_name("field")).rpartition("::")[2]
     objects = [atom for atom in owners if isinstance(atom, Obj)]
+    if is_plain(value) and re.search(r"->second\.", text(node)) and not objects:
+        through(run, node, frame)
     if any(isinstance(atom, Group) for atom in owners) and name in ("first", "second"):
         _assign_half(run, node, owners, name, value, frame)
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:

@@ -299,6 +299,9 @@ def _sequence_call(
         return (not atom.items,) if exact else unknown("a condition")
     if name == "clear" and receiver is not None:
         assign(run, receiver, (Seq(()),), frame)
+    elif name == "fill" and receiver is not None and values and isinstance(atom, Seq):
+        filled_with = Seq(tuple(values[0] for _ in atom.items)) if exact else open_sequence((values[0],))
+        assign(run, receiver, (filled_with,), frame)
     elif (
         name == "resize"
         and exact

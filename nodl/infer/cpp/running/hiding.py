@@ -83,7 +83,7 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     if node.type in ("compound_literal_expression", "new_expression", "cast_expression"):
         return run.type_of(text(node.child_by_field_name("type")), frame)
     if node.type == "subscript_expression":
-        return _element(seen_type(run, node.child_by_field_name("argument"), frame))
+        return element_type(seen_type(run, node.child_by_field_name("argument"), frame))
     if node.type == "this":
         return _of_this(run, frame)
     if node.type == "field_expression":
@@ -93,7 +93,8 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     return _of_variable(run, node, frame)
 
 
-def _element(kind: Type) -> Type:
+def element_type(kind: Type) -> Type:
+    """Of a container the type of its elements, of a map that of its values."""
     return kind.arguments[-1] if kind.arguments and kind.last != "array" else (*kind.arguments, NO_TYPE)[0]
 
 
@@ -130,7 +131,7 @@ def _of_call(run: Machine, node: Node, frame: Frame) -> Type:
         inner = seen_type(run, callee.child_by_field_name("argument"), frame)
         name = callee_name(callee.child_by_field_name("field") or callee)
         if name in _GIVES_INNER | _GIVES_ELEMENT:
-            return inner if name in _GIVES_INNER else _element(inner)
+            return inner if name in _GIVES_INNER else element_type(inner)
         return _returned(run, inner, name, frame)
     name, given = callee_name(callee), children(node.child_by_field_name("arguments"))
     if name in _KEEPS and given:
@@ -178,5 +179,5 @@ def _initialised(run: Machine, name: str, around: Node, frame: Frame) -> Type:
             each.type == "for_range_loop"
             and text(each.child_by_field_name("declarator")).lstrip("& *") == name
         ):
-            found.add(_element(seen_type(run, each.child_by_field_name("right"), frame)))
+            found.add(element_type(seen_type(run, each.child_by_field_name("right"), frame)))
     return found.pop() if len(found) == 1 else NO_TYPE

@@ -75,6 +75,22 @@ def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Fra
     return join(*found)
 
 
+def by_operator(
+    run: Machine, sign: str, left: Value, right: Sequence[Value], node: Node, frame: Frame
+) -> Value | None:
+    """What an operator of the program's own gives; ``None`` where an operand is no object, or there is none for it."""
+    objects = [a for value in (left, *right) for a in value if isinstance(a, Obj) and a.cls is not None]
+    if not objects:
+        return None
+    name, this = f"operator{sign}", left[0] if len(left) == 1 else None
+    if isinstance(this, Obj) and this.cls is not None and run.names.find_methods(this.cls, name):
+        return call_methods(run, run.names.find_methods(this.cls, name), this, right, node, frame, ())
+    free = run.names.find_functions(name, frame.scope, frame.file)
+    if not chosen(free, [left, *right]):
+        return None
+    return call_functions(run, free, [left, *right], node, frame, ())
+
+
 def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Sequence[Value]]]:
     """The object and arguments of a call; a method without its object gets that as its first argument."""
     function = atom.function
@@ -152,14 +168,15 @@ def _meant(
     special = [each for each in functions if each.specialises is not None]
     if not special:
         return functions
-    if not arguments:
-        run.gap(node, frame, f"which specialisation of {special[0].name} is called is not known")
     found = [
         f
         for f in special
         if [run.names.resolve(t, f.scope, f.file) for t in f.specialises or ()] == [*arguments]
     ]
-    return found or [each for each in functions if each.specialises is None]
+    general = [each for each in functions if each.specialises is None]
+    if not arguments or not (found or general):
+        run.gap(node, frame, f"which specialisation of {special[0].name} is called is not known")
+    return found or general or functions
 
 
 def _of_class(

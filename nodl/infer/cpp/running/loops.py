@@ -10,12 +10,13 @@ from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.frames import Frame, Loop
+from nodl.infer.cpp.running.hiding import element_type, seen_type
 from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Machine, statement
 from nodl.infer.cpp.running.references import elements_written
 from nodl.infer.cpp.running.statements import bind_names, condition_value, in_a_block
 from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.values import Value, join, unknown
-from nodl.infer.cpp.syntax import text, unwrapped, walk
+from nodl.infer.cpp.syntax import children, text, unwrapped, walk
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -43,7 +44,7 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
         ):
             bind_names(run, [text(name) for name in names], item, frame)
         elif names:
-            by_value = "&" not in text(declarator)
+            by_value = not set("&*") & set(text(declarator)) and not _points(run, right, frame)
             kind = run.type_of(written, frame)
             cls = None if kind.pointer else run.names.class_of(kind, frame.scope, frame.file)
             own = copied(run, item, node, frame, cls) if by_value else item
@@ -60,6 +61,13 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
         if body is not None and elements_written(run, body, names, frame):
             assign(run, right, unknown("what a loop writes to the elements"), frame)
     return outcome
+
+
+def _points(run: Machine, right: Node | None, frame: Frame) -> bool:
+    """Whether the elements are pointers."""
+    if right is not None and right.type == "initializer_list":
+        return any(each.type == "pointer_expression" for each in children(right))
+    return element_type(seen_type(run, right, frame)).pointer
 
 
 def _is_variable(node: Node) -> bool:

@@ -75,7 +75,8 @@ def declared_value(
     if value is None:
         return BOTTOM if pointer or kind.pointer else default_value(run, node, kind, frame)
     if pointer or kind.pointer or _is_auto(written) or kind.name in _SCALARS:
-        found = initial_value(run, value, frame, pointer or (_is_auto(written) and "&" in written))
+        by_reference = pointer or (kind.pointer and "optional" not in written)
+        found = initial_value(run, value, frame, by_reference or (_is_auto(written) and "&" in written))
         if "optional" in written and not pointer:
             found = copied(run, found, node, frame, run.names.class_of(kind, frame.scope, frame.file))
         return found if pointer or kind.pointer else as_type(kind.name, found)

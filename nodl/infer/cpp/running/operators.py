@@ -10,7 +10,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import class_of_member
-from nodl.infer.cpp.running.invocation import pointed_to
+from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import settled_text, text_of
 from nodl.infer.cpp.running.machine import NEXT, Machine, expression
 from nodl.infer.cpp.running.numbers import added, arithmetic
@@ -73,6 +73,9 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if operator in ("&&", "||", "and", "or"):
         return _logical(run, operator in ("||", "or"), left, right_node, frame)
     right = run.evaluate(right_node, frame)
+    own = by_operator(run, operator, left, [right], node, frame)
+    if own is not None:
+        return own
     if operator == ">>" and has_text(left):
         return _extracted(run, left_node, left, right_node, frame)
     if operator == "<<" and not (len(left) == 1 and isinstance(left[0], int)):
@@ -192,6 +195,9 @@ def unary(run: Machine, node: Node, frame: Frame) -> Value:
     """``!x``, ``-x`` and ``+x``; unknown for other operators and for what cannot be computed."""
     operator = text(node.child_by_field_name("operator"))
     value = run.evaluate(node.child_by_field_name("argument"), frame)
+    own = by_operator(run, operator, value, [], node, frame)
+    if own is not None:
+        return own
     if operator in ("!", "not"):
         known = truth(value)
         return unknown("a condition") if known is None else (not known,)
@@ -250,6 +256,9 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
     """``++x`` or ``x--``; an ``x`` that was not one known integer becomes unknown."""
     argument = node.child_by_field_name("argument")
     before = run.evaluate(argument, frame)
+    own = by_operator(run, "++" if "++" in text(node) else "--", before, [], node, frame)
+    if own is not None:
+        return own
     step = 1 if "++" in text(node) else -1
     after = (before[0] + step,) if len(before) == 1 and isinstance(before[0], int) else unknown("a counter")
     if argument is not None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import NEXT, Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -155,6 +156,11 @@ def _calls_back(
 ) -> Value:
     from nodl.infer.cpp.running.invocation import call_values
 
+    elements = tuple(join(*items_of(run, atom)[0]) for atom in values[0]) if values else ()
+    for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
+        run.branches(
+            [partial(_once, run, atom, elements, node, frame), lambda: NEXT]
+        )  # before what follows, or not
     callee = next(
         (at for at, value in enumerate(values) if any(isinstance(a, Lambda | Bound) for a in value)), 0
     )
@@ -167,6 +173,13 @@ def _calls_back(
         for atom in value:
             run.later(atom, frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
+
+
+def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, frame: Frame) -> int:
+    from nodl.infer.cpp.running.invocation import call_values
+
+    call_values(run, (atom,), [join(*elements)] if elements else [], node, frame)
+    return NEXT
 
 
 @_standard("std::find_if", "std::find")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.contents import handed_over, nodes_in
+from nodl.infer.cpp.running.contents import copied, handed_over, nodes_in, overwrite
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
@@ -107,11 +107,30 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
     """``std::reverse(x.begin(), x.end())``, ``std::getline(stream, x)``: every variable among the arguments, also that
     of ``std::back_inserter(x)``, may have changed."""
     seen: set[str] = set()
+    targets = [target for each in given for target in _variables(each)]
+    if name == "std::swap" and len(targets) == 2 and _swapped(run, targets, frame):
+        return
     for each in given:
         for target in _variables(each):
             if text(target) not in seen:
                 seen.add(text(target))
                 _changed(run, name, target, frame)
+
+
+def _swapped(run: Machine, targets: Sequence[Node], frame: Frame) -> bool:
+    """``std::swap(a, b)`` of two objects, or of pointers to one each; whether it was one."""
+    first, second = (run.evaluate(target, frame) for target in targets)
+    objects = [a for a in (*first, *second) if isinstance(a, Obj) and a.cls is not None and a.node is None]
+    if len(first) != 1 or len(second) != 1 or len(objects) != 2:
+        return False
+    if objects[0].heap or objects[1].heap:
+        assign(run, targets[0], second, frame)
+        assign(run, targets[1], first, frame)
+        return True
+    kept = copied(run, first, targets[0], frame, objects[0].cls)
+    overwrite(run, objects[:1], second)
+    overwrite(run, objects[1:], kept)
+    return True
 
 
 def _variables(given: Node) -> list[Node]:

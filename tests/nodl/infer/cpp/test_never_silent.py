@@ -298,3 +298,36 @@ def test_a_call_that_is_not_followed_is_told_though_its_target_ran_elsewhere(
     members += "void pub(std::string t) { create_publisher<std_msgs::msg::String>(t, 1); }"
     system = infer(tmp_path, in_class(f'pub("a"); {body}', members))
     assert "b" in names(system) or gaps(system) or any("?" in each for each in names(system))
+
+
+def test_a_template_of_which_only_other_specialisations_are_in_reach_is_told(tmp_path: Path) -> None:
+    before = "template <typename T> struct P { std::string text(); };\n"
+    before += 'template <> std::string P<int>::text() { return "of_int"; }\n'
+    use = "create_publisher<std_msgs::msg::String>(P<{}>().text(), 1);"
+    known, other = (
+        infer(tmp_path / kind, in_class(use.format(kind), before=before)) for kind in ("int", "char")
+    )
+    assert names(known) == ["of_int"]
+    assert gaps(known) == []
+    assert any("which specialisation of text" in why for why in gaps(other))
+
+
+WRITTEN = {
+    "by an operator": ("b << 1;", 'B & operator<<(int) { t = "a"; return *this; }'),
+    "by a free operator": ("b + 1;", ""),
+    "by a sign before it": ("++b;", 'B & operator++() { t = "a"; return *this; }'),
+    "by a comparison": ("if (b == b) {}", 'bool operator==(const B &) { t = "a"; return true; }'),
+    "in a thread": ('std::thread w([&]() { b.t = "a"; }); w.join();', ""),
+    "by an algorithm": ('std::for_each(v.begin(), v.end(), [](B & e) { e.t = "a"; }); b = v[0];', ""),
+    "by a swap": ('B c; c.t = "a"; std::swap(b, c);', ""),
+    "through a list of pointers": ('for (auto p : {&b}) { p->t = "a"; }', ""),
+    "through a wrapped reference": ('std::reference_wrapper<B> r = b; r.get().t = "a";', ""),
+}
+
+
+@pytest.mark.parametrize(("body", "members"), WRITTEN.values(), ids=WRITTEN)
+def test_what_is_written_in_a_way_of_its_own_is_seen(body: str, members: str, tmp_path: Path) -> None:
+    before = f'struct B {{ std::string t = "x"; {members} }};\n'
+    before += 'B & operator+(B & b, int) { b.t = "a"; return b; }\n'
+    use = f"std::vector<B> v(1); B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
+    assert "a" in names(infer(tmp_path, in_class(use, before=before)))
