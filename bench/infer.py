@@ -82,7 +82,7 @@ def main() -> int:
     args = parser.parse_args()
     if args.cpp:
         print(
-            f"{'sources':24}{'cold cpu s':>12}{'cold s':>9}{'warm s':>9}{'nodes':>7}{'programs':>10}"
+            f"{'sources':24}{'cold cpu s':>12}{'cold s':>9}{'warm cpu s':>12}{'warm s':>9}{'nodes':>7}{'programs':>10}"
             f"{'known':>11}{'complete':>10}{'gaps':>6}"
         )
         for given in args.cpp:
@@ -157,9 +157,9 @@ def compiled(folder: Path) -> None:
         before, started = processor_seconds(), time.perf_counter()
         system = infer_paths([folder])
         cold, cold_wall = processor_seconds() - before, time.perf_counter() - started
-        started = time.perf_counter()
+        before, started = processor_seconds(), time.perf_counter()
         infer_paths([folder])
-        warm = time.perf_counter() - started
+        warm, warm_wall = processor_seconds() - before, time.perf_counter() - started
     ends = [endpoint for node in system.nodes for endpoint in node.endpoints]
     known = [each for each in ends if each.certainty not in (Certainty.UNKNOWN, Certainty.PATTERN)]
     gaps = {(gap.source, gap.why) for gap in (*system.gaps, *(g for node in system.nodes for g in node.gaps))}
@@ -168,7 +168,7 @@ def compiled(folder: Path) -> None:
     ]
     programs = {(node.package, node.executable, node.plugin) for node in system.nodes}
     print(
-        f"{folder.name:24}{cold:12.1f}{cold_wall:9.1f}{warm:9.2f}{len(system.nodes):7}{len(programs):10}"
+        f"{folder.name:24}{cold:12.1f}{cold_wall:9.1f}{warm:12.2f}{warm_wall:9.2f}{len(system.nodes):7}{len(programs):10}"
         f"{f'{len(known)}/{len(ends)}':>11}{len(complete):10}{len(gaps):6}",
         flush=True,
     )

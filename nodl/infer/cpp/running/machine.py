@@ -91,7 +91,7 @@ class Machine:
     def __init__(self, names: Names, settings: Settings | None = None):
         self.names = names
         self.settings = settings or Settings()
-        self.store = AbstractStore()
+        self.store = AbstractStore(self.count)
         self.memory = Memory(self.store)
         self.size = Notes(self.store.log)  # how many nodes and classes the program has, so far
         self.nodes: dict[NodeRecord, None] = {}

@@ -11,6 +11,7 @@ from nodl.infer.cpp.running.values import BOTTOM, Value, join
 Cell = tuple[object, str]
 Changes = dict[Cell, Value]
 _ABSENT: Value = (("absent",),)
+_LOOKED_AT_IN_A_STEP = 64
 
 
 class Reads(NamedTuple):
@@ -23,7 +24,9 @@ class Reads(NamedTuple):
 class AbstractStore:
     """What every cell holds now; writes can be undone and joined, reads watched."""
 
-    def __init__(self) -> None:
+    def __init__(self, spend: Callable[[int], None] = lambda steps: None) -> None:
+        """``spend`` is told the steps that long looks at the trail count for; what it raises ends the run."""
+        self._spend = spend
         self._cells: dict[Cell, Value] = {}
         self._trail: list[tuple[Cell, Value]] = []
         self._reads: set[Cell] | None = None
@@ -83,6 +86,7 @@ class AbstractStore:
 
     def changes(self, mark: int) -> Changes:
         """What was written since ``mark``, as it is now."""
+        self._spend((len(self._trail) - mark) // _LOOKED_AT_IN_A_STEP)
         cells = self._cells
         return {
             cell: cells[cell]

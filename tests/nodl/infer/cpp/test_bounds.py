@@ -1,0 +1,60 @@
+"""What one program may take is bounded, and a program that is cut off says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+from nodl.infer.cpp.running.store import AbstractStore
+from nodl.infer.cpp.running.values import literal
+
+LOOPS = "for (int i = 0; i < 40; ++i) { for (int j = 0; j < 40; ++j) { sum = sum + i * j; } }"
+
+
+def test_a_program_that_is_cut_off_says_so_and_tells_the_place_that_was_not_reached(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nodl.infer.cpp.running.machine.MAX_STEPS", 3_000)
+    system = infer(
+        tmp_path,
+        in_class(
+            'create_publisher<std_msgs::msg::String>("before", 1);' + LOOPS
+            + 'create_publisher<std_msgs::msg::String>("behind", 1);',
+            "int sum = 0;",
+        ),
+    )  # fmt: skip
+    told = gaps(system)
+    assert names(system) == ["before"]
+    assert "this program is too large to be followed to its end" in told
+    assert any(each.startswith("create_publisher was not followed") for each in told)
+
+
+def test_one_that_comes_to_its_end_does_not(tmp_path: Path) -> None:
+    system = infer(
+        tmp_path, in_class(LOOPS + 'create_publisher<std_msgs::msg::String>("behind", 1);', "int sum = 0;")
+    )
+    assert names(system) == ["behind"]
+    assert gaps(system) == []
+
+
+def test_long_looks_back_at_what_was_written_count_as_steps_and_short_ones_do_not() -> None:
+    spent: list[int] = []
+    store = AbstractStore(spent.append)
+    for number in range(640):
+        store.set(("object", str(number)), literal("x"))
+    store.changes(630)
+    store.changes(0)
+    assert spent == [0, 10]
+
+
+def test_a_template_that_is_only_declared_may_be_any_of_its_specialisations(tmp_path: Path) -> None:
+    before = """template<typename T> void make(rclcpp::Node * n);
+template<> void make<int>(rclcpp::Node * n) { n->create_publisher<std_msgs::msg::String>("number", 1); }
+"""
+    assert names(infer(tmp_path, in_class("make<Other>(this);", before=before))) == ["number"]
+    assert names(infer(tmp_path, in_class("make<int>(this);", before=before))) == ["number"]
