@@ -213,6 +213,8 @@ def test_where_there_is_nothing_to_read_no_reader_is_imported(tmp_path: Path) ->
     assert {"nodl.infer.executable", "nodl.library"} <= loaded
     readers = {"nodl.infer.cpp.reading.project", "nodl.document.v2", "nodl.document.v1", "json"}
     assert loaded.isdisjoint(readers)
+    late = {"shutil", "traceback", "signal", "threading", "shlex", "enclave_launch.policy.node_permissions"}
+    assert loaded.isdisjoint(late)  # docs/speed.md has what each takes
 
 
 def named_in_architecture() -> list[str]:

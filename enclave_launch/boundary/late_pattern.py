@@ -1,7 +1,7 @@
 """Regular expressions that are compiled when something is searched with them.
 
-Each of the hundred patterns of a dry run takes as long to compile as a small module to import, and a launch meets the
-texts for a few of them only; ``bench/resolve.py`` shows what start-up costs. Pure.
+A pattern takes as long to compile as a small module to import, and a launch meets the texts for a few of the patterns
+only; docs/speed.md has what that saves. Pure.
 """
 
 from __future__ import annotations
