@@ -297,8 +297,8 @@ def _findings(run: Machine, sources: Sources) -> Findings:
             findings.gaps.setdefault(
                 (source, f"{what} was never seen to be set: what {name}() makes is not known")
             )
-    for kind, cls in run.names.specialisations.doubts.items():
-        why = f"which specialisation of {cls.qualified} is meant by {kind} is not known"
+    for cls in run.names.specialisations.doubts.values():
+        why = f"which specialisation of {cls.qualified} is meant is not known"
         findings.gaps.setdefault((SourceRef(cls.file.file, cls.line), why))
     own = list(run.names.files.values())
     findings.answers = account(run, own)

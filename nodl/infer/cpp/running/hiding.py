@@ -63,14 +63,10 @@ def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Fra
         return atom.cls
     argument = access.child_by_field_name("argument")
     seen = seen_class(run, argument, frame)
-    if seen in run.names.ancestry(atom.cls):
-        return seen
-    run.gap(
-        access,
-        frame,
-        f"which {name} of {text(argument)[:40]} is meant is not known: a derived class hides it",
-    )
-    return atom.cls
+    if seen is None:
+        what = f"which {name} of {text(argument)[:40]} is meant is not known: a derived class hides it"
+        run.gap(access, frame, what)
+    return seen if seen in run.names.ancestry(atom.cls) else atom.cls
 
 
 def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
