@@ -89,8 +89,13 @@ class EnvironmentWatch:
         """Until cancelled."""
         pause = RAREST_LOOK
         while True:
-            with contextlib.suppress(asyncio.TimeoutError):
-                await asyncio.wait_for(self._started.wait(), pause)
+            # Not wait_for: until Python 3.12 it loses a cancellation that comes together with what it waits for.
+            started = asyncio.ensure_future(self._started.wait())
+            try:
+                await asyncio.wait({started}, timeout=pause)
+            finally:
+                started.cancel()
+            if self._started.is_set():
                 self._started.clear()
                 pause = FIRST_LOOK
                 await asyncio.sleep(pause)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import os
 import subprocess
 import sys
@@ -11,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.runtime.environment_watch import (
+    EnvironmentWatch,
     Watched,
     environment_of,
     unplanned,
@@ -125,6 +127,22 @@ def test_a_node_whose_prefix_drops_its_enclave_is_ended(tmp_path: Path) -> None:
     kept = run("env MORE=1")
     assert kept.returncode == 0, kept.stdout
     assert "was ended" not in kept.stdout
+
+
+def test_a_launch_that_ends_as_something_starts_ends() -> None:
+    """A process that cannot be started is one that was going to be: the watch is woken and cancelled at once."""
+
+    async def main() -> None:
+        watch = EnvironmentWatch(list, lambda found: None)
+        task = asyncio.ensure_future(watch.run())
+        await asyncio.sleep(0)
+        watch.process_started()
+        await asyncio.sleep(0)
+        task.cancel()
+        await asyncio.wait({task}, timeout=5)
+        assert task.cancelled()
+
+    asyncio.run(main())
 
 
 FOREIGN = """
