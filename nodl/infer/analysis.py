@@ -130,10 +130,10 @@ def is_node(cls: ClassValue) -> bool:
     return any(isinstance(base, External) and is_node_class(base.path) for base in linearized(cls))
 
 
-def _creates(run: Run, node: ast.AST, cls: ClassValue | None) -> bool:
+def _creates(run: Run, node: ast.stmt, cls: ClassValue | None) -> bool:
     if cls is not None and is_node(cls):
         return True
-    first, last = node.lineno, node.end_lineno or node.lineno  # type: ignore[attr-defined]
+    first, last = node.lineno, node.end_lineno or node.lineno
     places = _creating_lines(run.main)
     index = bisect_left(places, first)
     return index < len(places) and places[index] <= last

@@ -11,6 +11,9 @@ import pytest
 
 from nodl.infer import infer_executable, python_program
 from nodl.infer.kept import own_sources
+from nodl.infer.program import Program
+from nodl.infer.python_executable import ProgramTarget
+from nodl.infer.start import LaunchKey
 
 PROGRAM = """\
 #!/usr/bin/python3
@@ -60,9 +63,9 @@ def analyses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     seen: list[str] = []
     really = python_program.infer_program
 
-    def infer_program(*given: object) -> object:
-        seen.append(str(given[2]))
-        return really(*given)  # type: ignore[arg-type]
+    def infer_program(program: Program, target: ProgramTarget, path: str, origin: LaunchKey) -> object:
+        seen.append(path)
+        return really(program, target, path, origin)
 
     monkeypatch.setattr(python_program, "infer_program", infer_program)
     return seen
