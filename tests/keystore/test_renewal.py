@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -50,7 +51,11 @@ def renewing(**changes: object) -> RenewOptions:
 def sros2(tmp_path: Path) -> Path:
     """A keystore as SROS2 writes it: one CA, CN=/path, no key usage, keys readable by all."""
     grants = {name: sros2_style.Grant(publish=("/chatter",)) for name in ARTICLE}
-    sros2_style.create(tmp_path / "sros2", 0, grants)
+    before = os.umask(0o022)  # SROS2 leaves keys to the umask: with this one all can read them
+    try:
+        sros2_style.create(tmp_path / "sros2", 0, grants)
+    finally:
+        os.umask(before)
     return tmp_path / "sros2"
 
 
