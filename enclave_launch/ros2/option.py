@@ -91,7 +91,7 @@ def names_keystore(words: Sequence[str]) -> bool:
 
 def _looked_at(args: argparse.Namespace) -> int:
     """As ``secure-launch --dry-run`` and its like: the plan is printed, nothing starts. Gives the exit status."""
-    from enclave_launch.flow import resolve  # half of all our modules: a plain `ros2 launch` does without
+    from enclave_launch.flow import resolve  # 78 modules that a plain `ros2 launch` does without
 
     path, arguments = target_of(args)
     keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
