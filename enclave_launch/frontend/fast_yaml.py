@@ -194,7 +194,7 @@ def _read(text: str, loader: Any) -> bytes | None:
     try:
         refuse_deep_nesting(text)
         return marshal.dumps(_values(text, loader))
-    except Exception:  # dates cannot be packed; whatever else it is, PyYAML says it in its own words
+    except Exception:  # dates cannot be packed; other errors PyYAML meets again and words itself
         return None
 
 

@@ -33,8 +33,8 @@ _APPLY = (
 
 
 class Explanation(NamedTuple):
-    """``who`` may not do ``what``; ``why``, and ``remedy`` as commands or steps. ``policy``: the policy file that
-    grants it and nothing else, "" where more rights are no answer."""
+    """``who`` may not do ``what``; ``why``, and ``remedy`` as commands or steps. ``policy``: a policy file that
+    grants just this; empty where granting more would not help."""
 
     who: str
     what: str

@@ -57,7 +57,7 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'pub("b" + std::to_string(0B101)); pub("t" + std::to_string(1\'000u)); pub("z" + std::to_string(0));',
         "", "", {"h31", "i31", "o15", "b5", "t1000", "z0"}, {"h1", "o17", "b101"},
     ),
-    "a text of so many letters is no number": (
+    "std::string(3, 'a') is three letters, not the number 3": (
         "pub(std::string(3, 'a')); std::string s(2, 'b'); pub(s);", "", "", {"aaa", "bb"}, {"3", "2"},
     ),
     "letters are written as numbers": (r'pub("\x61\142c");', "", "", {"abc"}, {"x61142c"}),
