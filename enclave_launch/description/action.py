@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.entity import LaunchDescriptionEntity, creation_location
+from enclave_launch.description.events.event import ExecutionComplete
 from enclave_launch.host.user_code import executed_once, is_users
 
 if TYPE_CHECKING:
@@ -86,8 +87,6 @@ class Action(LaunchDescriptionEntity):
 def _tell_completion(action: Action, context: LaunchContext) -> None:
     """Emit ``ExecutionComplete``, at once or when the action's future is done; only if a handler registered
     by now would take it."""
-    from enclave_launch.description.events.event import ExecutionComplete
-
     event = ExecutionComplete(action=action)
     if not context.would_handle_event(event):
         return

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+from enclave_launch.description.argument_scan import collect_arguments
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.diagnostics.evaluation import launch_file_deprecated
 
@@ -69,6 +70,4 @@ class LaunchDescription(LaunchDescriptionEntity):
 
         That list is shared by everything below one include of this description, as upstream.
         """
-        from enclave_launch.description.argument_scan import collect_arguments
-
         return collect_arguments(self, conditional_inclusion)

@@ -13,6 +13,7 @@ from typing import Any
 
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.description.upstream_paths import GATES, PATHS
+from enclave_launch.host.current import current_release
 
 _OURS = "enclave_launch.description."
 
@@ -121,7 +122,6 @@ def _is_available(name: str, module: str) -> bool:
     gate = GATES.get(name)
     if gate is None or (module and module not in PATHS):
         return True
-    from enclave_launch.host.current import current_release
 
     return current_release().has(gate)
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from typing import Any
 
+from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
 
 
@@ -72,8 +73,6 @@ def get_ros_adapter(context: LaunchContext) -> ROSAdapter:
     """The adapter of this launch, made on first use and shut down with it."""
     adapter: ROSAdapter | None = getattr(context.locals, "ros_adapter", None)
     if adapter is None:
-        from enclave_launch.description.events.handlers import OnShutdown
-
         adapter = started = ROSAdapter()
         context.extend_globals({"ros_adapter": adapter})
         context.register_event_handler(OnShutdown(on_shutdown=lambda *_: started.shutdown()))

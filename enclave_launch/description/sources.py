@@ -7,6 +7,7 @@ from collections.abc import Callable
 from types import ModuleType
 from typing import TYPE_CHECKING
 
+from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.parser import (
     InvalidFrontendLaunchFileError as InvalidFrontendLaunchFileError,
 )
@@ -55,8 +56,6 @@ class LaunchDescriptionSource:
 
     def location_without_context(self) -> str | None:
         """The path, performed in an empty context; ``None`` when it cannot, or when there is nothing to load."""
-        from enclave_launch.description.launch_context import LaunchContext
-
         if self.__launch_description is not None:
             return None
         try:

@@ -12,9 +12,23 @@ from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from typing import TYPE_CHECKING, Any
 
+import enclave_launch
+from enclave_launch.boundary.words import did_you_mean
+from enclave_launch.description.argument_scan import check_is_description
+from enclave_launch.description.install import installed
+from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.launch_description import LaunchDescription
 from enclave_launch.description.location import OUTSIDE, place_of
+from enclave_launch.description.markup import expose
+from enclave_launch.description.sources import (
+    AnyLaunchDescriptionSource,
+    get_launch_description_from_any_launch_file,
+)
+from enclave_launch.diagnostics.evaluation import argument_unknown
 from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
 from enclave_launch.evaluation.stage import STAGE
+from enclave_launch.frontend import error_location
+from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
 from enclave_launch.host.current import active_host
 from enclave_launch.host.environment import environment_untouched
 from enclave_launch.host.plan_host import PlanHost
@@ -53,7 +67,6 @@ def evaluate(
     """
     from enclave_launch.description.events.event import IncludeLaunchDescription
     from enclave_launch.description.events.handlers import OnIncludeLaunchDescription
-    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.evaluation.explore import Explorer
 
     host = host or PlanHost()
@@ -79,8 +92,6 @@ def evaluate(
 def top_description(path: str, arguments: Arguments) -> Any:
     """The description that ``ros2 launch`` makes around a file: it includes the file with the arguments."""
     from enclave_launch.description.actions.includes import IncludeLaunchDescription
-    from enclave_launch.description.launch_description import LaunchDescription
-    from enclave_launch.description.sources import AnyLaunchDescriptionSource
 
     include = IncludeLaunchDescription(AnyLaunchDescriptionSource(path), launch_arguments=arguments)
     include.source_location = None
@@ -93,9 +104,6 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
 
     Raises ``EvaluationError`` as ``evaluate``.
     """
-    from enclave_launch.description.argument_scan import check_is_description
-    from enclave_launch.description.sources import get_launch_description_from_any_launch_file
-
     path = os.path.abspath(launch_file)
     with evaluation_surroundings(host):
         try:
@@ -112,9 +120,6 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
 def evaluation_surroundings(host: Host) -> Iterator[None]:
     """What evaluation needs around it, undone at the end: our packages under their public names, the host in
     place, the environment as it was."""
-    from enclave_launch.description.install import installed
-    from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
-
     with ExitStack() as stack:
         stack.enter_context(STAGE.cleared())
         stack.enter_context(environment_untouched())
@@ -150,8 +155,6 @@ def _collector_paused() -> Iterator[None]:
 
 def forget_elements_of_launch_files() -> None:
     """What a launch file exposed (``expose_action``) is its own."""
-    from enclave_launch.description.markup import expose
-
     python_file = sys.modules.get("enclave_launch.frontend.python_file")
     if python_file is not None:  # else none was run
         expose.forget(python_file.MODULE_NAME)
@@ -173,9 +176,6 @@ def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
 
 def _unknown_arguments(arguments: Arguments, looked_at: Collection[str]) -> Iterator[Diagnostic]:
     """``ros2 launch`` passes over a mistyped argument without a word."""
-    from enclave_launch.boundary.words import did_you_mean
-    from enclave_launch.diagnostics.evaluation import argument_unknown
-
     for name, _ in arguments:
         if name not in looked_at:
             yield argument_unknown(name, did_you_mean(name, looked_at))
@@ -202,7 +202,6 @@ def _evaluation_error(error: Exception, path: str, host: PlanHost) -> Evaluation
 def launch_file_error(error: Exception, path: str) -> EvaluationError:
     """What the visit of the launch file at ``path`` raised, with its place, its include chain and what to do next."""
     from enclave_launch.evaluation.error_text import error_text
-    from enclave_launch.frontend import error_location
 
     location, helper = _location(error, path)
     where = f" (in {helper.file}:{helper.line})" if helper else ""
@@ -212,8 +211,6 @@ def launch_file_error(error: Exception, path: str) -> EvaluationError:
 def _location(error: Exception, path: str) -> tuple[SourceLocation, SourceLocation | None]:
     """The innermost place known, with the include chain of the entity that was being visited; and the place in a
     helper module of that entity, where it came from there."""
-    from enclave_launch.frontend import error_location
-
     visited = place_of(error)
     known, frame = error_location.location_of(error), _user_frame(error)
     exact = known or frame
@@ -231,10 +228,8 @@ def _user_frame(error: BaseException) -> SourceLocation | None:
     """The innermost frame that is neither ours nor of the standard library: the user's own."""
     import sysconfig
 
-    import enclave_launch
     import keystore
     import nodl
-    from enclave_launch.frontend import error_location
 
     packages = (enclave_launch.__file__, nodl.__file__, keystore.__file__)
     ours = tuple(os.path.dirname(os.path.abspath(file)) + os.sep for file in packages if file)

@@ -10,8 +10,10 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.actions.events import EmitEvent
 from enclave_launch.description.events.dispatch import chain, run_handler
 from enclave_launch.description.events.event import Shutdown, TimerEvent
+from enclave_launch.description.events.handlers import EventHandler
 from enclave_launch.description.events.process import ProcessStarted, process_event_arguments
 from enclave_launch.description.location import location_of, place_of
 from enclave_launch.host.user_code import only_acts
@@ -173,8 +175,6 @@ class Explorer:
 
     def _report_unreached(self) -> None:
         """Handlers with entities that no event of this dry run could reach."""
-        from enclave_launch.description.events.handlers import EventHandler
-
         for handler in self._context._event_handlers.all():
             if handler.internal or id(handler) in self._fired or not isinstance(handler, EventHandler):
                 continue
@@ -199,7 +199,6 @@ def _label(handler: BaseEventHandler, event: Event) -> str | None:
 
 def _ends_with(handler: BaseEventHandler) -> str | None:
     """The process at whose end the handler ends the launch, and does nothing else."""
-    from enclave_launch.description.actions.events import EmitEvent
     from enclave_launch.description.events.process_handlers import OnProcessExit
 
     details = getattr(handler.target, "process_details", None)

@@ -11,6 +11,8 @@ from _thread import RLock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 
+from enclave_launch.description.install import installed
+from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
 from enclave_launch.host.environment import Environment, environment_snapshot, environment_untouched
 
 
@@ -25,9 +27,6 @@ class Actor:
         self._stack = ExitStack()
 
     def enter(self) -> None:
-        from enclave_launch.description.install import installed
-        from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
-
         self._stack.enter_context(environment_untouched())
         if self._environment is None:
             self._prepare()

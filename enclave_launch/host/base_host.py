@@ -14,6 +14,7 @@ from enclave_launch.diagnostics.evaluation import (
     program_not_installed,
     ros_distro_unknown,
 )
+from enclave_launch.host.loading import LoadCache
 from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult, HostOptions
 from enclave_launch.ros_rules.distro import Distro, choose_release
 from nodl import ament_index
@@ -47,8 +48,6 @@ class BaseHost:
     @property
     def loads(self) -> LoadCache:
         if self._loads is None:
-            from enclave_launch.host.loading import LoadCache
-
             self._loads = LoadCache()
         return self._loads
 

@@ -7,6 +7,8 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
+from enclave_launch.host.plan_host import PlanHost
+
 if TYPE_CHECKING:
     from enclave_launch.host.protocol import Host
     from enclave_launch.ros_rules.distro import Release
@@ -18,8 +20,6 @@ def current_host() -> Host:
     """The host of the evaluation in progress; where none is, a fresh dry-run host (library use of the classes)."""
     host = _current.get()
     if host is None:
-        from enclave_launch.host.plan_host import PlanHost
-
         host = PlanHost()
         _current.set(host)
     return host

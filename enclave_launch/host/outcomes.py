@@ -23,6 +23,8 @@ from collections.abc import Callable, Hashable, Iterable, Iterator
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.description.entity import LaunchDescriptionEntity
+from enclave_launch.description.substitution import Substitution
 from enclave_launch.host.environment import changed, environment_snapshot
 from enclave_launch.host.moment import Moment, looked_at
 
@@ -379,9 +381,6 @@ _DEPTH = 4  # list of components -> tuple of parameters -> mapping -> value
 
 
 def _held(value: Any, depth: int) -> Iterator[object]:
-    from enclave_launch.description.entity import LaunchDescriptionEntity
-    from enclave_launch.description.substitution import Substitution
-
     if isinstance(value, (LaunchDescriptionEntity, Substitution, str)) or depth > _DEPTH:
         return
     if isinstance(value, (list, tuple, set, dict)):

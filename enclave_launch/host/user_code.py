@@ -9,6 +9,11 @@ from functools import wraps
 from types import CodeType
 from typing import TYPE_CHECKING, Any, TypeVar
 
+from enclave_launch.description.events.event import Shutdown
+from enclave_launch.description.location import location_of
+from enclave_launch.diagnostics.evaluation import function_called_again
+from enclave_launch.process import Unforeseeable
+
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
 
@@ -77,23 +82,15 @@ def _wrapped(method: Callable[..., Any], called: Callable[..., Any]) -> Callable
 
 
 def _at_shutdown(context: LaunchContext) -> bool:
-    from enclave_launch.description.events.event import Shutdown
-
     return isinstance(context.get_locals_as_dict().get("event"), Shutdown)
 
 
 def _tell_unforeseeable(owner: object, function: object, context: LaunchContext) -> None:
-    from enclave_launch.description.location import location_of
-    from enclave_launch.process import Unforeseeable
-
     what = f"what {_name(function)} gives when the launch ends"
     context.host.unforeseeable(Unforeseeable(what, location_of(owner, context)))
 
 
 def _tell_called_again(owner: object, function: object, context: LaunchContext) -> None:
-    from enclave_launch.description.location import location_of
-    from enclave_launch.diagnostics.evaluation import function_called_again
-
     context.host.warn(
         function_called_again(_name(function), str(context.on_event), location_of(owner, context))
     )

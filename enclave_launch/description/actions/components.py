@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.actions.nodes import Node, parse_remaps
 from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.parser import Parser
@@ -54,8 +55,6 @@ class ComposableNode:
     @classmethod
     def parse(cls, parser: Parser, entity: Entity) -> tuple[type[ComposableNode], dict[str, Any]]:
         """Keywords from a ``composable_node`` element; raises when something in it was not understood."""
-        from enclave_launch.description.actions.nodes import Node, parse_remaps
-
         kwargs: dict[str, Any] = {
             "package": parser.parse_substitution(entity.get_attr("pkg")),
             "plugin": parser.parse_substitution(entity.get_attr("plugin")),

@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import as_path
 from enclave_launch.description.action import Action
-from enclave_launch.description.actions.components import ComposableLifecycleNode, ComposableNode
+from enclave_launch.description.actions.components import (
+    ComposableLifecycleNode,
+    ComposableNode,
+    parse_lifecycle_components,
+)
 from enclave_launch.description.actions.nodes import Node
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.entity import LaunchDescriptionEntity
@@ -79,8 +83,6 @@ class ComposableNodeContainer(Node):
 
 def parse_components(entity: Entity, parser: Parser, *, optional: bool) -> list[ComposableNode] | None:
     """The ``composable_node`` children, of newer distributions also ``composable_lifecycle_node``."""
-    from enclave_launch.description.actions.components import parse_lifecycle_components
-
     lifecycle = parse_lifecycle_components(entity, parser)
     children = entity.get_attr(
         "composable_node",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.entity import normalize_to_list_of_entities
 from enclave_launch.description.events.event import Shutdown as ShutdownEvent
+from enclave_launch.description.events.process import ProcessExited
 from enclave_launch.description.markup.expose import expose_action
 
 if TYPE_CHECKING:
@@ -83,8 +84,6 @@ class Shutdown(EmitEvent):
         return cls, kwargs
 
     def execute(self, context: LaunchContext) -> None:
-        from enclave_launch.description.events.process import ProcessExited
-
         event = context.get_locals_as_dict().get("event")
         if isinstance(event, ProcessExited):
             from enclave_launch.description.logging import get_logger

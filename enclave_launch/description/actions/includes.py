@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.configurations import SetLaunchConfiguration
+from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.sources import LaunchDescriptionSource
+from enclave_launch.description.sources import AnyLaunchDescriptionSource, LaunchDescriptionSource
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.diagnostics.evaluation import include_left_out
 from enclave_launch.host.current import current_release
@@ -91,8 +92,6 @@ class IncludeLaunchDescription(Action):
     ) -> None:
         super().__init__(**kwargs)
         if not isinstance(launch_description_source, LaunchDescriptionSource):
-            from enclave_launch.description.sources import AnyLaunchDescriptionSource
-
             launch_description_source = AnyLaunchDescriptionSource(launch_description_source)
         self.__source: LaunchDescriptionSource = launch_description_source
         self.__launch_arguments = () if launch_arguments is None else tuple(launch_arguments)
@@ -131,8 +130,6 @@ class IncludeLaunchDescription(Action):
 
     def argument_names_without_context(self) -> list[str] | None:
         """The names of the arguments given, ``None`` when one needs a context."""
-        from enclave_launch.description.launch_context import LaunchContext
-
         context = LaunchContext()
         try:
             return self.__argument_names(context)

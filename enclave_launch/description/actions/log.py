@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.action import Action
+from enclave_launch.description.logging import get_logger
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.templates import TemplateAction, template
@@ -32,8 +33,6 @@ class LogInfo(TemplateAction):
 
     def execute(self, context: LaunchContext) -> None:
         import logging
-
-        from enclave_launch.description.logging import get_logger
 
         level = logging.getLevelName(self.log_level(context))
         get_logger("launch.user").log(level, "%s", perform_substitutions(context, self.msg))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.actions.node_extensions import NodeActionExtension, installed_extensions
 from enclave_launch.description.actions.processes import ExecuteProcess
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.entity import Entity, get_data_type_from_identifier
@@ -248,8 +249,6 @@ def _performed(context: LaunchContext, value: SomeSubstitutionsType) -> str:
 
 
 def _extensions() -> Iterable[NodeActionExtension]:
-    from enclave_launch.description.actions.node_extensions import installed_extensions
-
     return installed_extensions()
 
 
@@ -314,7 +313,5 @@ def _parse_named_parameter(param: Entity, parser: Parser) -> tuple[tuple[Substit
 
 def __getattr__(name: str) -> Any:
     if name == "NodeActionExtension":  # upstream's place for it; kept apart so that it loads only when asked
-        from enclave_launch.description.actions.node_extensions import NodeActionExtension
-
         return NodeActionExtension
     raise AttributeError(f"module 'launch_ros.actions.node' has no attribute {name!r}")

@@ -23,6 +23,7 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
+from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
 from enclave_launch.host.current import current_release
 from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess, Respawn
@@ -187,8 +188,6 @@ class ExecuteLocal(Action):
             "env": description.final_env,
         }
         if not isinstance(self.__respawn, bool):
-            from enclave_launch.description.typed_values import perform_typed_substitution
-
             self.__respawn = bool(perform_typed_substitution(context, self.__respawn, bool))
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
@@ -282,7 +281,6 @@ def _output(output: Any) -> list[Substitution] | Mapping[str, Any]:
 def _respawn(respawn: bool | SomeSubstitutionsType) -> Any:
     if isinstance(respawn, bool):
         return respawn
-    from enclave_launch.description.typed_values import normalize_typed_substitution
 
     return normalize_typed_substitution(respawn, bool)
 

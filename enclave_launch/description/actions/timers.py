@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.action import Action
+from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.events.event import Shutdown, TimerEvent
@@ -139,8 +140,6 @@ class TimerAction(Action):
             self.__environment = context.process_environment.snapshot()
 
     def __in_kept_state(self) -> list[LaunchDescriptionEntity]:
-        from enclave_launch.description.actions.flow import OpaqueFunction
-
         def begin(context: LaunchContext) -> None:
             context._push_launch_configurations()
             context._push_environment()

@@ -10,6 +10,8 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.entity import LaunchDescriptionEntity
+
 if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event
     from enclave_launch.description.events.handlers import BaseEventHandler
@@ -163,8 +165,6 @@ def run_handler(
 
 
 def _entities(result: Any) -> Iterable[Any]:
-    from enclave_launch.description.entity import LaunchDescriptionEntity
-
     for entity in result if isinstance(result, Iterable) else (result,):
         if entity is None:
             continue

@@ -14,6 +14,7 @@ from enclave_launch.description.events.event import (
     IncludeLaunchDescription,
     Shutdown,
 )
+from enclave_launch.description.events.process import suppose_process_event
 from enclave_launch.host.user_code import called_for_entities
 
 if TYPE_CHECKING:
@@ -111,7 +112,6 @@ class EventHandler(BaseEventHandler):
         """The exit, or the first output, of a started process that the matcher takes."""
         if type(self).matches is not BaseEventHandler.matches or self.event_class is not None:
             return None
-        from enclave_launch.description.events.process import suppose_process_event
 
         return suppose_process_event(self.matches, started)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.actions.processes import ExecuteLocal, ExecuteProcess
 from enclave_launch.description.events.handlers import OnActionEventBase
 from enclave_launch.description.events.process import (
     ProcessExited,
@@ -24,8 +25,6 @@ class OnProcessStart(OnActionEventBase):
     """When a process has started. The target must be an ``ExecuteProcess``, or a node."""
 
     def __init__(self, *, target_action: ActionMatcher = None, on_start: OnEvent, **kwargs: Any) -> None:
-        from enclave_launch.description.actions.processes import ExecuteProcess
-
         super().__init__(
             action_matcher=target_action,
             on_event=on_start,
@@ -39,8 +38,6 @@ class OnProcessExit(OnActionEventBase):
     """When a process has exited, also each time before it is respawned."""
 
     def __init__(self, *, target_action: ActionMatcher = None, on_exit: OnEvent, **kwargs: Any) -> None:
-        from enclave_launch.description.actions.processes import ExecuteLocal
-
         super().__init__(
             action_matcher=target_action,
             on_event=on_exit,
@@ -70,8 +67,6 @@ class OnProcessIO(OnActionEventBase):
         on_stderr: OnText = None,
         **kwargs: Any,
     ) -> None:
-        from enclave_launch.description.actions.processes import ExecuteLocal
-
         def handle(event: ProcessIO, _: LaunchContext) -> SomeEntitiesType | None:
             if event.from_stdout and on_stdout is not None:
                 return on_stdout(event)

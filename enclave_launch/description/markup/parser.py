@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from enclave_launch.description.markup import expose, extensions, parse_substitution
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.frontend import launch_file
+from enclave_launch.frontend.error_location import mark
 
 if TYPE_CHECKING:
     from enclave_launch.description.action import Action
@@ -91,7 +92,6 @@ class Parser:
     def parse_description(self, entity: Entity) -> LaunchDescription:
         """Root element -> ``LaunchDescription``; ``RuntimeError`` unless it is ``launch``."""
         from enclave_launch.description.launch_description import LaunchDescription
-        from enclave_launch.frontend.error_location import mark
 
         try:
             if entity.type_name != "launch":

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 from enclave_launch.boundary.files import as_path, read_text
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
+from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
     SomeSubstitutionsType_types_tuple,
@@ -16,6 +17,7 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
+from enclave_launch.frontend.fast_yaml import was_written
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -153,9 +155,6 @@ def _path_text(path: str | os.PathLike[str]) -> str:
 
 def _substituted(context: LaunchContext, path: str) -> str:
     import yaml
-
-    from enclave_launch.description.parameters import yaml_text
-    from enclave_launch.frontend.fast_yaml import was_written
 
     if context.host.allow_missing_packages and not os.path.isfile(path):
         return path  # told where it is used

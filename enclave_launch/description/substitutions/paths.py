@@ -78,8 +78,6 @@ class PathSubstitution(PathOperator, Substitution):
     """A ``pathlib.Path`` as a substitution, or anything that gives a path, with the operator ``/``."""
 
     def __init__(self, path: object) -> None:
-        from enclave_launch.description.substitution import normalize_to_list_of_substitutions
-
         self.__path = path
         from pathlib import Path  # slow to import, and here only when somebody has one
 
