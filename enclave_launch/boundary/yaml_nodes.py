@@ -1,4 +1,4 @@
-"""YAML text -> PyYAML's nodes, within bounds that hold for whoever walks over the nodes afterwards.
+"""Bounds of YAML documents that hold for whoever walks over PyYAML's nodes afterwards.
 
 Nodes that aliases share are visited once by PyYAML, but as often as they are named by most of what comes after it; a
 few lines can stand for billions of values. libyaml's loader also recurses in C, where depth ends the process. Pure.
@@ -21,31 +21,6 @@ EventParser: Any = getattr(yaml, "CLoader", yaml.Loader)
 
 class RefusedYaml(yaml.YAMLError):
     """Well-formed, but made to exhaust memory, time or the stack."""
-
-
-class _Untyped(SafeLoader):  # type: ignore[misc]
-    """Asks no rule of YAML 1.1 which type a value has, which would take as long as the reading itself."""
-
-    def resolve(self, kind: type, value: str, implicit: object) -> str:
-        return ""
-
-    def descend_resolver(self, node: object, index: object) -> None:
-        pass
-
-    def ascend_resolver(self) -> None:
-        pass
-
-
-def compose(text: str | bytes) -> Any:
-    """The root node of the one document in ``text``, its nodes without tags; ``None`` when there is none.
-
-    Raises ``yaml.YAMLError``; ``RefusedYaml`` is one.
-    """
-    refuse_deep_nesting(text)
-    root = yaml.compose(text, Loader=_Untyped)
-    if root is not None and may_have_aliases(text):
-        refuse_many_aliases(root)
-    return root
 
 
 def may_have_aliases(text: str | bytes) -> bool:

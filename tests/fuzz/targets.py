@@ -12,11 +12,11 @@ import yaml
 
 from enclave_launch.boundary.shell_words import split_words
 from enclave_launch.boundary.xml_tree import RefusedXml
-from enclave_launch.boundary.yaml_nodes import compose
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template, print_template
 from enclave_launch.frontend.xml_tree import parse_launch_xml as parse_launch_xml
 from enclave_launch.frontend.yaml_scalar import load as load_scalar
 from enclave_launch.frontend.yaml_tree import parse_yaml as parse_launch_yaml
+from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from keystore.disk.archive import ExportedFile, archive_bytes, read_archive
 from keystore.errors import KeystoreError
@@ -195,7 +195,10 @@ def targets() -> dict[str, Target]:
             YAML,
         ),
         "parameter-file": Target(
-            compose, (yaml.YAMLError, UnicodeDecodeError), (b"/**:\n  ros__parameters:\n    a: 1\n",), YAML
+            text(sections_of_text),
+            (yaml.YAMLError, RefusedParameters),
+            (b"/**:\n  ros__parameters:\n    a: 1\n",),
+            YAML,
         ),
         "substitution": Target(
             text(template),
