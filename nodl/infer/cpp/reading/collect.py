@@ -14,6 +14,8 @@ from nodl.infer.cpp.reading.declarations import (
     Function,
     FunctionParameter,
     Global,
+    conversion,
+    declared_name,
     function_declarator,
     type_text,
 )
@@ -159,10 +161,10 @@ class _Collector:
             self.index.functions.setdefault(made.name, []).append(made)
 
     def _function(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> Function | None:
-        declarator = function_declarator(node)
+        declarator = function_declarator(node) or conversion(node)
         if declarator is None:
             return None
-        named = text(declarator.child_by_field_name("declarator"))
+        named = declared_name(node, declarator)
         full = _plain_name(named)
         owner, _, name = full.rpartition("::")
         if cls is not None:

@@ -158,6 +158,22 @@ class FileIndex:
     maybe: list[Global] = field(default_factory=list)  # declarations that read as functions, too
 
 
+def conversion(node: Node) -> Node | None:
+    """The declarator of a conversion operator: ``operator T()``; ``None`` for all else."""
+    declarator = node.child_by_field_name("declarator") if node.type == "function_definition" else None
+    while declarator is not None and declarator.type == "qualified_identifier":
+        declarator = declarator.child_by_field_name("name")
+    return declarator if declarator is not None and declarator.type == "operator_cast" else None
+
+
+def declared_name(node: Node, declarator: Node) -> str:
+    """The name in a function's declarator: ``Foo::bar``, ``Foo::operator bool``."""
+    if declarator.type != "operator_cast":
+        return text(declarator.child_by_field_name("declarator"))
+    whole = text(node.child_by_field_name("declarator"))
+    return f"{whole.partition('operator')[0]}operator {text(declarator.child_by_field_name('type')).replace('::', '.')}"
+
+
 def function_declarator(node: Node) -> Node | None:
     """The declarator with the parameters; ``None`` for variables, arrays and pointers to functions."""
     declarator = node.child_by_field_name("declarator")

@@ -120,6 +120,11 @@ class Names:
         return tuple(used for index in seen for used in index.using)
 
     @cached_property
+    def has_conversions(self) -> bool:
+        """Whether a class has a conversion operator with a body."""
+        return any(name.startswith("operator ") for found in self.methods.values() for name in found)
+
+    @cached_property
     def functions_by_name(self) -> dict[str, list[Function]]:
         found: dict[str, list[Function]] = {}
         for index in self.files.values():

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BASES, Call
 from nodl.infer.cpp.reading.type_names import NO_TYPE
+from nodl.infer.cpp.running.algorithms import as_algorithm, writes_elements
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
 from nodl.infer.cpp.running.constructors import construct
@@ -158,15 +159,16 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
     if functions:
         values = [run.evaluate(each, frame) for each in given]
         return call_functions(run, functions, values, node, frame, types)
+    qualified = as_algorithm(qualified, given)
     standard = STANDARD.get(qualified)
-    if may_write(qualified):
+    if standard is not None or qualified.startswith("std::"):
         values = [run.evaluate(each, frame) for each in given]
         given_back = standard(run, values, node, frame, types) if standard is not None else BOTTOM
-        changed_by_standard(run, qualified, given, frame)
-        return given_back or unknown_call(run, qualified, values, node, [], frame)
-    if standard is not None:
-        values = [run.evaluate(each, frame) for each in given]
-        return standard(run, values, node, frame, types)
+        if may_write(qualified) or writes_elements(run, qualified, values):
+            changed_by_standard(run, qualified, given, frame)
+            given_back = given_back or unknown_call(run, qualified, values, node, [], frame)
+        if standard is not None or given_back:
+            return given_back
     model = LIBRARY_FUNCTIONS.get(qualified)
     if model is not None:
         values = [run.evaluate(each, frame) for each in given]

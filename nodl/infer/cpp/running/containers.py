@@ -6,6 +6,7 @@ import re
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running import texts
+from nodl.infer.cpp.running.algorithms import called_now
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
@@ -77,6 +78,7 @@ def container_call(
     ) and isinstance(atom, Seq | Unknown):
         return _added(run, atom, name, node, receiver, given, frame)
     values = [run.evaluate(each, frame) for each in given]
+    called_now(run, values, node, frame)
     run.handle(node, frame)
     if isinstance(atom, Map):
         return _map_call(run, atom, name, receiver, values, node, given, frame)

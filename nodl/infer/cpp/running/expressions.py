@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.invocation import by_operator
 from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.numbers import SIZES
 from nodl.infer.cpp.running.objects import as_map, cast, made
@@ -118,10 +119,15 @@ def inside(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("comma_expression")
 def comma(run: Machine, node: Node, frame: Frame) -> Value:
-    """Evaluates every operand and gives the last."""
-    found = BOTTOM
-    for child in children(node):
-        found = run.evaluate(child, frame)
+    """Evaluates every operand from the left and gives the last, or what an ``operator,`` of the program's own gives."""
+    operands = children(node)
+    while operands[-1].type == "comma_expression":
+        operands = [*operands[:-1], *children(operands[-1])]
+    found = run.evaluate(operands[0], frame)
+    for child in operands[1:]:
+        right = run.evaluate(child, frame)
+        own = by_operator(run, ",", found, [right], node, frame)
+        found = right if own is None else own
     return found
 
 

@@ -399,6 +399,22 @@ def _deduced(
     return bound
 
 
+_WRITTEN_BACK = (
+    "identifier",
+    "field_expression",
+    "subscript_expression",
+    "call_expression",
+    "pointer_expression",
+)
+
+
+def _is_element(call: Node) -> bool:
+    """``x.at(i)``: an element that a call gives by reference, and whose evaluation changes nothing."""
+    callee = call.child_by_field_name("function")
+    name = text(callee.child_by_field_name("field")) if callee is not None else ""
+    return name in ("at", "front", "back", "begin", "rbegin", "data", "value")
+
+
 def _write_back(
     run: Machine,
     parameters: Sequence[FunctionParameter],
@@ -413,8 +429,11 @@ def _write_back(
             continue
         target = unwrapped(argument)
         if target is not None and target.type == "pointer_expression":
-            target = target.child_by_field_name("argument")
-        if target is None or target.type not in ("identifier", "field_expression", "subscript_expression"):
+            inner = unwrapped(target.child_by_field_name("argument"))
+            target = target if inner is not None and inner.type == "call_expression" else inner
+        if target is None or target.type not in _WRITTEN_BACK:
+            continue
+        if target.type == "call_expression" and not _is_element(target):
             continue
         value = left[parameter.name]
         if value is not None and value != run.evaluate(target, frame):

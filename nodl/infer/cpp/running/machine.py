@@ -134,7 +134,13 @@ class Machine:
             if node.type in _CALLS_ALL and self.subtree_matters(node):
                 self.gap(node, frame, f"{what} is not followed; it may make interfaces")
             return unknown(what)
-        return handler(self, node, frame)
+        value = handler(self, node, frame)
+        return self._converted(node, value, frame) if self.names.has_conversions else value
+
+    def _converted(self, node: Node, value: Value, frame: Frame) -> Value:
+        from nodl.infer.cpp.running.conversions import converted_where_it_stands
+
+        return converted_where_it_stands(self, node, value, frame)
 
     def _misread(self, node: Node, frame: Frame) -> Value:
         """What the parser did not understand in an expression: its parts are run, its value is not known."""

@@ -70,7 +70,7 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     operator = text(node.child_by_field_name("operator"))
     left_node, right_node = node.child_by_field_name("left"), node.child_by_field_name("right")
     left = run.evaluate(left_node, frame)
-    if operator in ("&&", "||", "and", "or"):
+    if operator in ("&&", "||", "and", "or") and not _is_own(run, operator, left):
         return _logical(run, operator in ("||", "or"), left, right_node, frame)
     right = run.evaluate(right_node, frame)
     own = by_operator(run, operator, left, [right], node, frame)
@@ -87,6 +87,15 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if len(left) == 1 and len(right) == 1:
         return computed(operator, left[0], right[0])
     return unknown(f"the value of {text(node)[:60]}")
+
+
+def _is_own(run: Machine, operator: str, left: Value) -> bool:
+    """Whether the class of an operand has an ``operator&&`` or ``operator||`` of its own: both sides run then."""
+    sign = {"and": "&&", "or": "||"}.get(operator, operator)
+    return any(
+        isinstance(atom, Obj) and atom.cls is not None and run.names.find_methods(atom.cls, f"operator{sign}")
+        for atom in left
+    )
 
 
 def has_text(value: Value) -> bool:
@@ -270,8 +279,12 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
 def subscript(run: Machine, node: Node, frame: Frame) -> Value:
     """``container[key]`` for all that the container may be; unknown where nothing is found."""
     container = node.child_by_field_name("argument")
+    held = run.evaluate(container, frame)
     keys = [run.evaluate(child, frame) for child in children(node.child_by_field_name("indices"))]
-    found = [element(run, atom, keys[0] if keys else BOTTOM) for atom in run.evaluate(container, frame)]
+    own = by_operator(run, "[]", held, keys, node, frame)
+    if own is not None:
+        return own
+    found = [element(run, atom, keys[0] if keys else BOTTOM) for atom in held]
     result = join(*found) if found else BOTTOM
     return result or unknown(f"the value of {text(node)[:60]}")
 

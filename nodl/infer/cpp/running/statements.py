@@ -167,7 +167,11 @@ def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool 
     inner = condition
     if condition is not None and condition.type == "condition_clause":
         inner = condition.child_by_field_name("value")
-    if inner is None or inner.type == "declaration":
+    if inner is not None and inner.type == "declaration":
+        if run.names.has_conversions:
+            run.evaluate(inner.child_by_field_name("value"), frame)
+        return None
+    if inner is None:
         return None
     return truth(run.evaluate(inner, frame))
 

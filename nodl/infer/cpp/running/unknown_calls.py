@@ -8,24 +8,30 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
+from nodl.infer.cpp.running.algorithms import called_now
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, handed_over, nodes_in, overwrite
 from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.hiding import element_type, seen_type
 from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.objects import is_plain_type
+from nodl.infer.cpp.running.references import through
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Group,
     Map,
     Obj,
     Param,
     Seq,
     Text,
     Value,
+    as_one_map,
     join,
     open_sequence,
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type
-from nodl.infer.cpp.syntax import text, unwrapped
+from nodl.infer.cpp.syntax import text, unwrapped, walk
 
 if TYPE_CHECKING:
     from tree_sitter import Node
@@ -79,6 +85,7 @@ def unknown_call(
         )
     if receiver is not None and last.startswith("emplace"):  # the element that it makes may be anything
         handed_over(run, f"an element that {last}() makes", values, node, frame)
+    called_now(run, values, node, frame)
     if harmless:
         for value in values:
             for atom in value:
@@ -111,6 +118,8 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
     if name == "std::swap" and len(targets) == 2 and _swapped(run, targets, frame):
         return
     for each in given:
+        if not _variables(each) and _RANGE.search(text(each)):
+            through(run, each, frame)
         for target in _variables(each):
             if text(target) not in seen:
                 seen.add(text(target))
@@ -154,8 +163,34 @@ def _changed(run: Machine, name: str, target: Node, frame: Frame) -> None:
     if owner is not None and "const" in owner.types.get(text(target), "").split():
         return
     before = run.evaluate(target, frame)
-    if any(isinstance(atom, Text | Seq | Map | Param) for atom in before):
+    if any(isinstance(atom, Text | Seq | Map | Param | Group) for atom in before):
+        if _is_iterator(run, target, frame) or element_type(seen_type(run, target, frame)).pointer:
+            through(run, target, frame)
         assign(run, target, join(*(_after(atom, name) for atom in before)), frame)
+
+
+def _is_iterator(run: Machine, target: Node, frame: Frame) -> bool:
+    """Whether a local variable is an iterator or pointer into a container, not one itself, by its declaration."""
+    name = text(target)
+    owner = frame.owner_of(name)
+    if owner is None or name in owner.aliases or name not in owner.types or owner.types[name].endswith("&"):
+        return False
+    kind = run.type_of(owner.types[name], owner)
+    if "auto" not in owner.types[name].split():
+        return kind.pointer or not (is_plain_type(kind.name) or kind.name in _HOLDERS)
+    declared = walk(owner.function.node) if owner.function is not None else ()
+    return any(
+        each.type == "init_declarator"
+        and text(each.child_by_field_name("declarator")) == name
+        and _RANGE.search(text(each.child_by_field_name("value"))) is not None
+        for each in declared
+    )
+
+
+_HOLDERS = frozenset(
+    {"std::pair", "std::tuple", "std::variant", "std::optional", "std::stringstream", "std::any"}
+)
+_RANGE = re.compile(r"\b(?:c?r?(?:begin|end)|find\w*|(?:lower|upper)_bound|next|prev|data)\s*\([^()]*\)\W*$")
 
 
 def _after(atom: object, name: str) -> Value:
@@ -163,9 +198,11 @@ def _after(atom: object, name: str) -> Value:
     if isinstance(atom, Seq):
         more = () if _ORDERS.fullmatch(name) else (unknown(f"what {name}() may have written"),)
         return (open_sequence((*atom.items, *more)),)
-    if isinstance(atom, Map):
-        return (atom._replace(open=True),)
     changed = unknown(f"what {name}() may have written")
+    if isinstance(atom, Map):
+        return (as_one_map([(key, join(value, changed)) for key, value in atom.entries], True),)
+    if isinstance(atom, Group):
+        return (Group(tuple(join(each, changed) for each in atom.items)),)
     return changed if name.startswith("std::") else join((atom,), changed)
 
 

@@ -331,3 +331,95 @@ def test_what_is_written_in_a_way_of_its_own_is_seen(body: str, members: str, tm
     before += 'B & operator+(B & b, int) { b.t = "a"; return b; }\n'
     use = f"std::vector<B> v(1); B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
     assert "a" in names(infer(tmp_path, in_class(use, before=before)))
+
+
+EACH = {
+    "by a closure": 'std::for_each(v.begin(), v.end(), [](auto & s) { s = "b"; });',
+    "by a closure found by its arguments": 'for_each(v.begin(), v.end(), [](auto & s) { s = "b"; });',
+    "by a function": "std::for_each(v.begin(), v.end(), set);",
+    "by an object": "std::for_each(v.begin(), v.end(), Set{});",
+    "by a bound function": "std::for_each(v.begin(), v.end(), std::bind(set, std::placeholders::_1));",
+    "by somebody unknown": "std::for_each(v.begin(), v.end(), boost::trim);",
+    "between iterators": 'auto i = v.begin(); auto e = v.end(); std::fill(i, e, "b");',
+    "through a template": "range(v.begin(), v.end());",
+    "by a predicate": 'std::any_of(v.begin(), v.end(), [](auto & s) { s = "b"; return true; });',
+    "of what a method gives": "std::for_each(all().begin(), all().end(), set);",
+    "at a place": "set(v.at(0));",
+    "where an iterator stands": "set(*v.begin());",
+    "in what a closure captured": "std::count_if(w.begin(), w.end(), [&](int) { v = {}; return true; });",
+    "by a method of a container": "std::list<int> l; l.remove_if([&](int) { v = {}; return true; });",
+}
+ONLY_READ = {
+    "copies": 'std::for_each(v.begin(), v.end(), [](auto s) { s = "b"; });',
+    "constants": "std::for_each(v.begin(), v.end(), [](const auto & s) { look(s); });",
+}
+SETTERS = """
+void set(std::string & s) { s = "b"; }
+struct Set { void operator()(std::string & s) { s = "b"; } };
+template <typename I> void range(I b, I e) { std::for_each(b, e, [](auto & s) { s = "b"; }); }
+void look(const std::string &) {}
+"""
+
+
+def elements(folder: Path, body: str) -> tuple[list[str], list[str]]:
+    use = f"std::vector<int> w(1); {body} create_publisher<std_msgs::msg::String>(v[0], 1);"
+    members = 'std::vector<std::string> v{"a"}; std::vector<std::string> & all() { return v; }'
+    if body.startswith(("auto", "range")):
+        use = f'std::vector<std::string> v{{"a"}}; {use}'
+    system = infer(folder, in_class(use, members, before=SETTERS))
+    return names(system), gaps(system)
+
+
+@pytest.mark.parametrize("body", EACH.values(), ids=EACH)
+def test_elements_that_somebody_writes_are_not_what_they_were(body: str, tmp_path: Path) -> None:
+    made, told = elements(tmp_path, body)
+    assert told or any("?" in each for each in made) or "b" in made
+
+
+@pytest.mark.parametrize("body", ONLY_READ.values(), ids=ONLY_READ)
+def test_elements_that_an_algorithm_only_reads_stay(body: str, tmp_path: Path) -> None:
+    assert elements(tmp_path, body) == (["a"], [])
+
+
+BY_OPERATOR = {
+    "a condition": ("if (b) {}", 'operator bool() { t = "b"; return true; }'),
+    "a negation": ("if (!b) {}", 'explicit operator bool() { t = "b"; return true; }'),
+    "a comma": ("b, 1, 2;", 'B & operator,(int) { t = t == "a" ? "c" : "b"; return *this; }'),
+    "a comma of a loop": (
+        "for (int i = 0; i < 2; b, ++i) {}",
+        'B & operator,(int) { t = "b"; return *this; }',
+    ),
+    "an index": ("b[0];", 'int operator[](int) { t = "b"; return 1; }'),
+}
+TO_TEXT = 'operator std::string() { t = "b"; return "x"; }'
+
+
+@pytest.mark.parametrize(("body", "member"), BY_OPERATOR.values(), ids=BY_OPERATOR)
+def test_an_operator_that_certainly_runs_is_followed(body: str, member: str, tmp_path: Path) -> None:
+    use = f"B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
+    system = infer(tmp_path, in_class(use, before=f'struct B {{ std::string t = "a"; {member} }};\n'))
+    assert names(system) == ["b"]
+
+
+@pytest.mark.parametrize("body", ["std::string s = b;", "take(b);", "s_ = b;", "auto s = std::string(b);"])
+def test_a_conversion_that_writes_is_told_where_it_may_run(body: str, tmp_path: Path) -> None:
+    before = f'struct B {{ std::string t = "a"; {TO_TEXT} }};\nvoid take(std::string) {{}}\n'
+    use = f"B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
+    told = gaps(infer(tmp_path, in_class(use, "std::string s_;", before=before)))
+    assert any("whether b is converted here by an operator of B" in why for why in told)
+
+
+@pytest.mark.parametrize("body", ["B c = b;", "auto & c = b;", "same(b);", "b.t.size();"])
+def test_an_object_that_is_taken_as_it_is_is_not_converted(body: str, tmp_path: Path) -> None:
+    before = f'struct B {{ std::string t = "a"; {TO_TEXT} }};\nvoid same(const B &) {{}}\n'
+    system = infer(
+        tmp_path, in_class(f"B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);", before=before)
+    )
+    assert (names(system), gaps(system)) == (["a"], [])
+
+
+def test_a_conversion_that_only_reads_is_no_gap(tmp_path: Path) -> None:
+    before = 'struct B { std::string t = "a"; operator std::string() const { return t; } };\n'
+    use = "B b; std::string s = b; create_publisher<std_msgs::msg::String>(b.t, 1);"
+    system = infer(tmp_path, in_class(use, before=before))
+    assert (names(system), gaps(system)) == (["a"], [])
