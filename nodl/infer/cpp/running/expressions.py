@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.invocation import by_operator
 from nodl.infer.cpp.running.machine import Machine, expression
 from nodl.infer.cpp.running.numbers import SIZES
 from nodl.infer.cpp.running.objects import as_map, cast, made
 from nodl.infer.cpp.running.operators import has_text
+from nodl.infer.cpp.running.own_operators import by_operator
 from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
 from nodl.infer.cpp.running.variables import variable

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
 from nodl.infer.cpp.reading.collect import parameters_of
 from nodl.infer.cpp.reading.declarations import type_text
-from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.frames import Frame
@@ -21,12 +20,13 @@ from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import declared_type
+from nodl.infer.cpp.running.written_back import write_back
 from nodl.infer.cpp.syntax import children, text, unwrapped
 
 if TYPE_CHECKING:
     from tree_sitter import Node
 
-    from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
+    from nodl.infer.cpp.reading.declarations import Function
     from nodl.infer.cpp.reading.type_names import Type
 
 
@@ -60,35 +60,6 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             found.append(unknown(f"the result of {name}()"))
     run.left = run.left if len(found) == 1 else None
     return join(*found) if found else unknown("the result of a call")
-
-
-def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Frame) -> Value:
-    """``x->`` and ``*x``: what the operator of its class gives for an object that has one, else ``x`` itself."""
-    found: list[Value] = []
-    for atom in value:
-        own = (
-            run.names.find_methods(atom.cls, operator)
-            if isinstance(atom, Obj) and atom.cls is not None
-            else []
-        )
-        found.append(call_methods(run, own, atom, [], node, frame, ()) if own else (atom,))
-    return join(*found)
-
-
-def by_operator(
-    run: Machine, sign: str, left: Value, right: Sequence[Value], node: Node, frame: Frame
-) -> Value | None:
-    """What an operator of the program's own gives; ``None`` where an operand is no object, or there is none for it."""
-    objects = [a for value in (left, *right) for a in value if isinstance(a, Obj) and a.cls is not None]
-    if not objects:
-        return None
-    name, this = f"operator{sign}", left[0] if len(left) == 1 else None
-    if isinstance(this, Obj) and this.cls is not None and run.names.find_methods(this.cls, name):
-        return call_methods(run, run.names.find_methods(this.cls, name), this, right, node, frame, ())
-    free = run.names.find_functions(name, frame.scope, frame.file)
-    if not chosen(free, [left, *right]):
-        return None
-    return call_functions(run, free, [left, *right], node, frame, ())
 
 
 def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Sequence[Value]]]:
@@ -142,7 +113,7 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     given = parameters_of(declarator) if declarator is not None else []
     left = {p.name: run.store.get((inner, p.name)) for p in given if is_written_back(p)}
     if left and len(children(node.child_by_field_name("arguments"))) == len(values):
-        _write_back(run, given, left, node, frame)
+        write_back(run, given, left, node, frame)
     return inner.returned
 
 
@@ -286,7 +257,7 @@ def invoke(
     given = (tuple(values), inner.bindings, inner.conditions, len(run.nodes))
     key = (function, this_object, inner.path)
     outcome = _outcome(run, key, given, inner.depth, lambda: _run_body(run, function, values, inner))
-    _write_back(run, function.parameters, outcome.parameters, node, frame)
+    write_back(run, function.parameters, outcome.parameters, node, frame)
     run.left = node.id if outcome.ends else None
     return outcome.returned
 
@@ -397,44 +368,3 @@ def _deduced(
             if kinds:
                 bound[name] = kinds[0]
     return bound
-
-
-_WRITTEN_BACK = (
-    "identifier",
-    "field_expression",
-    "subscript_expression",
-    "call_expression",
-    "pointer_expression",
-)
-
-
-def _is_element(call: Node) -> bool:
-    """``x.at(i)``: an element that a call gives by reference, and whose evaluation changes nothing."""
-    callee = call.child_by_field_name("function")
-    name = text(callee.child_by_field_name("field")) if callee is not None else ""
-    return name in ("at", "front", "back", "begin", "rbegin", "data", "value")
-
-
-def _write_back(
-    run: Machine,
-    parameters: Sequence[FunctionParameter],
-    left: Mapping[str, Value | None],
-    node: Node,
-    frame: Frame,
-) -> None:
-    """What a function does to its reference parameters shows in the caller's variables."""
-    given = children(node.child_by_field_name("arguments"))
-    for parameter, argument in zip(parameters, given, strict=False):
-        if not is_written_back(parameter):
-            continue
-        target = unwrapped(argument)
-        if target is not None and target.type == "pointer_expression":
-            inner = unwrapped(target.child_by_field_name("argument"))
-            target = target if inner is not None and inner.type == "call_expression" else inner
-        if target is None or target.type not in _WRITTEN_BACK:
-            continue
-        if target.type == "call_expression" and not _is_element(target):
-            continue
-        value = left[parameter.name]
-        if value is not None and value != run.evaluate(target, frame):
-            assign(run, target, value, frame)

@@ -13,8 +13,9 @@ from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call,
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import class_of_member, lexical_class
-from nodl.infer.cpp.running.invocation import call_methods, call_values, pointed_to
+from nodl.infer.cpp.running.invocation import call_methods, call_values
 from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.own_operators import pointed_to
 from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
 from nodl.infer.cpp.running.values import (
     BOTTOM,

@@ -1,0 +1,44 @@
+"""Operators of the program's own classes, as methods or functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.invocation import call_functions, call_methods
+from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.overloads import chosen
+from nodl.infer.cpp.running.values import Obj, Value, join
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+
+def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Frame) -> Value:
+    """``x->`` and ``*x``: what the operator of its class gives for an object that has one, else ``x`` itself."""
+    found: list[Value] = []
+    for atom in value:
+        own = (
+            run.names.find_methods(atom.cls, operator)
+            if isinstance(atom, Obj) and atom.cls is not None
+            else []
+        )
+        found.append(call_methods(run, own, atom, [], node, frame, ()) if own else (atom,))
+    return join(*found)
+
+
+def by_operator(
+    run: Machine, sign: str, left: Value, right: Sequence[Value], node: Node, frame: Frame
+) -> Value | None:
+    """What an operator of the program's own gives; ``None`` where an operand is no object, or there is none for it."""
+    objects = [a for value in (left, *right) for a in value if isinstance(a, Obj) and a.cls is not None]
+    if not objects:
+        return None
+    name, this = f"operator{sign}", left[0] if len(left) == 1 else None
+    if isinstance(this, Obj) and this.cls is not None and run.names.find_methods(this.cls, name):
+        return call_methods(run, run.names.find_methods(this.cls, name), this, right, node, frame, ())
+    free = run.names.find_functions(name, frame.scope, frame.file)
+    if not chosen(free, [left, *right]):
+        return None
+    return call_functions(run, free, [left, *right], node, frame, ())

@@ -1,0 +1,59 @@
+"""What a function writes to its reference parameters, in the variables and elements of its caller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.constructors import is_written_back
+from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.values import Value
+from nodl.infer.cpp.syntax import children, text, unwrapped
+
+if TYPE_CHECKING:
+    from tree_sitter import Node
+
+    from nodl.infer.cpp.reading.declarations import FunctionParameter
+
+
+_WRITTEN_BACK = (
+    "identifier",
+    "field_expression",
+    "subscript_expression",
+    "call_expression",
+    "pointer_expression",
+)
+
+
+def _is_element(call: Node) -> bool:
+    """``x.at(i)``: an element that a call gives by reference, and whose evaluation changes nothing."""
+    callee = call.child_by_field_name("function")
+    name = text(callee.child_by_field_name("field")) if callee is not None else ""
+    return name in ("at", "front", "back", "begin", "rbegin", "data", "value")
+
+
+def write_back(
+    run: Machine,
+    parameters: Sequence[FunctionParameter],
+    left: Mapping[str, Value | None],
+    node: Node,
+    frame: Frame,
+) -> None:
+    """What a function does to its reference parameters shows in the caller's variables."""
+    given = children(node.child_by_field_name("arguments"))
+    for parameter, argument in zip(parameters, given, strict=False):
+        if not is_written_back(parameter):
+            continue
+        target = unwrapped(argument)
+        if target is not None and target.type == "pointer_expression":
+            inner = unwrapped(target.child_by_field_name("argument"))
+            target = target if inner is not None and inner.type == "call_expression" else inner
+        if target is None or target.type not in _WRITTEN_BACK:
+            continue
+        if target.type == "call_expression" and not _is_element(target):
+            continue
+        value = left[parameter.name]
+        if value is not None and value != run.evaluate(target, frame):
+            assign(run, target, value, frame)
