@@ -161,14 +161,13 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
         return call_functions(run, functions, values, node, frame, types)
     qualified = as_algorithm(qualified, given)
     standard = STANDARD.get(qualified)
-    if standard is not None or qualified.startswith("std::"):
+    if standard is not None or may_write(qualified):
         values = [run.evaluate(each, frame) for each in given]
         given_back = standard(run, values, node, frame, types) if standard is not None else BOTTOM
         if may_write(qualified) or writes_elements(run, qualified, values):
             changed_by_standard(run, qualified, given, frame)
             given_back = given_back or unknown_call(run, qualified, values, node, [], frame)
-        if standard is not None or given_back:
-            return given_back
+        return given_back
     model = LIBRARY_FUNCTIONS.get(qualified)
     if model is not None:
         values = [run.evaluate(each, frame) for each in given]
@@ -190,6 +189,8 @@ def _free_call(run: Machine, node: Node, callee: Node, name: str, given: list[No
     values = [run.evaluate(each, frame) for each in given]
     if variable_call := _callable_value(run, name, frame):
         return call_values(run, variable_call, values, node, frame)
+    if writes_elements(run, qualified, values):
+        changed_by_standard(run, qualified, given, frame)
     return unknown_call(run, qualified, values, node, given, frame)
 
 
