@@ -15,9 +15,9 @@ from nodl.infer.cpp.reading.declarations import (
     FunctionParameter,
     Global,
     conversion,
-    declared_name,
     function_declarator,
     type_text,
+    written_name,
 )
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.type_names import split_type
@@ -164,7 +164,7 @@ class _Collector:
         declarator = function_declarator(node) or conversion(node)
         if declarator is None:
             return None
-        named = declared_name(node, declarator)
+        named = written_name(node, declarator)
         full = _plain_name(named)
         owner, _, name = full.rpartition("::")
         if cls is not None:

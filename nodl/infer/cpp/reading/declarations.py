@@ -166,7 +166,7 @@ def conversion(node: Node) -> Node | None:
     return declarator if declarator is not None and declarator.type == "operator_cast" else None
 
 
-def declared_name(node: Node, declarator: Node) -> str:
+def written_name(node: Node, declarator: Node) -> str:
     """The name in a function's declarator: ``Foo::bar``, ``Foo::operator bool``."""
     if declarator.type != "operator_cast":
         return text(declarator.child_by_field_name("declarator"))
