@@ -12,13 +12,13 @@ from nodl.infer.cpp.reading.declarations import (
     Field,
     FileIndex,
     Function,
-    FunctionParameter,
     Global,
     conversion,
     function_declarator,
     type_text,
     written_name,
 )
+from nodl.infer.cpp.reading.parameter_lists import parameters_of, template_defaults, template_names
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.type_names import split_type
 from nodl.infer.cpp.syntax import children, line_of, parse, parse_expression, text, walk
@@ -69,8 +69,8 @@ class _Collector:
         elif kind == "function_definition":
             self.function(child, scope, templates, cls)
         elif kind == "template_declaration":
-            names = _template_names(child.child_by_field_name("parameters"))
-            self.defaults = _template_defaults(child.child_by_field_name("parameters"))
+            names = template_names(child.child_by_field_name("parameters"))
+            self.defaults = template_defaults(child.child_by_field_name("parameters"))
             for inner_node in child.named_children[1:]:
                 self.one(inner_node, scope, [*templates, *names], cls)
         elif kind in (
@@ -280,31 +280,6 @@ def _required(node: Node, name: str) -> Node:
     return node.child_by_field_name(name) or node
 
 
-def _template_names(node: Node | None) -> list[str]:
-    names = []
-    for child in children(node):
-        identifiers = [c for c in walk(child) if c.type in ("type_identifier", "identifier")]
-        if child.type in ("parameter_declaration", "optional_parameter_declaration"):
-            declarator = child.child_by_field_name("declarator")
-            names.append(text(declarator) if declarator is not None else "")
-        elif identifiers:
-            named = child.child_by_field_name("name")
-            names.append(text(named or identifiers[0]))
-        else:
-            names.append("")
-    return names
-
-
-def _template_defaults(node: Node | None) -> dict[str, str]:
-    found = {}
-    for child in children(node):
-        default = child.child_by_field_name("default_type") or child.child_by_field_name("default_value")
-        name = child.child_by_field_name("name") or child.child_by_field_name("declarator")
-        if default is not None and name is not None:
-            found[text(name)] = text(default)
-    return found
-
-
 def _is_variable(node: Node) -> bool:
     """``Foo member(1, this);`` reads as a function that takes types named 1 and this."""
     declarator = function_declarator(node)
@@ -322,37 +297,6 @@ def _plain_name(name: str) -> str:
         if depth == 0 and character != ">":
             out.append(character)
     return re.sub(r"\s+", "", "".join(out))
-
-
-def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:
-    """Parameters in order, without a lone ``void``; ``...`` or a pack marks ``function`` as variadic."""
-    listed = declarator.child_by_field_name("parameters")
-    found = []
-    for child in listed.named_children if listed is not None else ():
-        if child.type in ("variadic_parameter_declaration", "variadic_parameter") and function is not None:
-            function.variadic = True
-        if not child.type.endswith("parameter_declaration"):
-            continue
-        declared = child.child_by_field_name("declarator")
-        names = [n for n in walk(declared) if n.type == "identifier"] if declared is not None else []
-        constant = any(text(c) == "const" for c in child.named_children if c.type == "type_qualifier")
-        written = ("const " if constant else "") + type_text(child) + _marks(declared)
-        if written == "void" and not names:
-            continue
-        found.append(
-            FunctionParameter(
-                text(names[0]) if names else "", written, child.child_by_field_name("default_value")
-            )
-        )
-    return found
-
-
-def _marks(declarator: Node | None) -> str:
-    """``&`` or ``*`` of a declarator."""
-    if declarator is None:
-        return ""
-    written = text(declarator)
-    return "".join(c for c in written[: max(1, len(written) - len(written.lstrip("&* ")))] if c in "&*")
 
 
 def _enumerated(value: Node | None, before: int | None, numbers: Mapping[str, int]) -> int | None:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.reading.collect import parameters_of
+from nodl.infer.cpp.reading.parameter_lists import parameters_of
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import is_written_back
 from nodl.infer.cpp.running.frames import Frame

@@ -8,8 +8,8 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
-from nodl.infer.cpp.reading.collect import parameters_of
 from nodl.infer.cpp.reading.declarations import type_text
+from nodl.infer.cpp.reading.parameter_lists import parameters_of
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.frames import Frame
