@@ -159,7 +159,8 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
         body()
     except BudgetExceeded as error:
         run.gave_up = True
-        run.findings.gap(SourceRef(run.main.path), f"the analysis was given up: {error}")
+        why = f"the analysis was given up: {error}{_busiest(run)}; any interface beside those listed is possible"
+        run.findings.gap(SourceRef(run.main.path), why)
     except RecursionError:
         run.findings.gap(SourceRef(run.main.path), "the analysis was given up: nested too deep")
     finally:
@@ -167,3 +168,13 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
     for instance, source in run.handed.items():
         if instance.node is not None and instance.node.created:
             instance.node.gaps.setdefault((source, "the node is handed to code that is not analysed"))
+
+
+def _busiest(run: Run) -> str:
+    """Where most of the steps went: the innermost function that took at least half, with what it calls."""
+    half = [(steps, function) for function, steps in run.cost.items() if 2 * steps >= run.steps]
+    if not half:
+        return ""
+    _, function = min(half, key=lambda each: each[0])
+    place = SourceRef(function.module.source.path.rpartition("/")[2], function.node.lineno)
+    return f", most of them in {function.name} ({place}) and what it calls"

@@ -139,6 +139,7 @@ def _remembered(
         return known[1]
     reads = run.state.reads
     around, reads.attributes = reads.attributes, set()
+    before = run.steps if function.node not in run.stack else None  # a call inside itself counts already
     try:
         result = (body or _run_body)(run, function, cells, call)
         if (*run.state.version(), run.state.pulled, run.rounds) == version:
@@ -146,6 +147,8 @@ def _remembered(
     finally:
         around |= reads.attributes
         reads.attributes = around
+        if before is not None:
+            run.cost[function] = run.cost.get(function, 0) + run.steps - before
     return result
 
 

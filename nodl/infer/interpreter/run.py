@@ -98,6 +98,7 @@ class Run(Allocations):
         self.handed: dict[Instance, SourceRef] = {}  # objects that code which is not analysed got, and where
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
+        self.cost: dict[FunctionValue, int] = {}  # steps in a function and in what it calls
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
         self.bound: set[ast.AST] = set()  # functions that were read as a method
         self.with_metaclass: set[ast.AST] = set()

@@ -6,6 +6,8 @@ from collections.abc import Callable
 
 import pytest
 
+from tests.nodl.infer.conftest import Infer
+
 NodeBody = Callable[..., list[str]]
 
 CASES: dict[str, tuple[str, list[str]]] = {
@@ -211,3 +213,41 @@ def test_what_python_has_in_every_release_is_there(names: NodeBody) -> None:
         rclpy.create_node("n").create_publisher(String, topic, 10)
         """
     assert names(program) == ["with_it"]
+
+
+_HANDED = """
+    import rclpy, somewhere
+    from std_msgs.msg import String
+    node = rclpy.create_node('n')
+    def topics():
+        for name in ('a', 'b'):
+            {body}
+    somewhere.register({handed})
+    """
+
+
+def test_a_generator_function_that_creates_is_a_gap_in_the_hands_of_others(infer: Infer) -> None:
+    system = infer(_HANDED.format(body="yield node.create_publisher(String, name, 1)", handed="topics"))
+    assert [(gap.source.line, gap.why) for gap in system.gaps] == [
+        (
+            7,
+            "topics may be called from somewhere that the analysis did not follow, and would create interfaces",
+        )
+    ]
+
+
+@pytest.mark.parametrize(
+    ("body", "handed", "made"),
+    [
+        ("yield name", "topics", []),
+        ("yield node.create_publisher(String, name, 1)", "topics()", ["a", "b"]),
+        ("node.create_publisher(String, name, 1)", "topics", ["a", "b"]),
+    ],
+    ids=["it creates nothing", "the generator itself is handed over", "an ordinary function"],
+)
+def test_what_others_may_run_and_was_followed_is_no_gap(
+    body: str, handed: str, made: list[str], infer: Infer
+) -> None:
+    system = infer(_HANDED.format(body=body, handed=handed))
+    assert sorted(str(each.name) for node in system.nodes for each in node.endpoints) == made
+    assert (list(system.gaps), [gap for node in system.nodes for gap in node.gaps]) == ([], [])

@@ -35,15 +35,38 @@ def test_under_an_undecided_condition_the_name_is_exact(body: str, made: set[str
     assert gaps(system) == []
 
 
-def test_python_says_the_same(tmp_path: Path) -> None:
+_PYTHON = """\
+import random, rclpy
+from std_msgs.msg import String
+node = rclpy.create_node('n')
+def pub(name):
+    node.create_publisher(String, name, 1)
+"""
+UNDECIDED_IN_PYTHON = {
+    "an if": ("if random.random() > 0.5:\n    pub('a')", {"a"}),
+    "one of two names": ("pub('a' if random.random() > 0.5 else 'b')", {"a", "b"}),
+    "a library": ("try:\n    import there\n    pub('a')\nexcept ImportError:\n    pub('b')", {"a", "b"}),
+    "a name of a library": (
+        "try:\n    from there import x\n    name = 'a'\nexcept ImportError:\n    name = 'b'\npub(name)",
+        {"a", "b"},
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "made"), UNDECIDED_IN_PYTHON.values(), ids=UNDECIDED_IN_PYTHON)
+def test_python_says_the_same(body: str, made: set[str], tmp_path: Path) -> None:
     program = tmp_path / "program.py"
-    program.write_text(
-        "import random, rclpy\nfrom std_msgs.msg import String\nnode = rclpy.create_node('n')\n"
-        "if random.random() > 0.5:\n    node.create_publisher(String, 'a', 1)\n"
-        "node.create_publisher(String, 'b' if random.random() > 0.5 else 'c', 1)\n",
-        encoding="utf-8",
-    )
-    assert certainties(infer_paths([program])) == dict.fromkeys("abc", Certainty.EXACT)
+    program.write_text(_PYTHON + body, encoding="utf-8")
+    system = infer_paths([program])
+    assert certainties(system) == dict.fromkeys(made, Certainty.EXACT)
+    assert gaps(system) == []
+
+
+def test_a_module_that_python_always_has_decides_its_import(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    body = "try:\n    import json\n    pub('a')\nexcept ImportError:\n    pub('b')"
+    program.write_text(_PYTHON + body, encoding="utf-8")
+    assert set(certainties(infer_paths([program]))) == {"a"}
 
 
 @pytest.mark.parametrize(
