@@ -85,7 +85,8 @@ def unknown_call(
         )
     if receiver is not None and last.startswith("emplace"):  # the element that it makes may be anything
         handed_over(run, f"an element that {last}() makes", values, node, frame)
-    called_now(run, values, node, frame)
+    if not (harmless and (receiver is not None or name.startswith("rclcpp"))):  # a timer calls nobody at once
+        called_now(run, values, node, frame)
     if harmless:
         for value in values:
             for atom in value:

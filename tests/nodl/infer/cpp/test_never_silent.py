@@ -423,3 +423,16 @@ def test_a_conversion_that_only_reads_is_no_gap(tmp_path: Path) -> None:
     use = "B b; std::string s = b; create_publisher<std_msgs::msg::String>(b.t, 1);"
     system = infer(tmp_path, in_class(use, before=before))
     assert (names(system), gaps(system)) == (["a"], [])
+
+
+@pytest.mark.parametrize(
+    ("call", "made"),
+    [("boost::for_each(w, {});", ["a", "b"]), ("rclcpp::create_timer(this, get_clock(), 1s, {});", ["a"])],
+    ids=["somebody unknown", "a timer"],
+)
+def test_a_closure_may_run_at_once_unless_a_timer_keeps_it(
+    call: str, made: list[str], tmp_path: Path
+) -> None:
+    closure = '[&](auto...) { t = "b"; }'
+    use = f'std::string t = "a"; {call.format(closure)} create_publisher<std_msgs::msg::String>(t, 1);'
+    assert names(infer(tmp_path, in_class(use))) == made
