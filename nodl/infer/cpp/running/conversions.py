@@ -9,10 +9,11 @@ from __future__ import annotations
 from functools import partial
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.running.assignments import object_class
 from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import call_methods
 from nodl.infer.cpp.running.machine import NEXT, Machine
-from nodl.infer.cpp.running.values import Obj, Value, join
+from nodl.infer.cpp.running.values import Obj, Value, join, unknown
 from nodl.infer.cpp.syntax import text
 
 if TYPE_CHECKING:
@@ -38,6 +39,10 @@ def converted_where_it_stands(run: Machine, node: Node, value: Value, frame: Fra
         for each in objects:
             _may_be_converted(run, each, place, inner, node, frame)
         return value
+    if object_class(run, node, frame) is None:  # a pointer, or perhaps one, is not converted
+        for each in objects:
+            _may_be_converted(run, each, place, inner, node, frame)
+        return unknown("a condition")
     found: list[Value] = []
     for atom in value:
         own = _operators(run, atom.cls) if isinstance(atom, Obj) and atom.cls is not None else {}

@@ -436,3 +436,10 @@ def test_a_closure_may_run_at_once_unless_a_timer_keeps_it(
     closure = '[&](auto...) { t = "b"; }'
     use = f'std::string t = "a"; {call.format(closure)} create_publisher<std_msgs::msg::String>(t, 1);'
     assert names(infer(tmp_path, in_class(use))) == made
+
+
+@pytest.mark.parametrize("held", ["auto p = std::make_shared<B>();", "B * p = new B();"])
+def test_a_pointer_in_a_condition_is_not_what_its_object_converts_to(held: str, tmp_path: Path) -> None:
+    use = f'{held} if (p) {{ create_publisher<std_msgs::msg::String>("a", 1); }}'
+    before = "struct B { explicit operator bool() const { return false; } };\n"
+    assert names(infer(tmp_path, in_class(use, before=before))) == ["a"]
