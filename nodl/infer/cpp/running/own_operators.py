@@ -31,13 +31,13 @@ def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Fra
 def by_operator(
     run: Machine, sign: str, left: Value, right: Sequence[Value], node: Node, frame: Frame
 ) -> Value | None:
-    """What an operator of the program's own gives; ``None`` where an operand is no object, or there is none for it."""
+    """What an operator that the program defines gives; ``None`` if it defines none for these operands."""
     objects = [a for value in (left, *right) for a in value if isinstance(a, Obj) and a.cls is not None]
     if not objects:
         return None
     name, this = f"operator{sign}", left[0] if len(left) == 1 else None
-    if isinstance(this, Obj) and this.cls is not None and run.names.find_methods(this.cls, name):
-        return call_methods(run, run.names.find_methods(this.cls, name), this, right, node, frame, ())
+    if isinstance(this, Obj) and this.cls is not None and (own := run.names.find_methods(this.cls, name)):
+        return call_methods(run, own, this, right, node, frame, ())
     free = run.names.find_functions(name, frame.scope, frame.file)
     if not chosen(free, [left, *right]):
         return None

@@ -1,10 +1,17 @@
-"""Answers of one test are not those of another: each has a cache of its own."""
+"""Each test has a cache of its own, and may ask which programs were followed."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
+
+if TYPE_CHECKING:
+    from nodl.infer.cpp.entry import Entry
+    from nodl.infer.cpp.program import Findings, Sources
+    from nodl.infer.cpp.running.machine import Settings
 
 
 @pytest.fixture(autouse=True)
@@ -12,3 +19,18 @@ def own_cache(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.Monk
     folder = tmp_path_factory.mktemp("cache")
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     return folder
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """The first source of each program that was really followed, as the test goes on."""
+    from nodl.infer.cpp.program import run_program
+
+    followed: list[str] = []
+
+    def counted(sources: Sources, entry: Entry, settings: Settings | None = None) -> Findings:
+        followed.append(os.path.basename(entry.files[0]))
+        return run_program(sources, entry, settings)
+
+    monkeypatch.setattr("nodl.infer.cpp.solved.run_program", counted)
+    return followed

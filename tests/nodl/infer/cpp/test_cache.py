@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,7 +15,6 @@ pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
 from nodl.infer.cpp.cache.codec import decoded, encoded
 from nodl.infer.cpp.cache.folder import CacheFolder
-from nodl.infer.cpp.program import run_program
 
 NODE = (
     HEAD
@@ -35,19 +33,6 @@ def workspace(tmp_path: Path) -> Path:
         cmake="include_directories(include other)\nadd_executable(node src/main.cpp)",
     )
     return tmp_path / "src"
-
-
-@pytest.fixture
-def runs(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """The programs that were really followed."""
-    followed: list[str] = []
-
-    def counted(sources, entry, settings=None):  # type: ignore[no-untyped-def]
-        followed.append(os.path.basename(entry.files[0]))
-        return run_program(sources, entry, settings)
-
-    monkeypatch.setattr("nodl.infer.cpp.solved.run_program", counted)
-    yield followed
 
 
 def asked(workspace: Path) -> InferredSystem:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,7 +12,6 @@ from tests.nodl.infer.cpp.workspace import package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
-from nodl.infer.cpp.program import run_program
 
 HEADER = """#pragma once
 #include <rclcpp/rclcpp.hpp>
@@ -46,19 +43,6 @@ rclcpp_components_register_nodes(talker_component "demo::Talker")
 add_executable(talker src/main.cpp)
 target_link_libraries(talker talker_component)
 """
-
-
-@pytest.fixture
-def runs(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
-    """The first source of each program that was really followed."""
-    followed: list[str] = []
-
-    def counted(sources, entry, settings=None):  # type: ignore[no-untyped-def]
-        followed.append(os.path.basename(entry.files[0]))
-        return run_program(sources, entry, settings)
-
-    monkeypatch.setattr("nodl.infer.cpp.solved.run_program", counted)
-    yield followed
 
 
 def infer(folder: Path, main: str = MAIN, header: str = HEADER, source: str = SOURCE) -> InferredSystem:
