@@ -6,7 +6,7 @@ Bytes in, bytes out; nothing is written here.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 from cryptography import x509
 from cryptography.exceptions import UnsupportedAlgorithm
@@ -97,14 +97,14 @@ def request_key(pem: bytes, place: str) -> RequestedKey:
         found = x509.load_pem_x509_csr(pem)
         if not found.is_signature_valid:
             raise DamagedKeystoreError(f"{place} is not signed by the key that it is for")
-        key = found.public_key()
+        key = cast("PublicKey", found.public_key())  # any other kind is refused below
         names = found.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
         common_name = str(names[0].value) if len(names) == 1 else ""
-        der = spki(key)  # type: ignore[arg-type]
+        der = spki(key)
     except (ValueError, TypeError, UnsupportedAlgorithm):
         raise DamagedKeystoreError(f"{place} is not a certificate request") from None
     if key_kind(der) not in USABLE_KINDS:
         raise DamagedKeystoreError(
             f"{place} is for a {key_kind(der)} key; DDS-Security takes P-256 and RSA-2048"
         )
-    return RequestedKey(key, der, common_name)  # type: ignore[arg-type]
+    return RequestedKey(key, der, common_name)
