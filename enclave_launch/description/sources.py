@@ -21,7 +21,6 @@ from enclave_launch.frontend import error_location
 from enclave_launch.host.current import current_host
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.launch_description import LaunchDescription
 
 

@@ -37,7 +37,6 @@ from enclave_launch.process import Evaluation
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
-    from enclave_launch.description.launch_description import LaunchDescription
     from enclave_launch.diagnostics import Diagnostic
 
 Arguments = Sequence[tuple[str, str]]

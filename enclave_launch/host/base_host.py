@@ -20,7 +20,6 @@ from enclave_launch.ros_rules.distro import Distro, choose_release
 from nodl import ament_index
 
 if TYPE_CHECKING:
-    from enclave_launch.host.loading import LoadCache
     from enclave_launch.host.outcomes import Outcomes
 
 

@@ -26,7 +26,6 @@ from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.reach import SourcesInReach
     from nodl.infer.executable import InferredExecutable
 
 SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"

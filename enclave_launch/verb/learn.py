@@ -26,7 +26,6 @@ from keystore.errors import KeystoreError
 from keystore.formats.validity import parse_duration
 
 if TYPE_CHECKING:
-    from enclave_launch.recording.markers import MarkerRun
     from enclave_launch.runtime.companion import LaunchCompanion
     from enclave_launch.verb.target import LaunchTarget
 

@@ -19,7 +19,6 @@ from nodl.verb.options import add_prefix_argument
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reach import SourcesInReach
-    from nodl.lookup import ManifestLookup
     from nodl.node_interface import NodeInterface
     from nodl.record.asked import AskedNode
     from nodl.record.checking import Comparison

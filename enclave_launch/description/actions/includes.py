@@ -22,7 +22,6 @@ from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import LaunchDescriptionEntity
-    from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.launch_description import LaunchDescription
     from enclave_launch.description.markup.parser import Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType

@@ -27,7 +27,6 @@ from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMES
 from enclave_launch.ros_rules.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
 
 if TYPE_CHECKING:
-    from enclave_launch.description.actions.node_extensions import NodeActionExtension
     from enclave_launch.description.entity import LaunchDescriptionEntity
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.parameters.types import SomeParameters
@@ -196,7 +195,7 @@ class Node(ExecuteProcess):
         arguments = {"ns": f"__ns:={self.__expanded_namespace}"}
         if self.__name is not None:
             arguments["name"] = f"__node:={self.__expanded_name}"
-        for extension in _extensions():
+        for extension in installed_extensions():
             words, arguments = extension.prepare_for_execute(context, arguments, self)
             self.cmd.extend(normalize_to_list_of_substitutions(word) for word in words)
         context.extend_locals({"ros_specific_arguments": arguments})
@@ -246,10 +245,6 @@ _TEXT_ATTRIBUTES = (
 
 def _performed(context: LaunchContext, value: SomeSubstitutionsType) -> str:
     return perform_substitutions(context, normalize_to_list_of_substitutions(value))
-
-
-def _extensions() -> Iterable[NodeActionExtension]:
-    return installed_extensions()
 
 
 def parse_remaps(remaps: list[Entity], parser: Parser) -> list[PlacedRule]:
