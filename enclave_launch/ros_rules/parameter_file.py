@@ -44,7 +44,7 @@ def sections_of_text(text: str) -> Mapping[str, Section]:
 def value_of_text(text: str) -> ParameterValue | None:
     """The value of ``-p NAME:=text``; ``None`` for a comment alone. Raises as ``sections_of_text``."""
     if not text:
-        raise RefusedParameters("there is no value")
+        raise RefusedParameters("the value is missing")
     values, reader = _Values(), _ValueReader()
     for event in yaml.parse(text, Loader=EventParser):
         if isinstance(event, (yaml.AliasEvent, yaml.MappingStartEvent)):

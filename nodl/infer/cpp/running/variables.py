@@ -59,7 +59,7 @@ def current_object(frame: Frame | None) -> Obj | None:
 
 
 def member(run: Machine, owner: Obj, name: str, seen: Class | None) -> Value | None:
-    """The field of an object that is seen as one of ``seen``; ``None`` when there is no such field in reach."""
+    """The field ``name`` of ``owner``, seen as an object of ``seen``; ``None`` if no class in reach has it."""
     value = run.store.get((owner, cell_of(run, owner, name, seen)))
     if value is not None:
         return value
