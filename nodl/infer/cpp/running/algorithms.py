@@ -44,8 +44,7 @@ def writes_elements(run: Machine, name: str, values: Sequence[Value]) -> bool:
 
 
 def _callable(run: Machine, atom: Obj) -> bool:
-    calls = atom.cls is not None and run.names.find_methods(atom.cls, "operator()")
-    return bool(calls or atom.data.get("partial"))
+    return bool(run.methods_of(atom, "operator()") or atom.data.get("partial"))
 
 
 def _writes(run: Machine, atom: object) -> bool:
@@ -58,12 +57,7 @@ def _writes(run: Machine, atom: object) -> bool:
         return bool(given) and not writes_of(atom.function.node).changed.isdisjoint(given)
     if isinstance(atom, Obj) and atom.data.get("partial"):
         return any(_writes(run, each) for each in atom.data["partial"][0])
-    methods = (
-        run.names.find_methods(atom.cls, "operator()")
-        if isinstance(atom, Obj) and atom.cls is not None
-        else []
-    )
-    return any(_writes(run, Bound(each, None)) for each in methods)
+    return any(_writes(run, Bound(each, None)) for each in run.methods_of(atom, "operator()"))
 
 
 def called_now(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> None:

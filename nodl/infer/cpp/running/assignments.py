@@ -331,7 +331,7 @@ def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> Non
         return
     found: list[Value] = []
     for atom in run.evaluate(container, frame):
-        if isinstance(atom, Obj) and atom.cls is not None and run.names.find_methods(atom.cls, "operator[]"):
+        if run.methods_of(atom, "operator[]"):
             through(run, node, frame)
         if isinstance(atom, Map) and keys:
             found.append((with_entry(atom, keys[0], value),))

@@ -41,14 +41,8 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
                 invoke(run, atom.function, this, given, node, frame, ())
                 for this, given in _bound(atom, values)
             ]
-        elif (
-            isinstance(atom, Obj) and atom.cls is not None and run.names.find_methods(atom.cls, "operator()")
-        ):
-            found.append(
-                call_methods(
-                    run, run.names.find_methods(atom.cls, "operator()"), atom, values, node, frame, ()
-                )
-            )
+        elif isinstance(atom, Obj) and (own := run.methods_of(atom, "operator()")):
+            found.append(call_methods(run, own, atom, values, node, frame, ()))
         elif isinstance(atom, Obj) and atom.data.get("partial") is not None:
             inner, fixed = atom.data["partial"]
             found.append(call_values(run, inner, _placed(fixed, values), node, frame))

@@ -226,6 +226,12 @@ class Machine:
     def type_of(self, written: str, frame: Frame) -> Type:
         return self.names.resolve(written, frame.scope, frame.file, frame.bindings)
 
+    def methods_of(self, atom: object, name: str) -> Sequence[Function]:
+        """The methods of that name of an object of a class in reach; none for anything else."""
+        return (
+            self.names.find_methods(atom.cls, name) if isinstance(atom, Obj) and atom.cls is not None else ()
+        )
+
     def obj(self, key: object, kind: Type, **values: object) -> Obj:
         found = self.objects.get(key)
         if found is None:

@@ -68,11 +68,7 @@ def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame
         and not given
         and any(isinstance(a, Obj) for a in receiver)
     ):
-        kept = tuple(
-            a
-            for a in receiver
-            if not (isinstance(a, Obj) and a.cls is not None and run.names.find_methods(a.cls, name))
-        )
+        kept = tuple(a for a in receiver if not run.methods_of(a, name))
         if kept == receiver:
             return receiver
     if name == "reset" and _is_pointer(run, receiver_node, frame, receiver):

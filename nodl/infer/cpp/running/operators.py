@@ -92,10 +92,7 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
 def _is_own(run: Machine, operator: str, left: Value) -> bool:
     """Whether the class of an operand has an ``operator&&`` or ``operator||`` of its own: both sides run then."""
     sign = {"and": "&&", "or": "||"}.get(operator, operator)
-    return any(
-        isinstance(atom, Obj) and atom.cls is not None and run.names.find_methods(atom.cls, f"operator{sign}")
-        for atom in left
-    )
+    return any(run.methods_of(atom, f"operator{sign}") for atom in left)
 
 
 def has_text(value: Value) -> bool:

@@ -19,12 +19,10 @@ def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Fra
     """``x->`` and ``*x``: what the operator of its class gives for an object that has one, else ``x`` itself."""
     found: list[Value] = []
     for atom in value:
-        own = (
-            run.names.find_methods(atom.cls, operator)
-            if isinstance(atom, Obj) and atom.cls is not None
-            else []
+        own = run.methods_of(atom, operator)
+        found.append(
+            call_methods(run, own, atom, [], node, frame, ()) if own and isinstance(atom, Obj) else (atom,)
         )
-        found.append(call_methods(run, own, atom, [], node, frame, ()) if own else (atom,))
     return join(*found)
 
 
@@ -36,7 +34,7 @@ def by_operator(
     if not objects:
         return None
     name, this = f"operator{sign}", left[0] if len(left) == 1 else None
-    if isinstance(this, Obj) and this.cls is not None and (own := run.names.find_methods(this.cls, name)):
+    if isinstance(this, Obj) and (own := run.methods_of(this, name)):
         return call_methods(run, own, this, right, node, frame, ())
     free = run.names.find_functions(name, frame.scope, frame.file)
     if not chosen(free, [left, *right]):
