@@ -25,10 +25,8 @@ def settle(run: Run, at_end: bool = True) -> None:
     run.repeated += 1
     outermost = run.settle is not _no_settling
     run.settle = _no_settling
-    tries, run.tries = (
-        run.tries,
-        0,
-    )  # what a callback raises ends it, or the call that waits: one risk of a ``try``
+    # What a callback raises ends it, or the call that waits: one risk of a ``try``.
+    tries, run.tries = run.tries, 0
     expected: set[object] = set()
     for turn in range(MAX_ROUNDS):
         _expect_escaped(run, expected)
