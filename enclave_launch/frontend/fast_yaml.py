@@ -21,6 +21,8 @@ from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import Any
 
+from enclave_launch.boundary.late_pattern import late_pattern
+
 _NAMES = ("load", "dump", "safe_load", "safe_dump")
 _LOADERS = {
     "SafeLoader": "CSafeLoader",
@@ -94,24 +96,13 @@ def _large_pattern_compiled_when_used() -> Iterator[None]:
 
     def compile_later(pattern: Any, flags: Any = 0) -> Any:
         large = isinstance(pattern, str) and pattern[-2:-1] == chr(sys.maxunicode)
-        return _Later(pattern) if large else compile_now(pattern, flags)
+        return late_pattern(pattern) if large else compile_now(pattern, flags)
 
     re.compile = compile_later
     try:
         yield
     finally:
         re.compile = compile_now
-
-
-class _Later:
-    """A pattern that is compiled when it is asked for anything."""
-
-    def __init__(self, text: str) -> None:
-        self._text = text
-
-    def __getattr__(self, name: str) -> Any:
-        found = vars(self)[name] = getattr(re.compile(vars(self)["_text"]), name)
-        return found
 
 
 @contextmanager
