@@ -235,9 +235,8 @@ AS_UPSTREAM_HAS_IT = {  # launch, launch_ros and the NoDL v1 API name both so, a
 }  # fmt: skip
 # report/contract.py: their JSON
 AS_THE_PLAN_HAS_IT = {"Diagnostic", "LauncherCall", "Node", "Reaction", "Respawn"}
-IN_BOTH_KINDS_OF_INFERENCE = {  # of Python in nodl/infer/, of C++ in nodl/infer/cpp/
-    "BudgetExceeded", "Call", "Findings", "FoundEndpoint", "Frame", "NodePart", "NodeRecord", "Text", "Unknown",
-}  # fmt: skip
+# of Python in nodl/infer/, of C++ in nodl/infer/cpp/
+IN_BOTH_KINDS_OF_INFERENCE = {"Call", "Frame", "Text", "Unknown"}
 
 
 def test_a_public_class_has_its_name_alone() -> None:

@@ -71,7 +71,7 @@ def _compiled(
 ) -> InferredExecutable:
     if sources is None:
         return InferredExecutable((), f"{what}, whose sources were not looked for")
-    from nodl.infer.cpp.answer import CppSupportMissing
+    from nodl.infer.cpp.entry import CppSupportMissing
 
     try:
         answer = sources.infer(package, executable, plugin, start_of)

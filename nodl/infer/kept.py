@@ -16,8 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from nodl.ament_index import PackageNotFoundError, package_prefix
 from nodl.infer.cpp.cache.codec import decoded, encoded
-from nodl.infer.cpp.cache.digests import digest, digest_of
-from nodl.infer.cpp.cache.folder import CacheFolder
+from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of
 
 if TYPE_CHECKING:
     from nodl.infer.program import Program

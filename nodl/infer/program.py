@@ -15,7 +15,7 @@ import warnings
 from collections.abc import Iterable, Sequence
 
 from enclave_launch.boundary.files import read_bytes
-from nodl.infer.cpp.cache.digests import digest, digest_of
+from nodl.infer.cpp.cache.folder import digest, digest_of
 from nodl.infer.kept import installed_in
 from nodl.infer.mangling import mangle
 from nodl.infer.source_text import source_text

@@ -65,7 +65,7 @@ def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
     """C++ sources. Without the extra ``cpp`` they are one gap."""
     if not files:
         return [], []
-    from nodl.infer.cpp.answer import CppSupportMissing
+    from nodl.infer.cpp.entry import CppSupportMissing
     from nodl.infer.cpp.system import infer_sources
 
     try:

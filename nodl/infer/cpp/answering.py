@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 
-from nodl.infer.cpp.answer import Answer
 from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
-from nodl.infer.cpp.entry import Entry, Solved
+from nodl.infer.cpp.entry import Answer, Entry, Solved
 from nodl.infer.cpp.program import Sources
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace
 from nodl.infer.cpp.solved import solve

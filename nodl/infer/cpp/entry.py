@@ -35,3 +35,16 @@ class FixedMapping(dict[Any, Any]):
 
     def __hash__(self) -> int:  # type: ignore[override]
         return hash(frozenset(self.items()))
+
+
+class CppSupportMissing(Exception):
+    """tree-sitter is not installed: ``pip install enclave-launch[cpp]``."""
+
+
+class Answer:
+    """What the sources say of one program. ``consulted``: parameters of the launch decided what it makes."""
+
+    def __init__(self, interfaces: tuple[NodeInterface, ...], why: str = "", consulted: bool = False):
+        self.interfaces = interfaces
+        self.why = why
+        self.consulted = consulted

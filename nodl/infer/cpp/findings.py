@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.values import BOTTOM, Text, Value, join
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
-
-if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Class
 
 Condition = tuple[str, int, str]  # file, line of the #if, symbol: what the preprocessor decides elsewhere
 
@@ -30,7 +27,7 @@ class Follows:
 
 
 @dataclass(frozen=True)
-class FoundEndpoint:
+class PossibleEndpoint:
     """An interface made at ``source``; ``follows`` where its name derives from another topic."""
 
     kind: EndpointKind
@@ -42,7 +39,7 @@ class FoundEndpoint:
 
 
 @dataclass(eq=False)
-class NodeRecord:
+class AllocatedNode:
     """A node under construction."""
 
     source: SourceRef
@@ -51,7 +48,7 @@ class NodeRecord:
     lifecycle: bool = False
     cls: Class | None = None
     created: bool = False
-    endpoints: dict[FoundEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
+    endpoints: dict[PossibleEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
     parameters: Notes = field(default_factory=Notes)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)

@@ -14,12 +14,10 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS
-from nodl.infer.cpp.syntax import text
+from nodl.infer.cpp.syntax import Node, text
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
-    from tree_sitter import Node
-
     from nodl.infer.cpp.running.machine import Machine
 
 CREATES = re.compile(

@@ -5,16 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.findings import AllocatedNode
+from nodl.infer.cpp.reading.type_names import Type, ros_type
+from nodl.infer.cpp.running.machine import Frame, Machine, registered
 from nodl.infer.cpp.running.values import BOTTOM, Obj, Value
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.running.frames import Frame
-    from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.syntax import Node
 
 
 @dataclass(frozen=True)
@@ -24,18 +20,39 @@ class Call:
     node: Node
     frame: Frame
     values: Sequence[Value]
-    types: Sequence[Type]
+    types: Sequence[Type] = ()
     given: Sequence[Node] = ()
     receiver: Obj | None = None
+
+    @property
+    def this(self) -> Obj:
+        """The object that is made, or whose method is called."""
+        assert self.receiver is not None
+        return self.receiver
+
+    @property
+    def record(self) -> AllocatedNode:
+        """The node whose method is called."""
+        assert self.this.node is not None
+        return self.this.node
+
+    @property
+    def interface(self) -> str:
+        """The interface type that is the first template argument; empty without one."""
+        return ros_type(self.types[0]) if self.types else ""
+
+    def key(self, what: str) -> tuple[object, ...]:
+        """For the object that the call makes."""
+        return what, self.frame.file.file, self.node.start_byte, self.frame.path
 
     def value(self, index: int) -> Value:
         return self.values[index] if index < len(self.values) else BOTTOM
 
 
-ClassModel = Callable[["Machine", Obj, list[Value], "Node", "Frame"], Value | None]
-FunctionModel = Callable[["Machine", Call], Value]
+ClassModel = Callable[[Machine, Call], Value | None]
+FunctionModel = Callable[[Machine, Call], Value]
 
-NODE_BASES: dict[str, ClassModel] = {}
+NODE_BASES: set[str] = set()
 LIBRARY_CLASSES: dict[str, ClassModel] = {}
 LIBRARY_FUNCTIONS: dict[str, FunctionModel] = {}
 LIBRARY_METHODS: dict[tuple[str, str], FunctionModel] = {}
@@ -85,40 +102,27 @@ def is_harmless_function(name: str) -> bool:
 
 
 def library_class(*names: str) -> Callable[[ClassModel], ClassModel]:
-    """Decorator: the model of these classes, run where one is made, by itself or as a base."""
+    """Decorator: the model of these classes, run where one is made, by itself or as a base; what it gives stands for
+    the object."""
+    return registered(LIBRARY_CLASSES, names)
 
-    def register(model: ClassModel) -> ClassModel:
-        LIBRARY_CLASSES.update(dict.fromkeys(names, model))
-        return model
 
-    return register
+def node_class(*names: str) -> Callable[[ClassModel], ClassModel]:
+    """Decorator: as ``library_class``, of classes that are nodes."""
+    NODE_BASES.update(names)
+    return library_class(*names)
 
 
 def library_function(*names: str) -> Callable[[FunctionModel], FunctionModel]:
     """Decorator: the model of these functions, run in place of the library's code."""
-
-    def register(model: FunctionModel) -> FunctionModel:
-        LIBRARY_FUNCTIONS.update(dict.fromkeys(names, model))
-        return model
-
-    return register
+    return registered(LIBRARY_FUNCTIONS, names)
 
 
 def library_method(cls: str, *names: str) -> Callable[[FunctionModel], FunctionModel]:
     """Decorator: the model of these methods of ``cls``, run in place of the library's code."""
-
-    def register(model: FunctionModel) -> FunctionModel:
-        LIBRARY_METHODS.update({(cls, name): model for name in names})
-        return model
-
-    return register
+    return registered(LIBRARY_METHODS, [(cls, name) for name in names])
 
 
 def node_method(*names: str) -> Callable[[FunctionModel], FunctionModel]:
     """Decorator: the model of these methods on any node whose class has none of its own for them."""
-
-    def register(model: FunctionModel) -> FunctionModel:
-        NODE_METHODS.update(dict.fromkeys(names, model))
-        return model
-
-    return register
+    return registered(NODE_METHODS, names)

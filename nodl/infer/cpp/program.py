@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 import nodl.infer.cpp.models
 import nodl.infer.cpp.running.rules  # noqa: F401  (registers how statements and expressions run)
 from enclave_launch.boundary.files import read_bytes
-from nodl.infer.cpp.cache.digests import digest_of, digest_of_content
+from nodl.infer.cpp.cache.folder import digest_of, digest_of_content
 from nodl.infer.cpp.entry import Entry
-from nodl.infer.cpp.findings import NodeRecord
+from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account
 from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
@@ -25,10 +25,10 @@ from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import BudgetExceeded, Machine, Settings
+from nodl.infer.cpp.running.machine import Frame, Machine, StepLimitExceeded
 from nodl.infer.cpp.running.values import Seq, Value, unknown
 from nodl.infer.cpp.syntax import children, line_of, text
+from nodl.infer.start import Start
 from nodl.source_ref import SourceRef
 
 MAX_FILE_SIZE = 2_000_000
@@ -39,10 +39,10 @@ _EXPORTED = re.compile(r"PLUGINLIB_EXPORT_CLASS\s*\(\s*([\w:<>, ]+?)\s*,\s*([\w:
 
 
 @dataclass
-class Findings:
+class ProgramFindings:
     """What one program makes. ``classes``: the node classes that it makes objects of."""
 
-    nodes: list[NodeRecord] = field(default_factory=list)
+    nodes: list[AllocatedNode] = field(default_factory=list)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     answers: list[SiteAnswer] = field(default_factory=list)
     classes: set[str] = field(default_factory=set)
@@ -148,28 +148,23 @@ def library_sources(package: SourcePackage) -> list[str]:
 # --- running ----------------------------------------------------------------------------------------------------
 
 
-def run_program(
-    sources: Sources, entry: Entry, settings: Settings | None = None, plugins: Iterable[str] = ()
-) -> Findings:
+def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramFindings:
     """Everything that the program may make. Raises ``CppSupportMissing``."""
     symbols = dict(entry.symbols)
-    files = sources.closure([*entry.files, *plugins], symbols, entry.complete)
+    files = sources.closure(entry.files, symbols, entry.complete)
+    missing = [name for name in _possible_plugins(sources, files) if name not in {i.file for i in files}]
+    if missing:
+        files = sources.closure([*entry.files, *missing], symbols, entry.complete)
     names = Names(files)
     names.plugins = {key: found[0][0].type for key, found in sources.workspace.plugin_classes.items()}
-    missing = [name for name in _possible_plugins(sources, names) if name not in {i.file for i in files}]
-    if missing:
-        files = sources.closure([*entry.files, *plugins, *missing], symbols, entry.complete)
-        plugin_names = names.plugins
-        names = Names(files)
-        names.plugins = plugin_names
     names.depends = frozenset().union(
         *(p.depends for i in files if (p := sources.workspace.package_of(i.file)) is not None)
     )
-    run = Machine(names, settings)
+    run = Machine(names, start)
     try:
         _start(run, entry)
         run_callbacks(run)
-    except (BudgetExceeded, RecursionError):
+    except (StepLimitExceeded, RecursionError):
         run.gaps.setdefault(
             (
                 SourceRef(entry.files[0] if entry.files else ""),
@@ -179,10 +174,10 @@ def run_program(
     return _findings(run, sources)
 
 
-def _possible_plugins(sources: Sources, names: Names) -> list[str]:
+def _possible_plugins(sources: Sources, files: Iterable[FileIndex]) -> list[str]:
     """Sources of plugins whose base class a loader of the program asks for."""
     wanted: set[str] = set()
-    for index in names.files.values():
+    for index in files:
         for match in re.finditer(r"ClassLoader\s*<\s*([\w:]+)\s*>", index.source.text):
             wanted.add(match[1].rpartition("::")[2])
     found: list[str] = []
@@ -284,8 +279,8 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
     construct(run, Type(cls.qualified), arguments, cls.node, frame, heap=True)
 
 
-def _findings(run: Machine, sources: Sources) -> Findings:
-    findings = Findings()
+def _findings(run: Machine, sources: Sources) -> ProgramFindings:
+    findings = ProgramFindings()
     findings.nodes = [record for record in run.nodes if record.created]
     for record in findings.nodes if run.global_arguments else ():
         if record.use_global_arguments:
@@ -313,7 +308,7 @@ def _findings(run: Machine, sources: Sources) -> Findings:
     return findings
 
 
-def _text_gaps(run: Machine, index: FileIndex, findings: Findings) -> None:
+def _text_gaps(run: Machine, index: FileIndex, findings: ProgramFindings) -> None:
     """What the parser did not understand, and macros that nobody in reach defines."""
     ran = {f for f in run.called if f.file is index}
     if not ran:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import as_path, read_text
 from enclave_launch.boundary.late_pattern import late_pattern
-from nodl.infer.cpp.answer import Answer
+from nodl.infer.cpp.entry import Answer
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.answering import Answering

@@ -7,9 +7,9 @@ from itertools import pairwise
 
 from nodl.dependence import Dependence, Test, Variation, When
 from nodl.infer.cpp.entry import FixedMapping
-from nodl.infer.cpp.findings import Condition, Follows, FoundEndpoint, NodeRecord
-from nodl.infer.cpp.program import Findings
-from nodl.infer.cpp.running.values import NodePart, Text, Value, concatenated, plain
+from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
+from nodl.infer.cpp.program import ProgramFindings
+from nodl.infer.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
 from nodl.infer.results import certainty_of
 from nodl.infer.start import Start
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
@@ -26,7 +26,7 @@ from nodl.remap import InvalidRemapRuleError, parse_rule
 
 
 def interfaces_of(
-    findings: Findings,
+    findings: ProgramFindings,
     package: str | None,
     executable: str | None,
     plugin: str | None,
@@ -57,7 +57,7 @@ def _filled(interface: NodeInterface, start: Start) -> NodeInterface:
     return interface._replace(endpoints=tuple(dict.fromkeys(endpoints)))
 
 
-def program_gaps(findings: Findings) -> list[Gap]:
+def program_gaps(findings: ProgramFindings) -> list[Gap]:
     """What belongs to no single node, and every place without a result."""
     gaps = [Gap(source, why) for source, why in findings.gaps]
     gaps += [Gap(answer.source, answer.reason) for answer in findings.answers if not answer.dead]
@@ -73,7 +73,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def _of_node(
-    record: NodeRecord, package: str | None, executable: str | None, plugin: str | None
+    record: AllocatedNode, package: str | None, executable: str | None, plugin: str | None
 ) -> list[NodeInterface]:
     gaps = [Gap(source, why) for source, why in record.gaps]
     gaps += _conditional_gaps(record)
@@ -109,7 +109,7 @@ def _of_node(
     return interfaces
 
 
-def _texts(value: Value, record: NodeRecord) -> list[str]:
+def _texts(value: Value, record: AllocatedNode) -> list[str]:
     found = []
     for atom in value:
         for template in _templates(atom, record):
@@ -119,14 +119,14 @@ def _texts(value: Value, record: NodeRecord) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def _endpoint(found: FoundEndpoint, record: NodeRecord) -> list[Endpoint]:
+def _endpoint(found: PossibleEndpoint, record: AllocatedNode) -> list[Endpoint]:
     return [
         Endpoint(found.kind, template, found.type, found.source, _certainty(template, found))
         for template in _templates(found.name, record)
     ]
 
 
-def _dependence(record: NodeRecord, gaps: list[Gap]) -> Dependence | None:
+def _dependence(record: AllocatedNode, gaps: list[Gap]) -> Dependence | None:
     """The names that follow the final name of another topic, for launch to fill in."""
     variations: dict[tuple[EndpointKind, str], Variation] = {}
     for found in record.endpoints:
@@ -145,7 +145,7 @@ def _dependence(record: NodeRecord, gaps: list[Gap]) -> Dependence | None:
     return Dependence(variations=FixedMapping(variations), defaults=defaults, options=FixedMapping())
 
 
-def _variation(follows: Follows, record: NodeRecord) -> Variation | None:
+def _variation(follows: Follows, record: AllocatedNode) -> Variation | None:
     """``None`` where the topic's name has parts that launch does not fill in; they are told with the endpoint."""
     (template, *others) = _templates(follows.topic, record)
     parts = [_reference(part) for part in template.parts]
@@ -163,20 +163,20 @@ def _reference(part: Part) -> str | None:
     return part if isinstance(part, str) and "{" not in part else None
 
 
-def _certainty(template: NameTemplate, found: FoundEndpoint) -> Certainty:
+def _certainty(template: NameTemplate, found: PossibleEndpoint) -> Certainty:
     certainty = certainty_of(template)
     return Certainty.FROM_DEFAULT if certainty is Certainty.EXACT and not found.exact else certainty
 
 
-def _templates(atom: object, record: NodeRecord) -> list[NameTemplate]:
+def _templates(atom: object, record: AllocatedNode) -> list[NameTemplate]:
     texts = [atom] if isinstance(atom, Text) else list(concatenated((atom,)))
     return [NameTemplate(tuple(_parts(each, record))) for each in texts if isinstance(each, Text)]
 
 
-def _parts(text: Text, record: NodeRecord) -> Iterable[Part]:
+def _parts(text: Text, record: AllocatedNode) -> Iterable[Part]:
     found: list[Part] = []
     for index, part in enumerate(text.parts):
-        made = _node_part(part, record, index == 0) if isinstance(part, NodePart) else part
+        made = _node_part(part, record, index == 0) if isinstance(part, NodeNamePart) else part
         if isinstance(made, str) and found and isinstance(found[-1], str):
             found[-1] += made
         else:
@@ -184,7 +184,7 @@ def _parts(text: Text, record: NodeRecord) -> Iterable[Part]:
     return found
 
 
-def _node_part(part: NodePart, record: NodeRecord, first: bool) -> Part:
+def _node_part(part: NodeNamePart, record: AllocatedNode, first: bool) -> Part:
     if part.record is record:
         if part.what == "fqn":
             return "~" if first else "{ns}/{node}"
@@ -199,7 +199,7 @@ def _node_part(part: NodePart, record: NodeRecord, first: bool) -> Part:
 # --- what the build decides -------------------------------------------------------------------------------------
 
 
-def _is_certain(found: FoundEndpoint, when: list[tuple[Condition, ...]], record: NodeRecord) -> bool:
+def _is_certain(found: PossibleEndpoint, when: list[tuple[Condition, ...]], record: AllocatedNode) -> bool:
     """Made whatever the build says: without a condition, or on every side of one."""
     if any(not conditions for conditions in when):
         return True
@@ -216,11 +216,11 @@ def _is_certain(found: FoundEndpoint, when: list[tuple[Condition, ...]], record:
     )
 
 
-def _alike(first: FoundEndpoint, second: FoundEndpoint) -> bool:
+def _alike(first: PossibleEndpoint, second: PossibleEndpoint) -> bool:
     return (first.kind, first.name, first.type) == (second.kind, second.name, second.type)
 
 
-def _conditional_gaps(record: NodeRecord) -> list[Gap]:
+def _conditional_gaps(record: AllocatedNode) -> list[Gap]:
     gaps = []
     for found, when in record.endpoints.items():
         if not _is_certain(found, when, record):
@@ -239,7 +239,7 @@ def _conditional_gaps(record: NodeRecord) -> list[Gap]:
 # --- remap rules in code ----------------------------------------------------------------------------------------
 
 
-def _rules(record: NodeRecord, gaps: list[Gap]) -> tuple[str, ...]:
+def _rules(record: AllocatedNode, gaps: list[Gap]) -> tuple[str, ...]:
     """The remap rules in the options of the node; what cannot be read as one is a gap."""
     rules: dict[str, None] = {}
     for words in record.arguments:

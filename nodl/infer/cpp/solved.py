@@ -14,7 +14,6 @@ from nodl.infer.cpp.entry import Entry, Solved
 from nodl.infer.cpp.parallel import each_in_parallel
 from nodl.infer.cpp.program import Sources, run_program
 from nodl.infer.cpp.results import interfaces_of, program_gaps
-from nodl.infer.cpp.running.machine import Settings
 from nodl.infer.start import LaunchKey, Start
 from nodl.node_interface import Gap
 
@@ -24,7 +23,7 @@ Program: TypeAlias = tuple[LaunchKey, Entry]
 def solve(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None = None) -> Made:
     """The program of ``entry``, ``Solved``, with the files that it was read from. Raises ``CppSupportMissing``."""
     with _garbage_at_the_end():
-        findings = run_program(sources, entry, Settings(start))
+        findings = run_program(sources, entry, start)
     solved = Solved(
         nodes=tuple(interfaces_of(findings, key.package, key.executable, key.plugin, start)),
         gaps=tuple(program_gaps(findings)),

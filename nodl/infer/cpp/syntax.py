@@ -7,10 +7,15 @@ from collections.abc import Iterator
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.answer import CppSupportMissing
+from nodl.infer.cpp.entry import CppSupportMissing
 
 if TYPE_CHECKING:
     from tree_sitter import Node, Parser, Tree
+else:
+    Node = Tree = object  # the extra may not be installed, and only annotations name them
+
+__all__ = ["Node", "Tree", "check_support", "children", "line_of", "parse", "parse_expression", "text", "unwrapped",
+           "walk", "words_in"]  # fmt: skip
 
 
 @lru_cache(maxsize=1)

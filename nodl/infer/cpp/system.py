@@ -234,7 +234,7 @@ def _unmade(
                 for each in names.ancestry(cls)
                 for w in each.bases
             }
-            if not bases & set(NODE_BASES) or cls.qualified in parents | made or cls.templates:
+            if not bases & NODE_BASES or cls.qualified in parents | made or cls.templates:
                 continue
             package = workspace.package_of(index.file)
             own = [f for f in files if workspace.package_of(f) is package]

@@ -8,9 +8,8 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 from nodl.infer.cpp.cache.codec import decoded, encoded
-from nodl.infer.cpp.cache.digests import digest, digest_of
 from nodl.infer.cpp.cache.fingerprint import analyser, surroundings
-from nodl.infer.cpp.cache.folder import CacheFolder
+from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of
 from nodl.infer.cpp.reading.project import Workspace
 from nodl.infer.start import Start
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from nodl.infer.cpp.cache.digests import digest, digest_of
+from nodl.infer.cpp.cache.folder import digest, digest_of
 from nodl.infer.cpp.reading.project import Workspace
 
 _BUILD_SUFFIXES = (".cmake", ".xml", ".yaml", ".yml")

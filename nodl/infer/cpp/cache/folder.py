@@ -1,7 +1,7 @@
 """The folder that keeps answers: ``$XDG_CACHE_HOME/enclave-launch/inferred`` or ``~/.cache/enclave-launch/inferred``.
 
 An entry is a file, written whole or not at all, with a checksum in its first line. Folders and files that are not ours
-alone to write are not believed. Reads and writes files.
+alone to write are not believed. Digests are SHA-256. Reads and writes files.
 """
 
 from __future__ import annotations
@@ -10,6 +10,8 @@ import hashlib
 import os
 import stat
 import tempfile
+
+from enclave_launch.boundary.files import read_bytes
 
 _LIMIT = 32 * 2**20  # of one entry
 _MOST_ENTRIES = 2_000
@@ -35,7 +37,7 @@ class CacheFolder:
             if not stat.S_ISREG(status.st_mode) or not _is_ours(status) or status.st_size > _LIMIT:
                 return None
             checksum, _, content = stream.read().partition(b"\n")
-        return content if checksum == _checksum(content) else None
+        return content if checksum == digest_of_content(content).encode() else None
 
     def write(self, key: str, content: bytes) -> None:
         """Keep ``content``; several writers of one key do no harm."""
@@ -44,7 +46,7 @@ class CacheFolder:
         try:
             descriptor, temporary = tempfile.mkstemp(dir=self._path, prefix="tmp-")
             with os.fdopen(descriptor, "wb") as stream:
-                stream.write(_checksum(content) + b"\n" + content)
+                stream.write(digest_of_content(content).encode() + b"\n" + content)
             os.replace(temporary, os.path.join(self._path, key))
             _make_room(self._path)
         except OSError:
@@ -77,10 +79,6 @@ def _is_ours(status: os.stat_result) -> bool:
     return status.st_uid == os.geteuid() and not status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
 
 
-def _checksum(content: bytes) -> bytes:
-    return hashlib.sha256(content).hexdigest().encode()
-
-
 def _make_room(path: str) -> None:
     """The oldest half goes when there are too many."""
     if len(os.listdir(path)) <= _MOST_ENTRIES:
@@ -89,3 +87,21 @@ def _make_room(path: str) -> None:
         entries = [(each.stat(follow_symlinks=False).st_mtime, each.path) for each in listed]
     for _, old in sorted(entries)[: len(entries) // 2]:
         os.unlink(old)
+
+
+def digest(*parts: object) -> str:
+    """Of anything whose ``repr`` says all of it."""
+    return digest_of_content(repr(parts).encode("utf-8", "surrogatepass"))
+
+
+def digest_of(path: str) -> str:
+    """Of a file's content; of one that cannot be read, that it cannot."""
+    try:
+        return digest_of_content(read_bytes(path))
+    except OSError as error:
+        return f"unreadable: {error.errno}"
+
+
+def digest_of_content(content: bytes) -> str:
+    """SHA-256 of bytes, in hexadecimal."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,15 +1,15 @@
-"""image_transport: publishers with their transports, subscriptions, cameras."""
+"""image_transport: publishers with their transports, subscriptions, cameras; camera_info_manager."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import replace
+from functools import partial
 
-from nodl.infer.cpp.findings import Follows
-from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call, library_class, library_function
-from nodl.infer.cpp.models.table import PUB, SUB, owner_in, texts_in
+from nodl.infer.cpp.findings import AllocatedNode, Follows
+from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method
+from nodl.infer.cpp.models.interfaces import PUB, SRV, SUB, node_of, owner_in, texts_in
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.launch_values import given_by_launch
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
@@ -26,14 +26,7 @@ from nodl.infer.cpp.running.values import (
 )
 from nodl.name_template import ParameterPart
 
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
 _IMAGE, _INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
-
-
-def _transported(base: Value, plugin: str) -> Value:
-    return concatenated(base, literal(f"/{plugin}"))
 
 
 # image_transport_plugins: the transports that ros-<distro>-image-transport-plugins brings, with their types.
@@ -46,102 +39,93 @@ _TRANSPORTS = {
 }
 
 
-def _image_publisher(run: Machine, owner: Obj, base: Value, node: Node, frame: Frame) -> None:
+def _image_publisher(run: Machine, record: AllocatedNode, base: Value, call: Call) -> None:
     """image_transport/src/publisher.cpp: one publisher for each transport plugin that is installed, below the final
     name of the image."""
-    assert owner.node is not None
-    run.endpoint(owner.node, PUB, base, _IMAGE, node, frame)
+    run.endpoint(record, PUB, base, _IMAGE, call)
     for topic in concatenated(base):
         for plugin, kind in list(_TRANSPORTS.items())[:3]:
             follows = Follows("remapped", topic, f"/{plugin}")
-            run.endpoint(owner.node, PUB, _transported((topic,), plugin), kind, node, frame, follows)
+            run.endpoint(record, PUB, concatenated((topic,), literal(f"/{plugin}")), kind, call, follows)
 
 
 def _info_topic(base: Value) -> Value:
     """image_transport/src/camera_common.cpp, getCameraInfoTopic: the last part of the name replaced."""
     found: list[object] = []
     for atom in base:
-        if (
-            isinstance(atom, Text)
-            and atom.parts
-            and isinstance(atom.parts[-1], str)
-            and "/" in atom.parts[-1]
-        ):
-            head = atom.parts[-1].rpartition("/")[0]
-            found += concatenated((Text((*atom.parts[:-1], head + "/")),), literal("camera_info"))
-        elif isinstance(atom, Text) and all(isinstance(part, str) for part in atom.parts):
+        parts = atom.parts if isinstance(atom, Text) else ()
+        if parts and isinstance(parts[-1], str) and "/" in parts[-1]:
+            head = parts[-1].rpartition("/")[0]
+            found += concatenated((Text((*parts[:-1], head + "/")),), literal("camera_info"))
+        elif isinstance(atom, Text) and all(isinstance(part, str) for part in parts):
             found += literal("camera_info")
         else:
             found += unknown("the camera_info beside a topic that is not known")
     return tuple(found)
 
 
-def _image(run: Machine, call: Call, what: str, place: int = 3) -> Value:
-    owner = owner_in(run, call.values) or (
-        call.receiver if call.receiver is not None and call.receiver.node else None
-    )
-    held = call.receiver.data.get("owner") if call.receiver is not None else None
-    owner = owner or held
-    texts = texts_in(call.values, run)
+def _owner_of(call: Call) -> Obj | None:
+    """The node among the arguments, else that of the object, or that the object was made with."""
+    this = call.receiver
+    owner = owner_in(call.values) or (this if this is not None and this.node else None)
+    return owner or (this.data.get("owner") if this is not None else None)
+
+
+def _image(what: str, run: Machine, call: Call, place: int = 3) -> Value:
+    """``place``: of the transport among the arguments of a subscription."""
+    owner, texts = _owner_of(call), texts_in(call.values)
     if owner is None or owner.node is None:
         run.gap(call.node, call.frame, f"the node that image_transport makes a {what} on is not known")
         return unknown("an image interface")
     base = texts[0] if texts else unknown("a topic that is not given")
-    for value in call.values:
-        for atom in value:
-            run.later(atom, call.frame)
+    run.later(call.values, call.frame)
     if what in ("publisher", "camera publisher"):
-        _image_publisher(run, owner, base, call.node, call.frame)
+        _image_publisher(run, owner.node, base, call)
     else:
-        _image_subscriber(run, owner, base, call, place)
+        for transport in _transports_of(owner.node, call, place):
+            _image_subscription(run, owner.node, base, call, transport)
     if what.startswith("camera"):
         kind = PUB if what.endswith("publisher") else SUB
         for topic in concatenated(base):
-            follows = Follows("camera_info", topic)
             info = _info_topic((topic,))
-            run.endpoint(owner.node, kind, info, _INFO, call.node, call.frame, follows)
-    made = run.obj(
-        ("image", call.frame.file.file, call.node.start_byte, call.frame.path),
-        Type(f"image_transport::{what.replace('subscription', 'subscriber').title().replace(' ', '')}"),
-        heap=True,
-    )
-    return (made,)
+            run.endpoint(owner.node, kind, info, _INFO, call, Follows("camera_info", topic))
+    name = what.replace("subscription", "subscriber").title().replace(" ", "")
+    return (run.obj(call.key("image"), Type(f"image_transport::{name}"), heap=True),)
 
 
-def _image_subscriber(run: Machine, owner: Obj, base: Value, call: Call, place: int) -> None:
-    """image_transport/src/subscriber.cpp: one topic, by the transport. ``place``: of it among the arguments."""
-    assert owner.node is not None
-    transports = _transports_of(run, owner, call, place)
-    for atom in transports:
-        if isinstance(atom, Text) and atom.parts == ("raw",):
-            run.endpoint(owner.node, SUB, base, _IMAGE, call.node, call.frame)
-        elif isinstance(atom, Text) and plain(atom) in _TRANSPORTS:
-            _transported_subscription(run, owner, base, call, str(plain(atom)), "", "")
-        elif isinstance(atom, Param) and atom.item is None and _only_text(atom) is not None:
-            _chosen_by(run, owner, base, call, atom)
-        else:
-            run.endpoint(owner.node, SUB, base, _IMAGE, call.node, call.frame)
+def _image_subscription(
+    run: Machine, record: AllocatedNode, base: Value, call: Call, transport: object
+) -> None:
+    """image_transport/src/subscriber.cpp: one topic, by the transport."""
+    known = plain(transport) if isinstance(transport, Text) else None
+    if known in _TRANSPORTS:
+        _transported_subscription(run, record, base, call, str(known), "", "")
+    elif isinstance(transport, Param) and transport.item is None and _only_text(transport) is not None:
+        _chosen_by(run, record, base, call, transport)
+    else:
+        run.endpoint(record, SUB, base, _IMAGE, call)
+        if known != "raw":
             run.gap(
                 call.node, call.frame,
                 "the transport of this image subscription is chosen at run time (not known); "
                 "its topic is BASE for raw, BASE/TRANSPORT else",
-                owner.node,
+                record,
             )  # fmt: skip
 
 
-def _transports_of(run: Machine, owner: Obj, call: Call, place: int) -> Value:
+def hinted(call: Call) -> Value:
+    """The transport that hints among the arguments name; nothing without hints."""
+    hints = [a for v in call.values for a in v if isinstance(a, Obj) and a.type.last == "TransportHints"]
+    return join(*(each.data.get("transport", unknown("a transport")) for each in hints))
+
+
+def _transports_of(record: AllocatedNode, call: Call, place: int) -> Value:
     """As given, else ``raw``; for the methods of ``ImageTransport`` the hints decide, else the parameter that they read
     (image_transport/src/image_transport.cpp, ``getTransportOrDefault``)."""
     if call.receiver is None:
         return (call.values[place] or unknown("a transport")) if len(call.values) > place else literal("raw")
-    hints = [
-        a for value in call.values for a in value if isinstance(a, Obj) and a.type.last == "TransportHints"
-    ]
-    if hints:
-        return join(*(each.data.get("transport", unknown("a transport")) for each in hints))
-    if owner.node is not None and "image_transport" in owner.node.parameters:
-        return (Param(owner.node, "image_transport"),)
-    return literal("raw")
+    parameter = (Param(record, "image_transport"),) if "image_transport" in record.parameters else None
+    return hinted(call) or parameter or literal("raw")
 
 
 def _only_text(atom: Param) -> str | None:
@@ -149,33 +133,30 @@ def _only_text(atom: Param) -> str | None:
     return texts[0] if len(texts) == 1 else None
 
 
-def _chosen_by(run: Machine, owner: Obj, base: Value, call: Call, chosen: Param) -> None:
+def _chosen_by(run: Machine, record: AllocatedNode, base: Value, call: Call, chosen: Param) -> None:
     """A parameter names the transport: of all its topics the one with its value is subscribed."""
-    assert owner.node is not None
     default = _only_text(chosen) or ""
     for topic in concatenated(base):
         raw = Follows("remapped", topic, "", chosen.name, "raw", default)
         name = concatenated((topic,), only_if(chosen.name, default, "raw"))
-        run.endpoint(owner.node, SUB, name, _IMAGE, call.node, call.frame, raw)
+        run.endpoint(record, SUB, name, _IMAGE, call, raw)
     for transport in _TRANSPORTS:
-        _transported_subscription(run, owner, base, call, transport, chosen.name, default)
-    given = given_by_launch(run, chosen.record, chosen.name)
-    if (default if given is None else given) not in ("raw", *_TRANSPORTS):
-        why = f"the image transport {given or default} (parameter {chosen.name}) is not in the table"
-        run.gap(call.node, call.frame, why, owner.node)
-    run.from_default.pop(chosen.name, None)  # its values are all listed
+        _transported_subscription(run, record, base, call, transport, chosen.name, default)
+    if chosen_transport(run, chosen, ("raw", *_TRANSPORTS)) is None:
+        named = run.consulted.get(chosen.name) or default
+        why = f"the image transport {named} (parameter {chosen.name}) is not in the table"
+        run.gap(call.node, call.frame, why, record)
 
 
 def _transported_subscription(
-    run: Machine, owner: Obj, base: Value, call: Call, transport: str, parameter: str, default: str
+    run: Machine, record: AllocatedNode, base: Value, call: Call, transport: str, parameter: str, default: str
 ) -> None:
-    assert owner.node is not None
     for topic in concatenated(base):
         wanted = transport if parameter else ""
         follows = Follows("remapped", topic, f"/{transport}", parameter, wanted, default)
         condition = only_if(parameter, default, transport) if parameter else literal("")
         name = concatenated((topic,), literal(f"/{transport}"), condition)
-        run.endpoint(owner.node, SUB, name, _TRANSPORTS[transport], call.node, call.frame, follows)
+        run.endpoint(record, SUB, name, _TRANSPORTS[transport], call, follows)
 
 
 def chosen_transport(run: Machine, chosen: Param, known: Sequence[str]) -> str | None:
@@ -192,24 +173,19 @@ def only_if(parameter: str, default: str, value: str) -> Value:
 
 
 @library_class("image_transport::TransportHints")
-def _transport_hints(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
+def _transport_hints(run: Machine, call: Call) -> None:
     """image_transport/transport_hints.hpp: (node, default, parameter name), read by ``get_parameter_or``."""
-    owner = owner_in(run, arguments)
-    texts = texts_in(arguments, run)
+    owner, texts = owner_in(call.values), texts_in(call.values)
     name = plain(texts[1][0]) if len(texts) > 1 and len(texts[1]) == 1 else "image_transport"
     fallback = texts[0] if texts else literal("raw")
     if owner is not None and owner.node is not None and name is not None:
-        this.data["transport"] = (Param(owner.node, name, None, owner.node.default(name) or fallback),)
-    return None
+        call.this.data["transport"] = (Param(owner.node, name, None, owner.node.default(name) or fallback),)
 
 
-LIBRARY_METHODS[("image_transport::TransportHints", "getTransport")] = lambda run, call: (
-    call.receiver.data.get("transport", unknown("a transport"))
-    if call.receiver is not None
-    else unknown("a transport")
-)
+@library_method("image_transport::TransportHints", "getTransport")
+def _transport(run: Machine, call: Call) -> Value:
+    found: Value = call.this.data.get("transport", unknown("a transport"))
+    return found
 
 
 @library_function("image_transport::getCameraInfoTopic")
@@ -223,66 +199,59 @@ def _camera_info_topic(run: Machine, call: Call) -> Value:
     return tuple(found)
 
 
-for _function, _what in (
-    ("create_publisher", "publisher"),
-    ("create_subscription", "subscription"),
-    ("create_camera_publisher", "camera publisher"),
-    ("create_camera_subscription", "camera subscription"),
-):
-    library_function(f"image_transport::{_function}")(lambda run, call, what=_what: _image(run, call, what))  # type: ignore[misc]
-
-
 @library_class("image_transport::ImageTransport")
-def _image_transport(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
-    this.data["owner"] = owner_in(run, arguments)
-    if this.data["owner"] is None:
-        run.gap(node, frame, "the node of this image_transport::ImageTransport is not known")
-    return None
+def _image_transport(run: Machine, call: Call) -> None:
+    node_of(run, call, "image_transport::ImageTransport")
+    call.this.data["owner"] = owner_in(call.values)
 
 
-for _method, _what in (
-    ("advertise", "publisher"),
-    ("advertiseCamera", "camera publisher"),
-    ("subscribe", "subscription"),
-    ("subscribeCamera", "camera subscription"),
+for _what, _function, _method in (
+    ("publisher", "create_publisher", "advertise"),
+    ("subscription", "create_subscription", "subscribe"),
+    ("camera publisher", "create_camera_publisher", "advertiseCamera"),
+    ("camera subscription", "create_camera_subscription", "subscribeCamera"),
 ):
-    LIBRARY_METHODS[("image_transport::ImageTransport", _method)] = lambda run, call, what=_what: _image(
-        run, call, what
-    )  # type: ignore[misc]
+    library_function(f"image_transport::{_function}")(partial(_image, _what))
+    library_method("image_transport::ImageTransport", _method)(partial(_image, _what))
 
 
 @library_class("image_transport::SubscriberFilter")
-def _subscriber_filter(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
+def _subscriber_filter(run: Machine, call: Call) -> None:
     """image_transport/subscriber_filter.hpp: (node, topic, transport)."""
-    if arguments:
-        _image(run, Call(node, frame, arguments, []), "subscription", 2)
-    return None
+    if call.values:
+        _filter(run, call)
 
 
+@library_method("image_transport::SubscriberFilter", "subscribe")
 def _filter(run: Machine, call: Call) -> Value:
-    return _image(run, Call(call.node, call.frame, call.values, []), "subscription", 2)
+    return _image("subscription", run, replace(call, receiver=None), 2)
 
 
-LIBRARY_METHODS[("image_transport::SubscriberFilter", "subscribe")] = _filter
-
-
-def _handle(what: str) -> None:
+def _handle(what: str, run: Machine, call: Call) -> Value | None:
     """image_transport/publisher.hpp and its siblings: default, copied, or (node, topic, ...) as the functions."""
-
-    def model(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
-        same = tuple(
-            a for value in arguments for a in value if isinstance(a, Obj) and a.type.name == this.type.name
-        )
-        if same or not arguments:
-            return same or None
-        return _image(run, Call(node, frame, arguments, []), what)
-
-    library_class(f"image_transport::{what.title().replace(' ', '')}")(model)
+    same = tuple(
+        a for v in call.values for a in v if isinstance(a, Obj) and a.type.name == call.this.type.name
+    )
+    if same or not call.values:
+        return same or None
+    return _image(what, run, replace(call, receiver=None))
 
 
 for _what in ("publisher", "camera publisher", "subscriber", "camera subscriber"):
-    _handle(_what)
+    library_class(f"image_transport::{_what.title().replace(' ', '')}")(partial(_handle, _what))
+
+
+@library_class("camera_info_manager::CameraInfoManager")
+def _manager(run: Machine, call: Call) -> None:
+    """(node, camera, url): ``set_camera_info`` in humble, ``~/set_camera_info`` from jazzy on; in rolling a further
+    text is the namespace. Which one is installed is not asked: both are listed. Source: ros-perception/image_common
+    humble d118138, jazzy d04d2c8, rolling f6e4ab6: camera_info_manager/src/camera_info_manager.cpp."""
+    record = node_of(run, call, "camera_info_manager::CameraInfoManager")
+    if record is None:
+        return
+    texts = [v for v in texts_in(call.values) if any(isinstance(atom, Text) for atom in v)]
+    names = [concatenated(texts[2] if len(texts) > 2 else literal("~"), literal("/set_camera_info"))]
+    if len(texts) <= 2:
+        names.append(literal("set_camera_info"))
+    for name in names:
+        run.endpoint(record, SRV, name, "sensor_msgs/srv/SetCameraInfo", call)

@@ -5,27 +5,24 @@ Source: rclcpp/include/rclcpp/node.hpp, rclcpp_lifecycle/lifecycle_node.hpp, nod
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from functools import partial
 
-from nodl.infer.cpp.findings import NodeRecord
+from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.libraries import (
-    LIBRARY_CLASSES,
-    NODE_BASES,
     Call,
     library_class,
     library_function,
     library_method,
+    node_class,
     node_method,
 )
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,
-    NodePart,
+    NodeNamePart,
     Obj,
     Param,
     Seq,
@@ -38,39 +35,34 @@ from nodl.infer.cpp.running.values import (
     truth,
     unknown,
 )
+from nodl.infer.cpp.syntax import text
 from nodl.node_interface import EndpointKind
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
 
 OPTIONS = "rclcpp::NodeOptions"
 
 
-def become_node(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame, *, lifecycle: bool
-) -> NodeRecord:
-    """``this`` is a node from now on: ``Node(name, options)`` or ``Node(name, namespace, options)``."""
-    record = run.new_node(node, frame, this)
+def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> AllocatedNode:
+    """The object is a node from now on: ``Node(name, options)`` or ``Node(name, namespace, options)``."""
+    this = call.this
+    record = run.new_node(call.node, call.frame, this)
     if not record.created:
         record.created = True
         record.cls = this.cls
-        record.source = run.place(node, frame)
+        record.source = run.place(call.node, call.frame)
         record.lifecycle = lifecycle
         record.description = this.type.name
     this.node, this.is_node = record, True
-    name = arguments[0] if arguments else BOTTOM
-    rest = arguments[1:]
-    record.names = join(record.names, name or unknown("a name that is not given"))
+    record.names = join(record.names, call.value(0) or unknown("a name that is not given"))
+    rest = call.values[1:]
     if rest and not _is_options(rest[0]):
         record.namespaces = join(record.namespaces, rest[0])
         rest = rest[1:]
-    for value in rest:
-        for atom in value:
-            if isinstance(atom, Obj) and atom.type.name == OPTIONS:
-                _read_options(run, record, atom, node, frame)
+    for atom in (atom for value in rest for atom in value):
+        if isinstance(atom, Obj) and atom.type.name == OPTIONS:
+            _read_options(run, record, atom, call)
     if lifecycle and len(rest) > 1 and truth(rest[1]) is False:
         record.lifecycle = False
-    for condition in run.conditions(node, frame):
+    for condition in run.conditions(call.node, call.frame):
         record.gap(record.source, f"this node is made only where the build says {condition[2]}")
     return record
 
@@ -82,46 +74,38 @@ def _is_options(value: Value) -> bool:
     )
 
 
-def _read_options(run: Machine, record: NodeRecord, options: Obj, node: Node, frame: Frame) -> None:
+def _read_options(run: Machine, record: AllocatedNode, options: Obj, call: Call) -> None:
     for atom in run.store.get((options, "arguments")) or BOTTOM:
         if isinstance(atom, Seq) and not atom.open:
             words = tuple(_word(run, item) for item in atom.items)
             if words not in record.arguments:
                 record.arguments.append(words)
-            _read_parameters(run, record, words, atom.items, node, frame)
+            _read_parameters(run, record, words, atom, call)
         else:
-            record.gap(
-                run.place(node, frame), "remap rules given in code (NodeOptions.arguments) are not known"
-            )
+            why = "remap rules given in code (NodeOptions.arguments) are not known"
+            run.gap(call.node, call.frame, why, record)
     if truth(run.store.get((options, "use_global_arguments")) or BOTTOM) is False:
         record.use_global_arguments = False
-    _asked_for(run, record, options, node, frame)
+    _asked_for(run, record, options, call)
     for atom in run.store.get((options, "overrides")) or BOTTOM:
-        if isinstance(atom, Seq):
-            for item in atom.items:
-                _override(record, item)
-        for name, value in atom.entries if isinstance(atom, Map) else ():
-            _override(record, (Seq((name, value)),))
+        entries = [(Seq(entry),) for entry in atom.entries] if isinstance(atom, Map) else []
+        for item in atom.items if isinstance(atom, Seq) else entries:
+            _override(record, item)
 
 
 def _read_parameters(
-    run: Machine,
-    record: NodeRecord,
-    words: tuple[str | None, ...],
-    items: Sequence[Value],
-    node: Node,
-    frame: Frame,
+    run: Machine, record: AllocatedNode, words: tuple[str | None, ...], given: Seq, call: Call
 ) -> None:
     """rcl/src/rcl/arguments.c: ``-p name:=value`` and files of parameters, given to the node in code."""
-    for flag, word, item in zip(words, words[1:], items[1:], strict=False):
+    for flag, word, item in zip(words, words[1:], given.items[1:], strict=False):
         names = {_assigned(atom) for atom in item} if flag in ("-p", "--param") else set()
         if len(names) == 1 and None not in names:
-            value = (
-                literal(word.partition(":=")[2]) if word is not None else unknown("a parameter given in code")
-            )
+            not_known = unknown("a parameter given in code")
+            value = not_known if word is None else literal(word.partition(":=")[2])
             record.overrides[str(names.pop())] = value
         elif flag in ("--params-file", "-p", "--param"):
-            record.gap(run.place(node, frame), f"parameters given in code ({flag} {word}) are not known")
+            why = f"parameters given in code ({flag} {word}) are not known"
+            run.gap(call.node, call.frame, why, record)
 
 
 def _assigned(atom: object) -> str | None:
@@ -130,16 +114,16 @@ def _assigned(atom: object) -> str | None:
     return first.partition(":=")[0] if isinstance(first, str) and ":=" in first else None
 
 
-def _asked_for(run: Machine, record: NodeRecord, options: Obj, node: Node, frame: Frame) -> None:
+def _asked_for(run: Machine, record: AllocatedNode, options: Obj, call: Call) -> None:
     """What rclcpp makes when the options ask for it: topic statistics, logger services (node_logging.cpp)."""
     statistics = run.store.get((options, "enable_topic_statistics"))
     if statistics and truth(statistics) is not False:
         kind = "statistics_msgs/msg/MetricsMessage"
-        run.endpoint(record, EndpointKind.PUBLISHER, literal("/statistics"), kind, node, frame)
+        run.endpoint(record, EndpointKind.PUBLISHER, literal("/statistics"), kind, call)
     logger = run.store.get((options, "enable_logger_service"))
     for name in ("get_logger_levels", "set_logger_levels") if logger and truth(logger) is not False else ():
         kind = f"rcl_interfaces/srv/{name.title().replace('_', '')}"
-        run.endpoint(record, EndpointKind.SERVICE_SERVER, literal(f"~/{name}"), kind, node, frame)
+        run.endpoint(record, EndpointKind.SERVICE_SERVER, literal(f"~/{name}"), kind, call)
 
 
 def _word(run: Machine, item: Value) -> str | None:
@@ -147,7 +131,7 @@ def _word(run: Machine, item: Value) -> str | None:
     return text_of(run, item[0]) if len(item) == 1 else None
 
 
-def _override(record: NodeRecord, item: Value) -> None:
+def _override(record: AllocatedNode, item: Value) -> None:
     for atom in item:
         pair = atom.data.get("arguments", []) if isinstance(atom, Obj) else list(getattr(atom, "items", ()))
         if len(pair) == 2:
@@ -156,89 +140,56 @@ def _override(record: NodeRecord, item: Value) -> None:
                     record.overrides["".join(str(p) for p in name.parts)] = pair[1]
 
 
-def _plain_node(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
-    become_node(run, this, arguments, node, frame, lifecycle=False)
-    return None
+@node_class("rclcpp::Node")
+def _plain_node(run: Machine, call: Call) -> None:
+    become_node(run, call)
 
 
-def _lifecycle_node(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
-    become_node(run, this, arguments, node, frame, lifecycle=True)
-    return None
-
-
-NODE_BASES["rclcpp::Node"] = LIBRARY_CLASSES["rclcpp::Node"] = _plain_node
-NODE_BASES["rclcpp_lifecycle::LifecycleNode"] = LIBRARY_CLASSES["rclcpp_lifecycle::LifecycleNode"] = (
-    _lifecycle_node
-)
+@node_class("rclcpp_lifecycle::LifecycleNode")
+def _lifecycle_node(run: Machine, call: Call) -> None:
+    become_node(run, call, lifecycle=True)
 
 
 # --- what a node says of itself ---------------------------------------------------------------------------------
 
 
+@node_method(
+    "shared_from_this", "weak_from_this", "get_rcl_node_handle", "get_shared_rcl_node_handle",
+    *(f"get_node_{part}_interface" for part in (
+        "base", "topics", "services", "parameters", "timers", "graph", "clock", "logging", "waitables", "time_source",
+        "type_descriptions")),
+)  # fmt: skip
 def _self(run: Machine, call: Call) -> Value:
-    return (call.receiver,) if call.receiver is not None else BOTTOM
+    return (call.this,)
 
 
-for _name in (
-    "shared_from_this",
-    "weak_from_this",
-    "get_node_base_interface",
-    "get_node_topics_interface",
-    "get_node_services_interface",
-    "get_node_parameters_interface",
-    "get_node_timers_interface",
-    "get_node_graph_interface",
-    "get_node_clock_interface",
-    "get_node_logging_interface",
-    "get_node_waitables_interface",
-    "get_node_time_source_interface",
-    "get_node_type_descriptions_interface",
-    "get_rcl_node_handle",
-    "get_shared_rcl_node_handle",
-):
-    node_method(_name)(_self)
+def _says(what: str, run: Machine, call: Call) -> Value:
+    return (Text((NodeNamePart(call.record, what),)),)
 
 
-def _says(what: str) -> None:
-    def answer(run: Machine, call: Call) -> Value:
-        record = call.receiver.node if call.receiver is not None else None
-        return (Text((NodePart(record, what),)),) if record is not None else unknown("the name of a node")
-
-    node_method({"name": "get_name", "ns": "get_namespace", "fqn": "get_fully_qualified_name"}[what])(answer)
-
-
-for _what in ("name", "ns", "fqn"):
-    _says(_what)
+for _what, _name in (("name", "get_name"), ("ns", "get_namespace"), ("fqn", "get_fully_qualified_name")):
+    node_method(_name)(partial(_says, _what))
 
 
 @node_method("get_sub_namespace")
 def _sub_namespace(run: Machine, call: Call) -> Value:
     """rclcpp/src/rclcpp/node.cpp: empty for the node itself."""
-    return (call.receiver.data.get("prefix") if call.receiver is not None else None) or literal("")
+    return call.this.data.get("prefix") or literal("")
 
 
 @node_method("get_effective_namespace")
 def _effective_namespace(run: Machine, call: Call) -> Value:
     """rclcpp/src/rclcpp/node.cpp: the namespace of the node, of a sub-node with its own behind it."""
-    record = call.receiver.node if call.receiver is not None else None
-    if call.receiver is None or record is None:
-        return unknown("a namespace")
-    if call.receiver.data.get("prefix"):
-        return unknown("the namespace of a sub-node")
-    return (Text((NodePart(record, "ns"),)),)
+    return unknown("the namespace of a sub-node") if call.this.data.get("prefix") else _says("ns", run, call)
 
 
 @node_method("create_sub_node")
 def _sub_node(run: Machine, call: Call) -> Value:
     """Relative names of a sub-node stand below its sub-namespace."""
-    key = ("sub", call.frame.file.file, call.node.start_byte, call.frame.path)
-    made = run.obj(key, Type("rclcpp::Node"), heap=True)
-    if call.receiver is not None:
-        made.node, made.is_node = call.receiver.node, True
-        outer = call.receiver.data.get("prefix")
-        made.data["prefix"] = concatenated(outer, literal("/"), call.value(0)) if outer else call.value(0)
+    made = run.obj(call.key("sub"), Type("rclcpp::Node"), heap=True)
+    made.node, made.is_node = call.record, True
+    outer = call.this.data.get("prefix")
+    made.data["prefix"] = concatenated(outer, literal("/"), call.value(0)) if outer else call.value(0)
     return (made,)
 
 
@@ -249,9 +200,7 @@ def _resolved(run: Machine, call: Call) -> Value:
 
 
 def _nothing(run: Machine, call: Call) -> Value:
-    for value in call.values:
-        for atom in value:
-            run.later(atom, call.frame)
+    run.later(call.values, call.frame)
     return unknown("a value that rclcpp gives")
 
 
@@ -287,47 +236,34 @@ node_method(
 
 
 @library_class(OPTIONS)
-def _options(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
-    for atom in arguments[0] if arguments else BOTTOM:
-        if isinstance(atom, Obj) and atom.type.name == OPTIONS:
-            return (atom,)
-    return None
+def _options(run: Machine, call: Call) -> Value | None:
+    return next(((a,) for a in call.value(0) if isinstance(a, Obj) and a.type.name == OPTIONS), None)
 
 
-def _setter(run: Machine, call: Call) -> Value:
-    """``options.arguments({...})`` and kin return the options."""
-    name = _called(call)
-    if call.receiver is None:
-        return BOTTOM
-    if not call.values:
-        known = run.store.get((call.receiver, name))
-        return known or ((Seq(()),) if name == "arguments" else unknown(f"the {name} of node options"))
-    if name == "append_parameter_override":
-        pair = (Seq((call.value(0), call.value(1))),)
-        before = run.store.get((call.receiver, "overrides")) or BOTTOM
-        items = [item for atom in before if isinstance(atom, Seq) for item in atom.items]
-        run.store.set((call.receiver, "overrides"), (Seq((*items, pair)),))
-    else:
-        key = "overrides" if name == "parameter_overrides" else name
-        run.store.set((call.receiver, key), call.value(0))
-    return (call.receiver,)
-
-
-def _called(call: Call) -> str:
-    from nodl.infer.cpp.syntax import text
-
-    function = call.node.child_by_field_name("function")
-    return text(function.child_by_field_name("field")) if function is not None else ""
-
-
-library_method(
+@library_method(
     OPTIONS, "arguments", "parameter_overrides", "append_parameter_override", "use_global_arguments", "context",
     "enable_rosout", "use_intra_process_comms", "enable_topic_statistics", "start_parameter_services",
     "start_parameter_event_publisher", "clock_type", "clock_qos", "use_clock_thread", "parameter_event_qos",
     "rosout_qos",
     "parameter_event_publisher_options", "allow_undeclared_parameters", "enable_logger_service",
     "automatically_declare_parameters_from_overrides", "allocator", "get_rcl_node_options",
-)(_setter)  # fmt: skip
+)  # fmt: skip
+def _setter(run: Machine, call: Call) -> Value:
+    """``options.arguments({...})`` and kin return the options."""
+    function = call.node.child_by_field_name("function")
+    name = text(function.child_by_field_name("field")) if function is not None else ""
+    if not call.values:
+        known = run.store.get((call.this, name))
+        return known or ((Seq(()),) if name == "arguments" else unknown(f"the {name} of node options"))
+    if name == "append_parameter_override":
+        pair = (Seq((call.value(0), call.value(1))),)
+        before = run.store.get((call.this, "overrides")) or BOTTOM
+        items = [item for atom in before if isinstance(atom, Seq) for item in atom.items]
+        run.store.set((call.this, "overrides"), (Seq((*items, pair)),))
+    else:
+        key = "overrides" if name == "parameter_overrides" else name
+        run.store.set((call.this, key), call.value(0))
+    return (call.this,)
 
 
 ARGUMENT = "an argument of the program"
@@ -338,14 +274,12 @@ ARGUMENT = "an argument of the program"
 def _init(run: Machine, call: Call) -> Value:
     """rclcpp/utilities.hpp: (argc, argv, ...). With arguments of the program's own making, those of the launch are not
     heard; they are rules for all nodes."""
-    given = call.value(1) if len(call.values) > 1 else BOTTOM
-    for atom in given or ((Seq(()),) if call.values else BOTTOM):
+    for atom in call.value(1) or ((Seq(()),) if call.values else BOTTOM):
         if isinstance(atom, Seq) and not atom.open:
             run.global_arguments.append(tuple(_word(run, item) for item in atom.items))
         elif not _is_of_program(atom):
-            run.gap(
-                call.node, call.frame, "the arguments that the program gives to rclcpp::init are not known"
-            )
+            why = "the arguments that the program gives to rclcpp::init are not known"
+            run.gap(call.node, call.frame, why)
     return unknown("the arguments that are left")
 
 

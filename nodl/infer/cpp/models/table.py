@@ -1,32 +1,48 @@
 """Well-known libraries: what each of their classes and functions makes on the node that it gets.
 
 Each row names the file that was read. A row lists interfaces with their fixed name, or with the argument that the name
-comes from (counted behind the node). Rows without interfaces were read too: those classes make none.
+comes from (counted behind the node). Rows without interfaces were read too: those classes make none. Behind the rows
+stand the classes that a row cannot say.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
-from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_METHODS, NODE_BASES, Call, library_class
-from nodl.infer.cpp.models.interfaces import add
+from nodl.infer.cpp.libraries import (
+    LIBRARY_CLASSES,
+    LIBRARY_FUNCTIONS,
+    Call,
+    library_class,
+    library_method,
+    node_class,
+    node_method,
+)
+from nodl.infer.cpp.models.interfaces import (
+    ACT,
+    CALL,
+    CLI,
+    KINDS,
+    PUB,
+    SRV,
+    SUB,
+    add,
+    named_in,
+    node_of,
+    owner_in,
+    texts_in,
+)
 from nodl.infer.cpp.models.nodes import become_node
-from nodl.infer.cpp.reading.type_names import ros_type
-from nodl.infer.cpp.running.contents import nodes_in
-from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.models.parameters import read
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import BOTTOM, Obj, Param, Text, Value, concatenated, literal, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Text, Value, concatenated, literal, unknown
+from nodl.name_template import ParameterPart
 from nodl.node_interface import EndpointKind
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-
-PUB, SUB = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
-SRV, CLI = EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT
-ACT, CALL = EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT
 
 
 class Makes(NamedTuple):
@@ -104,35 +120,19 @@ NONE = (
 ROWS.update(dict.fromkeys(NONE, ()))
 
 
-def texts_in(arguments: Sequence[Value], run: Machine) -> list[Value]:
-    """The arguments that hold something and no node: names and the like."""
-    return [value for value in arguments if value and not nodes_in(run, value)]
-
-
-def owner_in(run: Machine, arguments: Sequence[Value]) -> Obj | None:
-    """The first node among the arguments or in lists among them; ``None`` if they hold none."""
-    return next((obj for value in arguments for obj in nodes_in(run, value)), None)
-
-
-def make(
-    run: Machine, row: Sequence[Makes], this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> None:
-    """The interfaces of a row, on the node among ``arguments``."""
-    owner = owner_in(run, arguments)
-    for value in arguments:
-        for atom in value:
-            run.later(atom, frame)
-    if owner is None or owner.node is None:
+def _make(row: Sequence[Makes], run: Machine, call: Call) -> None:
+    """The interfaces of a row, on the node among the arguments."""
+    owner = owner_in(call.values)
+    run.later(call.values, call.frame)
+    if owner is None:
         if row:
-            run.gap(node, frame, f"the node that {this.type.name} makes interfaces on is not known")
+            why = f"the node that {call.this.type.name} makes interfaces on is not known"
+            run.gap(call.node, call.frame, why)
         return
-    texts = texts_in(arguments, run)
     for each in row:
-        kind = each.type
-        if kind == "T0":
-            kind = ros_type(this.type.arguments[0]) if this.type.arguments else ""
-        call = Call(node, frame, [], [], (), owner)
-        add(run, owner, each.kind, _named(each.name, texts), kind, call)
+        kind = call.interface if each.type == "T0" else each.type
+        alone = Call(call.node, call.frame, [], receiver=owner)
+        add(run, owner, each.kind, _named(each.name, texts_in(call.values)), kind, alone)
 
 
 _GIVEN = re.compile(r"\{(\d)(?:=([^}]*))?\}")
@@ -150,86 +150,144 @@ def _named(name: str, texts: Sequence[Value]) -> Value:
     return concatenated(literal(name[: given.start()]), value, literal(name[given.end() :]))
 
 
-def _row(name: str, row: tuple[Makes, ...]) -> None:
-    def model(run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame) -> Value | None:
-        make(run, row, this, arguments, node, frame)
-        return None
-
-    library_class(name)(model)
-
-
-for _name, _makes in ROWS.items():
-    _row(_name, _makes)
+LIBRARY_CLASSES.update({name: partial(_make, row) for name, row in ROWS.items()})
 
 
 # --- message_filters ----------------------------------------------------------------------------------------------
 
 
 @library_class("message_filters::Subscriber")
-def _filter_subscriber(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
+def _filter_subscriber(run: Machine, call: Call) -> None:
     """message_filters/subscriber.h: with a node it subscribes at once, else when ``subscribe`` is called."""
-    if arguments:
-        _filter_subscribe(run, this, arguments, node, frame)
-    return None
+    if call.values:
+        _subscribe(run, call)
 
 
-def _filter_subscribe(run: Machine, this: Obj, arguments: Sequence[Value], node: Node, frame: Frame) -> None:
-    owner = owner_in(run, arguments)
-    texts = texts_in(arguments, run)
-    kind = ros_type(this.type.arguments[0]) if this.type.arguments else ""
-    if not arguments and this.data.get("topic") is not None:
-        return  # the same subscription again
-    if owner is None or owner.node is None:
-        run.gap(node, frame, f"the node of this {this.type.name} is not known")
-        return
-    this.data["topic"] = True
-    run.endpoint(
-        owner.node, SUB, texts[0] if texts else unknown("a topic that is not given"), kind, node, frame
-    )
-
-
+@library_method("message_filters::Subscriber", "subscribe")
 def _subscribe(run: Machine, call: Call) -> Value:
-    assert call.receiver is not None
-    _filter_subscribe(run, call.receiver, call.values, call.node, call.frame)
+    texts, call = texts_in(call.values), replace(call, types=call.this.type.arguments)
+    if not call.values and call.this.data.get("topic") is not None:
+        return BOTTOM  # the same subscription again
+    record = node_of(run, call)
+    if record is not None:
+        call.this.data["topic"] = True
+        topic = texts[0] if texts else unknown("a topic that is not given")
+        run.endpoint(record, SUB, topic, call.interface, call)
     return BOTTOM
 
 
-LIBRARY_METHODS[("message_filters::Subscriber", "subscribe")] = _subscribe
+# --- tf2_ros ------------------------------------------------------------------------------------------------------
 
 
-# --- nodes of libraries -------------------------------------------------------------------------------------------
+@library_class("tf2_ros::TransformListener")
+def _listener(run: Machine, call: Call) -> None:
+    """tf2_ros/src/transform_listener.cpp: without a node it makes one, ``transform_listener_impl_<address>``."""
+    owner = owner_in(call.values)
+    if owner is None and any(_may_be_node(value) for value in call.values[1:2]):
+        run.gap(call.node, call.frame, "the node of this tf2_ros::TransformListener is not known")
+        return
+    if owner is None:
+        owner = run.obj(("own node", call.this), Type("rclcpp::Node"), heap=True)
+        name = concatenated(literal("transform_listener_impl_"), unknown("an address"))
+        become_node(
+            run, replace(call, values=[name], receiver=owner)
+        ).description = "tf2_ros::TransformListener"
+    assert owner.node is not None
+    for topic in ("/tf", "/tf_static"):
+        run.endpoint(owner.node, SUB, literal(topic), TF, call)
 
 
-def _nav2_lifecycle(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
-    """nav2_util/lifecycle_node.hpp: a lifecycle node with a bond to its manager."""
-    record = become_node(run, this, arguments, node, frame, lifecycle=True)
-    for kind in (PUB, SUB):
-        run.endpoint(record, kind, literal("bond"), "bond/msg/Status", node, frame)
-    return None
+def _may_be_node(value: Value) -> bool:
+    return not value or not all(isinstance(atom, bool) for atom in value)
 
 
-for _cls in ("nav2_util::LifecycleNode", "nav2::LifecycleNode"):
-    NODE_BASES[_cls] = LIBRARY_CLASSES[_cls] = _nav2_lifecycle
+@library_class("tf2_ros::StaticTransformListener")
+def _static_listener(run: Machine, call: Call) -> None:
+    record = node_of(run, call, "tf2_ros::StaticTransformListener")
+    if record is not None:
+        run.endpoint(record, SUB, literal("/tf_static"), TF, call)
 
 
-def _component_manager(
-    run: Machine, this: Obj, arguments: list[Value], node: Node, frame: Frame
-) -> Value | None:
-    """rclcpp_components/component_manager.hpp: (executor, name, options); what it loads is the launch's business."""
-    texts = [v for v in arguments if any(isinstance(a, Text | Param) for a in v)]
-    record = become_node(
-        run, this, [texts[0] if texts else literal("ComponentManager")], node, frame, lifecycle=False
+@library_class("tf2_ros::Buffer")
+def _buffer(run: Machine, call: Call) -> None:
+    """tf2_ros/src/buffer.cpp: with a node, the service ``tf2_frames`` on it."""
+    owner = owner_in(call.values)
+    if owner is not None and owner.node is not None:
+        run.endpoint(owner.node, SRV, literal("tf2_frames"), "tf2_msgs/srv/FrameGraph", call)
+
+
+@library_class("tf2_ros::BufferServer")
+def _buffer_server(run: Machine, call: Call) -> None:
+    """tf2_ros/buffer_server.h: (buffer, node, action name, ...)."""
+    _make((Makes(ACT, "{0}", "tf2_msgs/action/LookupTransform"),), run, replace(call, values=call.values[1:]))
+
+
+@library_class("robot_localization::RosRobotLocalizationListener")
+def _robot_localization(run: Machine, call: Call) -> None:
+    """robot_localization/src/ros_robot_localization_listener.cpp: two topics, and a listener with a node of its own."""
+    row = (
+        Makes(SUB, "odom/filtered", "nav_msgs/msg/Odometry"),
+        Makes(SUB, "acceleration/filtered", "geometry_msgs/msg/AccelWithCovarianceStamped"),
     )
+    _make(row, run, call)
+    _listener(run, replace(call, values=[]))
+
+
+# --- nav2, where its sources are not in reach: nav2_ros_common (interface_factories.hpp, lifecycle_node.hpp,
+# service_server.hpp), nav_2d_utils (odom_subscriber.hpp), of the commits above -------------------------------------
+
+
+def _action(kind: EndpointKind, run: Machine, call: Call) -> Value:
+    return add(run, call.this, kind, call.value(0), call.interface, call)
+
+
+for _word in KINDS:
+    LIBRARY_FUNCTIONS[f"nav2::interfaces::create_{_word}"] = LIBRARY_FUNCTIONS[f"rclcpp::create_{_word}"]
+for _word, _kind in (("server", ACT), ("client", CALL)):
+    _function = LIBRARY_FUNCTIONS[f"rclcpp_action::create_{_word}"]
+    LIBRARY_FUNCTIONS[f"nav2::interfaces::create_action_{_word}"] = _function
+    node_method(f"create_action_{_word}")(partial(_action, _kind))
+
+
+@library_class("nav2_util::ServiceServer", "nav2::ServiceServer")
+def _service(run: Machine, call: Call) -> None:
+    """(name, node, callback): with the parameter ``service_introspection_mode`` also its events."""
+    record, texts = node_of(run, call), texts_in(call.values)
+    if record is None:
+        return
+    name, kind = texts[0] if texts else unknown("a name that is not given"), call.interface
+    run.endpoint(record, SRV, name, kind, call)
+    for mode in ("metadata", "contents"):
+        part = ParameterPart("service_introspection_mode", "disabled", None, (("only if equal", (mode,)),))
+        events = concatenated(name, literal("/_service_event"), (Text((part,)),))
+        run.endpoint(record, PUB, events, f"{kind}_Event" if kind else "", call)
+    run.later(call.values, call.frame)
+
+
+@library_class("nav_2d_utils::OdomSubscriber")
+def _odometry(run: Machine, call: Call) -> None:
+    """(node, default topic): the parameter ``odom_topic`` names it."""
+    record, texts = node_of(run, call), texts_in(call.values)
+    if record is not None:
+        topic = read(run, record, literal("odom_topic"), texts[0] if texts else literal("odom"))
+        run.endpoint(record, SUB, topic, "nav_msgs/msg/Odometry", call)
+
+
+@node_class("nav2_util::LifecycleNode", "nav2::LifecycleNode")
+def _nav2_lifecycle(run: Machine, call: Call) -> None:
+    """nav2_util/lifecycle_node.hpp: a lifecycle node with a bond to its manager."""
+    record = become_node(run, call, lifecycle=True)
+    for kind in (PUB, SUB):
+        run.endpoint(record, kind, literal("bond"), "bond/msg/Status", call)
+
+
+# --- rclcpp_components --------------------------------------------------------------------------------------------
+
+
+@node_class("rclcpp_components::ComponentManager", "rclcpp_components::ComponentManagerIsolated")
+def _component_manager(run: Machine, call: Call) -> None:
+    """rclcpp_components/component_manager.hpp: (executor, name, options); what it loads is the launch's business."""
+    names = named_in(call.values)
+    record = become_node(run, replace(call, values=names[:1] or [literal("ComponentManager")]))
     for name, kind in (("load_node", "LoadNode"), ("unload_node", "UnloadNode"), ("list_nodes", "ListNodes")):
-        run.endpoint(
-            record, SRV, literal(f"~/_container/{name}"), f"composition_interfaces/srv/{kind}", node, frame
-        )
-    return None
-
-
-for _cls in ("rclcpp_components::ComponentManager", "rclcpp_components::ComponentManagerIsolated"):
-    NODE_BASES[_cls] = LIBRARY_CLASSES[_cls] = _component_manager
+        run.endpoint(record, SRV, literal(f"~/_container/{name}"), f"composition_interfaces/srv/{kind}", call)

@@ -11,12 +11,12 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_text
 from nodl.infer.cpp.reading.cmake_language import (
     BLOCK_ENDS,
     LINK_WORDS,
+    Command,
     Layer,
     absolute,
     commands,
@@ -26,9 +26,6 @@ from nodl.infer.cpp.reading.cmake_language import (
     expand,
     recursive_pattern,
 )
-
-if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.cmake_language import Command
 
 _SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _EXECUTABLES = frozenset(

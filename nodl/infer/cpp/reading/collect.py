@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
     Class,
@@ -13,6 +13,7 @@ from nodl.infer.cpp.reading.declarations import (
     FileIndex,
     Function,
     Global,
+    Scope,
     conversion,
     function_declarator,
     type_text,
@@ -21,13 +22,7 @@ from nodl.infer.cpp.reading.declarations import (
 from nodl.infer.cpp.reading.parameter_lists import parameters_of, template_defaults, template_names
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.type_names import split_type
-from nodl.infer.cpp.syntax import children, line_of, parse, parse_expression, text, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Scope
-
+from nodl.infer.cpp.syntax import Node, children, line_of, parse, parse_expression, text, walk
 
 _USING = re.compile(r"\busing\s+namespace\s+([\w:]+)\s*;")
 

@@ -8,11 +8,9 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.writes import Writes
-from nodl.infer.cpp.syntax import line_of, text
+from nodl.infer.cpp.syntax import Node, Tree, line_of, text
 
 if TYPE_CHECKING:
-    from tree_sitter import Node, Tree
-
     from nodl.infer.cpp.ledger import Site
 
 

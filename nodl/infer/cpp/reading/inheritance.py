@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.declarations import Class
+
 if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Class
     from nodl.infer.cpp.reading.names import Names
 
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, update_wrapper
-from typing import TYPE_CHECKING, Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from nodl.infer.cpp.reading.c_headers import is_of_c
+from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.specialisations import Specialisations
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
-
-if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
 
 _WRAPPERS = frozenset({
     "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",
@@ -63,7 +61,7 @@ class Names:
         self._bases: dict[str, tuple[str, ...]] = {}
         self.hidden: dict[Class, frozenset[str]] = {}  # what ``inheritance.hidden`` found
         self.depends: frozenset[str] = frozenset()  # what the packages of the program depend on
-        self.plugins: dict[str, str] = {}  # lookup name or class -> class
+        self.plugins: dict[str, str] = {}  # lookup name or class -> class that pluginlib makes
         for index in self.files.values():
             self._add(index)
         self.specialisations = Specialisations(self)
@@ -288,13 +286,6 @@ class Names:
     def is_foreign(self, folder: str, file: str) -> bool:
         """Whether a folder of headers belongs to a package that the sources depend on and nobody has reviewed."""
         return folder not in KNOWN_HEADERS and (not self.depends or folder in self.depends)
-
-    def plugin(self, name: str) -> str | None:
-        """The class that pluginlib makes for a lookup name."""
-        return self.plugins.get(name)
-
-    def plugin_type(self, name: str, file: FileIndex) -> Type:
-        return self.resolve(name.replace("/", "::"), (), file)
 
     # --- types ------------------------------------------------------------------------------------------
 

@@ -2,15 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from nodl.infer.cpp.reading.declarations import FunctionParameter, type_text
-from nodl.infer.cpp.syntax import children, text, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Function
+from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, type_text
+from nodl.infer.cpp.syntax import Node, children, text, walk
 
 
 def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:

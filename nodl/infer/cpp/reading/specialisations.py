@@ -6,10 +6,10 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
+from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.type_names import Type, split_type
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Class, Function
     from nodl.infer.cpp.reading.names import Names
 
 Resolve = Callable[[str], Type]

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from nodl.infer.cpp.syntax import text, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node, text, walk
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _READING = frozenset({

@@ -5,17 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.parameter_lists import parameters_of
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import is_written_back
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import NEXT, Machine
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, unknown
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node
 
 _BY_ARGUMENT = re.compile(
     r"for_each(?:_n)?|transform|(?:stable_|partial_)?sort|reverse|rotate|shuffle|fill(?:_n)?|generate(?:_n)?|copy(?:_if|_n)?|"

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.contents import copied, overwrite
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import cell_of, class_of_member, lexical_class, seen_class, seen_type
-from nodl.infer.cpp.running.machine import Machine, expression
+from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.numbers import added, as_type
 from nodl.infer.cpp.running.references import is_plain, through, told
 from nodl.infer.cpp.running.values import (
@@ -29,13 +28,8 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import current_object, declared_type, static_by_name, static_member
-from nodl.infer.cpp.syntax import children, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped
 from nodl.name_template import UnknownPart
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Class
 
 
 @expression("assignment_expression")
@@ -217,7 +211,7 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
     if models and all(models):
         for atom, model in zip(holders, models, strict=True):
             if model is not None:
-                model(run, Call(call, frame, [value], (), (), atom))
+                model(run, Call(call, frame, [value], receiver=atom))
     elif owner is not None and name in ("at", "front", "back") and holders:
         assign(run, owner, tuple(_one_of(atom, value) for atom in holders), frame)
     elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value) or _gives_reference(run, function):
@@ -299,8 +293,7 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     if any(isinstance(atom, Group) for atom in owners) and name in ("first", "second"):
         _assign_half(run, node, owners, name, value, frame)
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
-        for atom in value:  # a library keeps it and may call it
-            run.later(atom, frame)
+        run.later([value], frame)  # a library keeps it and may call it
     for each in objects:
         strong = len(owners) == 1
         cell = (each, cell_of(run, each, name, class_of_member(run, each, name, node, frame)))

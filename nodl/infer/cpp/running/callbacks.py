@@ -6,14 +6,13 @@ Run until nothing changes. A callback that makes no interface runs too when it m
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.ledger import Reach
+from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.writes import Writes, writes_of
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
-from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, Machine
-from nodl.infer.cpp.running.store import Cell, Reads
+from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, Frame, Machine
+from nodl.infer.cpp.running.memory import Cell, Reads
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -31,9 +30,6 @@ from nodl.infer.cpp.running.values import (
 )
 from nodl.infer.cpp.syntax import words_in
 from nodl.source_ref import SourceRef
-
-if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Class, Function
 
 PATIENCE = 5
 """Rounds after which a variable that callbacks still change counts as not known."""

@@ -2,17 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.syntax import text
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Class
-    from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.declarations import Class
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.syntax import Node, text
 
 
 def callee_name(callee: Node) -> str:

@@ -6,18 +6,16 @@ its name makes an interface in rclcpp.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BASES, Call
+from nodl.infer.cpp.reading.declarations import Function
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.algorithms import as_algorithm, writes_elements
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import lexical_class
 from nodl.infer.cpp.running.invocation import call_functions, call_methods, call_values
-from nodl.infer.cpp.running.machine import Machine, expression
+from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.method_calls import by_model, is_library_method, method_call, of_this, on_object
 from nodl.infer.cpp.running.objects import cast, is_plain_type, made
 from nodl.infer.cpp.running.references import is_plain, keep_references
@@ -25,12 +23,7 @@ from nodl.infer.cpp.running.standard import CASTS, STANDARD, may_write
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, join, unknown
 from nodl.infer.cpp.running.variables import current_object, member, variable
-from nodl.infer.cpp.syntax import children, text, unwrapped
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Function
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped
 
 
 @expression("call_expression")
@@ -119,7 +112,7 @@ def _own_method(
             )
     if (
         cls is None
-        and kind.name in NODE_BASES | {this_object.foreign_base: None}
+        and kind.name in NODE_BASES | {this_object.foreign_base}
         and is_library_method(this_object, last)
     ):
         values = [run.evaluate(each, frame) for each in given]

@@ -5,15 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.libraries import LIBRARY_CLASSES, NODE_BASES, is_harmless_class
+from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
+from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
 from nodl.infer.cpp.reading.inheritance import repeated_base
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.contents import copied, handed_over
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import cell_of
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.objects import (
     MAPS,
     SEQUENCES,
@@ -26,13 +26,7 @@ from nodl.infer.cpp.running.objects import (
 )
 from nodl.infer.cpp.running.overloads import chosen
 from nodl.infer.cpp.running.values import BOTTOM, Map, Obj, Seq, Text, Unknown, Value, unknown
-from nodl.infer.cpp.syntax import children
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
-    from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.syntax import Node, children
 
 
 def construct(
@@ -73,7 +67,8 @@ def construct(
         STANDARD[kind.name](run, arguments, node, frame, ())
     model = LIBRARY_CLASSES.get(kind.name)
     if model is not None:
-        found = model(run, made_object, list(arguments), node, frame)
+        call = Call(node, frame, list(arguments), kind.arguments, receiver=made_object)
+        found = model(run, call)
         return (made_object,) if found is None else found
     if not is_harmless_class(kind.name):
         handed_over(run, f"the constructor of {kind.name}", arguments, node, frame)
@@ -270,9 +265,9 @@ def foreign_base(
 ) -> None:
     """A base whose source is not in reach: of a node, of a library that is known, or a gap."""
     this.foreign_base = kind.name
-    model = NODE_BASES.get(kind.name) or LIBRARY_CLASSES.get(kind.name)
+    model = LIBRARY_CLASSES.get(kind.name)
     if model is not None:
-        model(run, this, list(values), node, frame)
+        model(run, Call(node, frame, list(values), this.type.arguments, receiver=this))
     elif not is_harmless_class(kind.name):
         place = frame if frame.file is not cls.file else Frame(cls.file, cls.scope)
         run.gap(

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running import texts
 from nodl.infer.cpp.running.algorithms import called_now
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.launch_values import settled_text
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.numbers import added
 from nodl.infer.cpp.running.objects import ORDERED, SETS, as_set, made
 from nodl.infer.cpp.running.operators import element
@@ -33,10 +31,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type
-from nodl.infer.cpp.syntax import children, text
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node, children, text
 
 
 def is_standard(name: str) -> bool:
@@ -93,9 +88,7 @@ def container_call(
         return _text_call(run, atom, name, receiver, values, node, frame)
     if isinstance(atom, Seq | Group):
         return _sequence_call(run, atom, name, receiver, values, given, frame)
-    for value in values:
-        for each in value:
-            run.later(each, frame)
+    run.later(values, frame)
     return unknown(f"the result of {name}()")
 
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import dataclasses
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import cell_of
 from nodl.infer.cpp.running.launch_values import given_by_launch
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
@@ -26,22 +25,17 @@ from nodl.infer.cpp.running.values import (
     literal,
     unknown,
 )
-from nodl.infer.cpp.syntax import text, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Class, Function
+from nodl.infer.cpp.syntax import Node, text, walk
 
 
-def nodes_in(run: Machine, value: Value) -> list[Obj]:
+def nodes_in(value: Value) -> list[Obj]:
     """The nodes (or interfaces of nodes) that ``value`` may be or hold in plain containers."""
     found: list[Obj] = []
     for atom in value:
         if isinstance(atom, Obj) and atom.node is not None:
             found.append(atom)
         elif isinstance(atom, Seq | Group):
-            found += [obj for item in atom.items for obj in nodes_in(run, item)]
+            found += [obj for item in atom.items for obj in nodes_in(item)]
     return found
 
 
@@ -55,15 +49,12 @@ def handed_over(
     ignore: Obj | None = None,
 ) -> None:
     """Somebody who is not known gets these values: a node among them is a gap, closures may be called at any time."""
+    why = f"the node is handed to {whom}, which may make interfaces on it"
     for value in arguments:
-        for obj in nodes_in(run, value):
-            if obj is not ignore and obj.node is not None:
-                run.gap(
-                    node, frame, f"the node is handed to {whom}, which may make interfaces on it", obj.node
-                )
-                break
-        for atom in value:
-            run.later(atom, frame)
+        owner = next((obj for obj in nodes_in(value) if obj is not ignore), None)
+        if owner is not None:
+            run.gap(node, frame, why, owner.node)
+    run.later(arguments, frame)
 
 
 def copied(run: Machine, value: Value, node: Node, frame: Frame, cls: Class | None = None) -> Value:
@@ -110,7 +101,7 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
         for each in run.names.ancestry(target)
         for name in each.fields
     }
-    if target is atom.cls and any(nodes_in(run, value or BOTTOM) for value in cells.values()):
+    if target is atom.cls and any(nodes_in(value or BOTTOM) for value in cells.values()):
         return atom
     kind = atom.type if target is atom.cls else Type(target.qualified)
     key = ("copy", atom, frame.file.file, node.start_byte, frame.path, target)

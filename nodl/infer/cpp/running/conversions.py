@@ -7,19 +7,13 @@ may run or not, and one that changes something is a gap.
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.running.assignments import object_class
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import call_methods
-from nodl.infer.cpp.running.machine import NEXT, Machine
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.values import Obj, Value, join, unknown
-from nodl.infer.cpp.syntax import text
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Class, Function
+from nodl.infer.cpp.syntax import Node, text
 
 _BRACKETS = ("parenthesized_expression", "condition_clause")
 _CONDITIONS = ("if_statement", "while_statement", "do_statement", "for_statement", "conditional_expression")

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import Machine, expression
+from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.numbers import SIZES
 from nodl.infer.cpp.running.objects import as_map, cast, made
 from nodl.infer.cpp.running.operators import has_text
@@ -16,11 +14,7 @@ from nodl.infer.cpp.running.own_operators import by_operator
 from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
 from nodl.infer.cpp.running.variables import variable
-from nodl.infer.cpp.syntax import children, text, unwrapped, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
 
 _ESCAPES = {"n": "\n", "t": "\t", "\\": "\\", '"': '"', "'": "'", "0": "\0", "r": "\r"}
 

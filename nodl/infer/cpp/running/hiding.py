@@ -7,20 +7,15 @@ class that an expression has at compile time.
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import Class, type_text
 from nodl.infer.cpp.reading.inheritance import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.callees import callee_name, types_of
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
-from nodl.infer.cpp.syntax import children, text, unwrapped, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
 
 
 def cell_of(run: Machine, owner: Obj, name: str, seen: Class | None) -> str:

@@ -5,29 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
-from nodl.infer.cpp.reading.declarations import type_text
+from nodl.infer.cpp.reading.declarations import Function, type_text
 from nodl.infer.cpp.reading.parameter_lists import parameters_of
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import copied, handed_over
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Machine
-from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome
+from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
-from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.running.written_back import write_back
-from nodl.infer.cpp.syntax import children, text, unwrapped
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Function
-    from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped
 
 
 def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame) -> Value:

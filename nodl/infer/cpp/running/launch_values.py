@@ -5,9 +5,9 @@ Notes in the machine which of them decided what is made.
 
 from __future__ import annotations
 
-from nodl.infer.cpp.findings import NodeRecord
+from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import Atom, NodePart, Param, Text, plain
+from nodl.infer.cpp.running.values import Atom, NodeNamePart, Param, Text, plain
 from nodl.name_template import ParameterPart
 
 
@@ -24,19 +24,19 @@ def text_of(run: Machine, atom: Atom) -> str | None:
 
 def settled_text(run: Machine, atom: Atom) -> str | None:
     """``text_of`` where a launch has settled it; a parameter that only has its default is open."""
-    if run.settings.start is None:
+    if run.start is None:
         parts = atom.parts if isinstance(atom, Text) else ()
         if isinstance(atom, Param) or any(isinstance(part, ParameterPart) for part in parts):
             return None
     return text_of(run, atom)
 
 
-def given_by_launch(run: Machine, record: NodeRecord, name: str) -> object | None:
+def given_by_launch(run: Machine, record: AllocatedNode, name: str) -> object | None:
     """What the launch file sets; a value that decides what is made is remembered."""
-    if run.settings.start is None:
+    if run.start is None:
         run.from_default[name] = None
         return None
-    value = run.settings.start.parameters(_static_name(record)).get(name)
+    value = run.start.parameters(_static_name(record)).get(name)
     run.consulted[name] = value
     return value
 
@@ -55,10 +55,10 @@ def _part_text(run: Machine, part: object) -> str | None:
     """The same for a piece of a text."""
     if isinstance(part, ParameterPart):
         return _parameter_part(run, part)
-    if not isinstance(part, NodePart):
+    if not isinstance(part, NodeNamePart):
         return None
-    if run.settings.start is not None:
-        name, namespace = run.settings.start.final_name(_static_name(part.record))
+    if run.start is not None:
+        name, namespace = run.start.final_name(_static_name(part.record))
     else:
         run.from_default[f"the {part.what} of node {_static_name(part.record)}"] = None
         name, namespace = _static_name(part.record), _static_namespace(part.record)
@@ -77,11 +77,11 @@ def _parameter_part(run: Machine, part: ParameterPart) -> str | None:
     return None
 
 
-def _static_name(record: NodeRecord) -> str | None:
+def _static_name(record: AllocatedNode) -> str | None:
     names = [plain(each) for each in record.names]
     return names[0] if len(names) == 1 else None
 
 
-def _static_namespace(record: NodeRecord) -> str | None:
+def _static_namespace(record: AllocatedNode) -> str | None:
     spaces = [plain(each) for each in record.namespaces] or [""]
     return "/" + (spaces[0] or "").lstrip("/") if len(spaces) == 1 and spaces[0] is not None else None

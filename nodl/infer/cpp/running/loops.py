@@ -4,23 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, iterated
-from nodl.infer.cpp.running.frames import Frame, Loop
 from nodl.infer.cpp.running.hiding import element_type, seen_type
-from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Machine, statement
+from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
+from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import elements_written
 from nodl.infer.cpp.running.statements import bind_names, condition_value, in_a_block
-from nodl.infer.cpp.running.store import Changes
 from nodl.infer.cpp.running.values import Value, join, unknown
-from nodl.infer.cpp.syntax import children, text, unwrapped, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
 
 MAX_UNROLLED = 64
 MAX_ROUNDS = 3

@@ -6,18 +6,18 @@ libraries. A place that was run is noted; the ledger later asks about every othe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import chain
+from typing import TYPE_CHECKING, TypeVar
 
-from nodl.infer.cpp.findings import Condition, Follows, FoundEndpoint, NodeRecord
+from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
-from nodl.infer.cpp.reading.declarations import Class, Function
+from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.memory import Memory
+from nodl.infer.cpp.running.memory import AbstractStore, Cell, Changes, Memory
 from nodl.infer.cpp.running.notes import Notes
-from nodl.infer.cpp.running.store import AbstractStore, Cell, Changes
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
@@ -30,17 +30,14 @@ from nodl.infer.cpp.running.values import (
     concatenated,
     unknown,
 )
-from nodl.infer.cpp.syntax import line_of, words_in
+from nodl.infer.cpp.syntax import Node, line_of, words_in
 from nodl.infer.start import Start
 from nodl.name_template import UnknownPart
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.running.frames import Frame
-
+    from nodl.infer.cpp.libraries import Call
 
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
@@ -48,57 +45,54 @@ MAX_DEPTH = 60
 MAX_STEPS = 800_000
 MAX_RECURSION = 2
 
+Key = TypeVar("Key")
+Handler = TypeVar("Handler")
 StatementHandler = Callable[["Machine", "Node", "Frame"], int]
 ExpressionHandler = Callable[["Machine", "Node", "Frame"], Value]
 STATEMENTS: dict[str, StatementHandler] = {}
 EXPRESSIONS: dict[str, ExpressionHandler] = {}
 
 
-class BudgetExceeded(Exception):
+class StepLimitExceeded(Exception):
     """The program is too much for the counted steps."""
+
+
+def registered(table: dict[Key, Handler], names: Iterable[Key]) -> Callable[[Handler], Handler]:
+    """Decorator: ``table`` has the function under these names."""
+
+    def register(handler: Handler) -> Handler:
+        table.update(dict.fromkeys(names, handler))
+        return handler
+
+    return register
 
 
 def statement(*kinds: str) -> Callable[[StatementHandler], StatementHandler]:
     """Decorator: the handler runs statements of these tree-sitter types and says which ways lead on."""
-
-    def register(handler: StatementHandler) -> StatementHandler:
-        STATEMENTS.update(dict.fromkeys(kinds, handler))
-        return handler
-
-    return register
+    return registered(STATEMENTS, kinds)
 
 
 def expression(*kinds: str) -> Callable[[ExpressionHandler], ExpressionHandler]:
     """Decorator: the handler gives the value of expressions of these tree-sitter types."""
-
-    def register(handler: ExpressionHandler) -> ExpressionHandler:
-        EXPRESSIONS.update(dict.fromkeys(kinds, handler))
-        return handler
-
-    return register
-
-
-@dataclass(frozen=True)
-class Settings:
-    """``start``: ``None`` when there is no launch."""
-
-    start: Start | None = None
+    return registered(EXPRESSIONS, kinds)
 
 
 class Machine:
-    """The state of one run and what it found: nodes, gaps, dead code, the parameters that decided."""
+    """The state of one run and what it found: nodes, gaps, dead code, the parameters that decided.
 
-    def __init__(self, names: Names, settings: Settings | None = None):
-        self.names = names
-        self.settings = settings or Settings()
+    ``start``: ``None`` when there is no launch.
+    """
+
+    def __init__(self, names: Names, start: Start | None):
+        self.names, self.start = names, start
         self.store = AbstractStore(self.count)
         self.memory = Memory(self.store)
         self.size = Notes(self.store.log)  # how many nodes and classes the program has, so far
-        self.nodes: dict[NodeRecord, None] = {}
+        self.nodes: dict[AllocatedNode, None] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.objects: dict[object, Obj] = {}
         self.frames: dict[object, Frame] = {}
-        self.records: dict[object, NodeRecord] = {}
+        self.records: dict[object, AllocatedNode] = {}
         self.callbacks: dict[tuple[object, object], tuple[Atom, Frame]] = {}
         self.ran: dict[str, set[int]] = {}  # file -> first bytes of what was run
         self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
@@ -111,7 +105,6 @@ class Machine:
         self.limit = MAX_STEPS
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
-        self.plugins_used: dict[str, None] = {}
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
         self.shared: dict[Cell, None] = {}  # plain variables that an object keeps a reference to
         self._used: set[str] = set()
@@ -125,7 +118,7 @@ class Machine:
             return BOTTOM
         self.steps += 1
         if self.steps > self.limit:
-            raise BudgetExceeded
+            raise StepLimitExceeded
         if node.has_error and node.type != "assignment_expression" and any(c.is_error for c in node.children):
             return self._misread(node, frame)
         handler = EXPRESSIONS.get(node.type)
@@ -150,10 +143,10 @@ class Machine:
         return unknown("what the parser did not understand")
 
     def count(self, steps: int) -> None:
-        """Raises ``BudgetExceeded``."""
+        """Raises ``StepLimitExceeded``."""
         self.steps += steps
         if self.steps > self.limit:
-            raise BudgetExceeded
+            raise StepLimitExceeded
 
     def execute(self, node: Node, frame: Frame) -> int:
         self.count(1)
@@ -167,13 +160,13 @@ class Machine:
     def attempt(self, action: Callable[[], None], steps: int) -> bool:
         """Run ``action`` if it takes no more than so many steps; else nothing of what it wrote is left.
 
-        Raises ``BudgetExceeded`` at the end of all steps.
+        Raises ``StepLimitExceeded`` at the end of all steps.
         """
         before, mark, active = self.limit, self.store.mark(), len(self.active)
         self.limit = min(before, self.steps + steps)
         try:
             action()
-        except BudgetExceeded:
+        except StepLimitExceeded:
             if self.steps > before:
                 raise
             self.store.undo(mark)
@@ -257,7 +250,7 @@ class Machine:
     def place(self, node: Node, frame: Frame) -> SourceRef:
         return SourceRef(frame.file.file, line_of(node))
 
-    def gap(self, node: Node, frame: Frame, why: str, record: NodeRecord | None = None) -> None:
+    def gap(self, node: Node, frame: Frame, why: str, record: AllocatedNode | None = None) -> None:
         source = self.place(node, frame)
         if record is not None:
             record.gap(source, why)
@@ -281,25 +274,27 @@ class Machine:
         return (*frame.conditions, *here) if here else frame.conditions
 
     def endpoint(
-        self, record: NodeRecord, kind: EndpointKind, name: Value, type_name: str, node: Node, frame: Frame,
+        self, record: AllocatedNode, kind: EndpointKind, name: Value, type_name: str, call: Call,
         follows: Follows | None = None,
     ) -> None:  # fmt: skip
-        source = self.place(node, frame)
-        conditions = self.conditions(node, frame)
+        source = self.place(call.node, call.frame)
+        conditions = self.conditions(call.node, call.frame)
         for atom in concatenated(name or unknown("a name that is never set")):
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
             derived = parts[-1] if parts and isinstance(parts[-1], DerivedName) else None
             which = (
                 Follows("camera_info", derived.image) if derived is not None and follows is None else follows
             )
-            found = FoundEndpoint(kind, Text(parts), type_name, source, follows=which)
+            found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=which)
             record.endpoints.setdefault(found, []).append(conditions)
 
-    def later(self, atom: Atom, frame: Frame) -> None:
-        """A closure that somebody outside keeps: it may be called at any time."""
-        if isinstance(atom, Lambda | Bound):
-            key = (atom.node.id, atom.frame.path) if isinstance(atom, Lambda) else (atom.function, atom.this)
-            self.callbacks.setdefault(key, (atom, frame))
+    def later(self, values: Iterable[Value], frame: Frame) -> None:
+        """Closures that somebody outside keeps: they may be called at any time."""
+        for atom in chain.from_iterable(values):
+            if isinstance(atom, Lambda):
+                self.callbacks.setdefault((atom.node.id, atom.frame.path), (atom, frame))
+            elif isinstance(atom, Bound):
+                self.callbacks.setdefault((atom.function, atom.this), (atom, frame))
 
     def made_objects(self) -> list[Obj]:
         return list(self.objects.values())
@@ -333,11 +328,11 @@ class Machine:
             self._leading[known] = leads_to_interfaces(self, words)
         return self._leading[known]
 
-    def new_node(self, node: Node, frame: Frame, key: object) -> NodeRecord:
+    def new_node(self, node: Node, frame: Frame, key: object) -> AllocatedNode:
         record = self.records.get(key)
         if record is None:
             log = self.store.log
-            record = NodeRecord(self.place(node, frame), parameters=Notes(log), overrides=Notes(log))
+            record = AllocatedNode(self.place(node, frame), parameters=Notes(log), overrides=Notes(log))
             self.records[key] = record
             self.nodes[record] = None
             self.size["nodes"] = len(self.nodes)
@@ -345,3 +340,56 @@ class Machine:
 
 
 _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})
+
+
+@dataclass(eq=False)
+class Loop:
+    """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start``."""
+
+    mark: int
+    start: int
+    breaks: list[Changes] = field(default_factory=list)
+    continues: list[Changes] = field(default_factory=list)
+
+
+@dataclass(eq=False)
+class Frame:
+    """A call that runs. ``path`` tells apart what is made at one place through different calls."""
+
+    file: FileIndex
+    scope: Scope
+    function: Function | None = None
+    this: Obj | None = None
+    bindings: Mapping[str, Type] = field(default_factory=dict)
+    outer: Frame | None = None  # of a lambda: where its captures live
+    path: tuple[object, ...] = ()
+    conditions: tuple[Condition, ...] = ()
+    types: dict[str, str] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
+    returned: Value = BOTTOM
+    exits: list[Changes] = field(default_factory=list)
+    exit_values: list[Value] = field(default_factory=list)
+    mark: int = 0
+    loops: list[Loop] = field(default_factory=list)
+    blocks: list[dict[str, tuple[bool, Value, str | None, Node | None]]] = field(default_factory=list)
+    """For each block that runs: what names that it declares stood for before."""
+    kept: dict[str, Frame] = field(
+        default_factory=dict
+    )  # of a lambda: what it captured of blocks that may have ended
+    aliases: dict[str, Node | None] = field(default_factory=dict)
+    """References and pointers to plain values: the expression that each stands for, ``None`` if not known."""
+    depth: int = 0
+    finished: bool = False  # nobody can see its variables any more
+    captured: bool = False  # a lambda can
+    active: bool = False  # runs now
+
+    def owner_of(self, name: str) -> Frame | None:
+        """The frame whose variable ``name`` is."""
+        frame: Frame | None = self
+        while frame is not None:
+            if name in frame.names:
+                return frame
+            if name in frame.kept:
+                return frame.kept[name]
+            frame = frame.outer
+        return None

@@ -1,15 +1,127 @@
-"""Calls that were run before: one that finds all that it read as it was has the same outcome, and is not run again."""
+"""What a run holds and remembers: cells with a trail of what was written, so that branches are run, undone and joined;
+calls that were run before, whose outcome is the same where all that they read is as it was. Pure."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from nodl.infer.cpp.running.store import AbstractStore, Changes, Reads
-from nodl.infer.cpp.running.values import Value
+from nodl.infer.cpp.running.notes import Noted, NoteLog, hold
+from nodl.infer.cpp.running.values import BOTTOM, Value, join
 
 MEMORY_DEPTH = 20
 """Paths of calls are whole up to this depth (``Frame.path``): then the same path means the same callers."""
+Cell = tuple[object, str]
+Changes = dict[Cell, Value]
+_ABSENT: Value = (("absent",),)
+_LOOKED_AT_IN_A_STEP = 64
+
+
+class Reads(NamedTuple):
+    """What somebody read: cells with the values that they had before, and notes."""
+
+    cells: Changes
+    noted: Noted
+
+
+class AbstractStore:
+    """What every cell holds now; writes can be undone and joined, reads watched."""
+
+    def __init__(self, spend: Callable[[int], None] = lambda steps: None) -> None:
+        """``spend`` is told the steps that long looks at the trail count for; what it raises ends the run."""
+        self._spend = spend
+        self._cells: dict[Cell, Value] = {}
+        self._trail: list[tuple[Cell, Value]] = []
+        self._reads: set[Cell] | None = None
+        self.log = NoteLog()
+
+    def get(self, cell: Cell) -> Value | None:
+        if self._reads is not None:
+            self._reads.add(cell)
+        return self._cells.get(cell)
+
+    def watched(self, action: Callable[[], None]) -> Reads:
+        """Run ``action``; what it read and did not write itself before. Who watches the caller learns of it, too."""
+        outer, outer_noted = self._reads, self.log.noted
+        self._reads, self.log.noted = set(), {}
+        mark = len(self._trail)
+        try:
+            action()
+        finally:
+            read, noted = self._reads, self.log.noted
+            self._reads, self.log.noted = outer, outer_noted
+            before = {}
+            for cell, old in reversed(self._trail[mark:]):
+                before[cell] = old
+            cells = self._cells
+            found = {cell: before[cell] if cell in before else cells.get(cell, _ABSENT) for cell in read}
+            kept = {c: value for c, value in found.items() if value is not _ABSENT or not _is_local(c)}
+            reads = Reads(kept, noted)
+            self.saw(reads)
+        return reads
+
+    def saw(self, reads: Reads) -> None:
+        """Tell who watches that all this was read."""
+        if self._reads is not None and self.log.noted is not None:
+            self._reads.update(reads.cells)
+            for key, said in reads.noted.items():
+                self.log.noted.setdefault(key, said)
+
+    def holds(self, reads: Reads, *, in_any_order: bool = False) -> bool:
+        """Whether all this says what it said; ``in_any_order``: alternatives may have changed places."""
+        get = self._cells.get
+        for cell, value in reads.cells.items():
+            present = get(cell, _ABSENT)
+            if present is value or present == value:
+                continue
+            if not in_any_order or set(present) != set(value):
+                return False
+        return hold(reads.noted)
+
+    def set(self, cell: Cell, value: Value) -> None:
+        old = self._cells.get(cell, _ABSENT)
+        if old is not value:
+            self._trail.append((cell, old))
+            self._cells[cell] = value
+
+    def mark(self) -> int:
+        return len(self._trail)
+
+    def changes(self, mark: int) -> Changes:
+        """What was written since ``mark``, as it is now."""
+        self._spend((len(self._trail) - mark) // _LOOKED_AT_IN_A_STEP)
+        cells = self._cells
+        return {
+            cell: cells[cell]
+            for cell, _ in self._trail[mark:]
+            if cell in cells and not getattr(cell[0], "finished", False)
+        }
+
+    def before(self, mark: int) -> Changes:
+        """The values at ``mark`` of all cells that were written since."""
+        found: Changes = {}
+        for cell, old in self._trail[mark:]:
+            found.setdefault(cell, BOTTOM if old is _ABSENT else old)
+        return found
+
+    def undo(self, mark: int) -> None:
+        while len(self._trail) > mark:
+            cell, old = self._trail.pop()
+            if old is _ABSENT:
+                self._cells.pop(cell, None)
+            else:
+                self._cells[cell] = old
+
+    def merge(self, alternatives: Sequence[Changes]) -> None:
+        """Continue with any of ``alternatives``, each made from the present state."""
+        for cell in dict.fromkeys(cell for changes in alternatives for cell in changes):
+            present = self._cells.get(cell, BOTTOM)
+            self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
+
+
+def _is_local(cell: Cell) -> bool:
+    """Whether it is a variable of a call, which nobody sees before it is set."""
+    return hasattr(cell[0], "finished")
 
 
 class CallOutcome(NamedTuple):

@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, NODE_METHODS, Call
+from nodl.infer.cpp.reading.declarations import Function
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import class_of_member, lexical_class
 from nodl.infer.cpp.running.invocation import call_methods, call_values
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.own_operators import pointed_to
 from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
 from nodl.infer.cpp.running.values import (
@@ -34,13 +34,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type, member
-from nodl.infer.cpp.syntax import text, unwrapped
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Function
-    from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.syntax import Node, text, unwrapped
 
 
 def is_library_method(this_object: Obj, name: str) -> bool:
@@ -75,9 +69,7 @@ def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame
         return _reset(run, receiver_node, node, given, frame)
     if not receiver:
         values = [run.evaluate(each, frame) for each in given]
-        for value in values:
-            for atom in value:
-                run.later(atom, frame)
+        run.later(values, frame)
         if receiver_node is not None and _could_make(run, receiver_node, name, frame):
             run.unset[(frame.file.file, node.start_byte)] = (
                 run.place(node, frame),
@@ -192,9 +184,7 @@ def on_object(
     if atom.cls is not None and is_only_declared(run, atom.cls, name):
         return without_source(run, f"{atom.cls.name}::{name}", values, node, frame, atom)
     if atom.node is not None and not atom.is_node and not name.startswith("create"):
-        for value in values:
-            for each in value:
-                run.later(each, frame)
+        run.later(values, frame)
         return unknown(f"the result of {name}()")
     return unknown_call(run, f"{atom.type.name}::{name}", values, node, given, frame, receiver=atom)
 

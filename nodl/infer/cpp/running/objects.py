@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.reading.type_names import NO_TYPE
+from nodl.infer.cpp.reading.declarations import Class
+from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.contents import copied, items_of
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.launch_values import settled_text
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.numbers import as_type
 from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import (
@@ -29,14 +28,7 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.syntax import children, text
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import Class
-    from nodl.infer.cpp.reading.type_names import Type
-
+from nodl.infer.cpp.syntax import Node, children, text
 
 SEQUENCES = frozenset({
     "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",

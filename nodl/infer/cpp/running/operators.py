@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import class_of_member
 from nodl.infer.cpp.running.launch_values import settled_text, text_of
-from nodl.infer.cpp.running.machine import NEXT, Machine, expression
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.numbers import added, arithmetic
 from nodl.infer.cpp.running.own_operators import by_operator, pointed_to
 from nodl.infer.cpp.running.values import (
@@ -36,10 +34,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import current_object, member
-from nodl.infer.cpp.syntax import children, text
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node, children, text
 
 
 @expression("field_expression")

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
 from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Value
-
-if TYPE_CHECKING:
-    from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
 
 
 def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:

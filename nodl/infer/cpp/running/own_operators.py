@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.invocation import call_functions, call_methods
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.overloads import chosen
 from nodl.infer.cpp.running.values import Obj, Value, join
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node
 
 
 def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Frame) -> Value:

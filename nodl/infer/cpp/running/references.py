@@ -7,18 +7,13 @@ stands for the expression that it was made of; what is written through any other
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.writes import writes_of
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import cell_of, lexical_class
-from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.store import Cell
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Param, Seq, Text, Value
-from nodl.infer.cpp.syntax import children, text, unwrapped, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
 
 
 def is_plain(value: Value) -> bool:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.contents import items_of
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import NEXT, Machine
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -29,11 +27,7 @@ from nodl.infer.cpp.running.values import (
     truth,
     unknown,
 )
-from nodl.infer.cpp.syntax import text
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
+from nodl.infer.cpp.syntax import Node, text
 
 Standard = Callable[[Machine, Sequence[Value], "Node", Frame, Sequence[Type]], Value]
 STANDARD: dict[str, Standard] = {}
@@ -168,10 +162,8 @@ def _calls_back(
         if isinstance(atom, Obj) and atom.data.get("partial"):
             call_values(run, (atom,), [], node, frame)  # with its arguments
         else:
-            run.later(atom, frame)
-    for value in values:
-        for atom in value:
-            run.later(atom, frame)
+            run.later([(atom,)], frame)
+    run.later(values, frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
 
 

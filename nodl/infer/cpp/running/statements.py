@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import partial
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
-from nodl.infer.cpp.running.frames import Frame, Loop
-from nodl.infer.cpp.running.machine import BREAK, CONTINUE, NEXT, RETURN, Machine, StatementHandler, statement
+from nodl.infer.cpp.running.machine import (
+    BREAK,
+    CONTINUE,
+    NEXT,
+    RETURN,
+    Frame,
+    Loop,
+    Machine,
+    StatementHandler,
+    statement,
+)
 from nodl.infer.cpp.running.objects import declared_value
 from nodl.infer.cpp.running.references import bind_reference
 from nodl.infer.cpp.running.values import BOTTOM, Group, Value, join, truth, unknown
-from nodl.infer.cpp.syntax import children, parse_expression, text, unwrapped, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node, children, parse_expression, text, unwrapped, walk
 
 
 def in_a_block(handler: StatementHandler) -> StatementHandler:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
 from nodl.infer.cpp.running.algorithms import called_now
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, handed_over, nodes_in, overwrite
-from nodl.infer.cpp.running.frames import Frame
 from nodl.infer.cpp.running.hiding import element_type, seen_type
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.objects import is_plain_type
 from nodl.infer.cpp.running.references import through
 from nodl.infer.cpp.running.values import (
@@ -31,17 +29,14 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type
-from nodl.infer.cpp.syntax import text, unwrapped, walk
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
+from nodl.infer.cpp.syntax import Node, text, unwrapped, walk
 
 
 def without_source(
     run: Machine, name: str, values: Sequence[Value], node: Node, frame: Frame, receiver: Obj | None
 ) -> Value:
     """Declared in a header in reach, defined where we cannot see it."""
-    nodes = [o for value in values for o in nodes_in(run, value)]
+    nodes = [o for value in values for o in nodes_in(value)]
     if receiver is not None and receiver.node is not None:
         nodes.append(receiver)
     holder = receiver is not None and receiver.cls is not None and _holds_node(run, receiver)
@@ -49,14 +44,14 @@ def without_source(
         record = nodes[0].node if nodes else None
         run.gap(node, frame, f"the source of {name}() is not in reach; it may make interfaces", record)
     run.handle(node, frame)
-    handed_over(run, f"{name}()", [v for v in values if not nodes_in(run, v)], node, frame)
+    handed_over(run, f"{name}()", [v for v in values if not nodes_in(v)], node, frame)
     return unknown(f"the result of {name}()")
 
 
 def _holds_node(run: Machine, holder: Obj) -> bool:
     for each in run.names.ancestry(holder.cls) if holder.cls is not None else ():
         for name in each.fields:
-            if nodes_in(run, run.store.get((holder, name)) or BOTTOM):
+            if nodes_in(run.store.get((holder, name)) or BOTTOM):
                 return True
     return False
 
@@ -88,9 +83,7 @@ def unknown_call(
     if not (harmless and (receiver is not None or name.startswith("rclcpp"))):  # a timer calls nobody at once
         called_now(run, values, node, frame)
     if harmless:
-        for value in values:
-            for atom in value:
-                run.later(atom, frame)
+        run.later(values, frame)
         return unknown(f"the result of {name}()")
     handed_over(run, f"{name}()", values, node, frame)
     if receiver is None or receiver.cls is not None:

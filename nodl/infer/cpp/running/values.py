@@ -6,16 +6,15 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from nodl.infer.cpp.reading.declarations import Class, Function
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.notes import Notes
+from nodl.infer.cpp.syntax import Node
 from nodl.name_template import ParameterPart, Part, UnknownPart
 
 if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.findings import NodeRecord
-    from nodl.infer.cpp.reading.declarations import Class, Function
-    from nodl.infer.cpp.reading.type_names import Type
-    from nodl.infer.cpp.running.frames import Frame
+    from nodl.infer.cpp.findings import AllocatedNode
+    from nodl.infer.cpp.running.machine import Frame
 
 MAX_ALTERNATIVES = 32
 MAX_SEQUENCES = 6
@@ -25,17 +24,17 @@ Value = tuple[Atom, ...]
 BOTTOM: Value = ()
 
 
-class NodePart(NamedTuple):
+class NodeNamePart(NamedTuple):
     """What a node says of itself: its ``name``, ``ns`` or ``fqn``."""
 
-    record: NodeRecord
+    record: AllocatedNode
     what: str
 
 
 class Text(NamedTuple):
     """A text; its parts are literals, parameters, names of nodes and what is not known."""
 
-    parts: tuple[Part | NodePart, ...]
+    parts: tuple[Part | NodeNamePart, ...]
 
 
 class DerivedName(str):
@@ -72,7 +71,7 @@ class Param(NamedTuple):
     ``item``: an element of a list; ``known``: that element as the launch file or the default gives it.
     """
 
-    record: NodeRecord
+    record: AllocatedNode
     name: str
     item: int | None = None
     known: Value = ()
@@ -126,7 +125,7 @@ class Obj:
 
     type: Type
     cls: Class | None = None
-    node: NodeRecord | None = None
+    node: AllocatedNode | None = None
     bindings: dict[Class, dict[str, Type]] = field(default_factory=dict)
     data: Notes = field(default_factory=Notes)  # of library classes
     heap: bool = False
@@ -213,7 +212,7 @@ def literal(value: str) -> Value:
     return (Text((value,)) if value else Text(()),)
 
 
-def as_parts(atom: Atom) -> tuple[Part | NodePart, ...]:
+def as_parts(atom: Atom) -> tuple[Part | NodeNamePart, ...]:
     """An alternative as a piece of text."""
     if isinstance(atom, Text):
         return atom.parts
@@ -238,7 +237,7 @@ def _parameter_parts(param: Param) -> tuple[Part, ...]:
 
 def concatenated(*values: Value) -> Value:
     """Every way to put one alternative of each behind another."""
-    results: list[tuple[Part | NodePart, ...]] = [()]
+    results: list[tuple[Part | NodeNamePart, ...]] = [()]
     for value in values:
         pieces = [piece for atom in value for piece in spread(atom)] or [
             (UnknownPart("a text that is never set"),)
@@ -249,16 +248,16 @@ def concatenated(*values: Value) -> Value:
     return tuple(dict.fromkeys(Text(melted(parts)) for parts in results))
 
 
-def spread(atom: Atom) -> list[tuple[Part | NodePart, ...]]:
+def spread(atom: Atom) -> list[tuple[Part | NodeNamePart, ...]]:
     """``as_parts``, once for each default of a parameter."""
     if isinstance(atom, Param) and len(atom.default) > 1:
         return [as_parts(atom._replace(known=(each,))) for each in atom.default]
     return [as_parts(atom)]
 
 
-def melted(parts: Iterable[Part | NodePart]) -> tuple[Part | NodePart, ...]:
+def melted(parts: Iterable[Part | NodeNamePart]) -> tuple[Part | NodeNamePart, ...]:
     """The parts without empty ones, literals that stand side by side as one."""
-    found: list[Part | NodePart] = []
+    found: list[Part | NodeNamePart] = []
     for part in parts:
         if part == "":
             continue

@@ -3,19 +3,13 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.frames import Frame
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.hiding import cell_of, lexical_class
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
-from nodl.infer.cpp.syntax import children, text
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.syntax import Node, children, text
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:

@@ -3,20 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
+from nodl.infer.cpp.reading.declarations import FunctionParameter
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import is_written_back
-from nodl.infer.cpp.running.frames import Frame
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Value
-from nodl.infer.cpp.syntax import children, text, unwrapped
-
-if TYPE_CHECKING:
-    from tree_sitter import Node
-
-    from nodl.infer.cpp.reading.declarations import FunctionParameter
-
+from nodl.infer.cpp.syntax import Node, children, text, unwrapped
 
 _WRITTEN_BACK = (
     "identifier",

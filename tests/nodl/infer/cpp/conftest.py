@@ -10,8 +10,8 @@ import pytest
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.entry import Entry
-    from nodl.infer.cpp.program import Findings, Sources
-    from nodl.infer.cpp.running.machine import Settings
+    from nodl.infer.cpp.program import ProgramFindings, Sources
+    from nodl.infer.start import Start
 
 
 @pytest.fixture(autouse=True)
@@ -28,9 +28,9 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
     followed: list[str] = []
 
-    def counted(sources: Sources, entry: Entry, settings: Settings | None = None) -> Findings:
+    def counted(sources: Sources, entry: Entry, start: Start | None) -> ProgramFindings:
         followed.append(os.path.basename(entry.files[0]))
-        return run_program(sources, entry, settings)
+        return run_program(sources, entry, start)
 
     monkeypatch.setattr("nodl.infer.cpp.solved.run_program", counted)
     return followed

@@ -10,7 +10,7 @@ from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
-from nodl.infer.cpp.running.store import AbstractStore
+from nodl.infer.cpp.running.memory import AbstractStore
 from nodl.infer.cpp.running.values import literal
 
 LOOPS = "for (int i = 0; i < 40; ++i) { for (int j = 0; j < 40; ++j) { sum = sum + i * j; } }"

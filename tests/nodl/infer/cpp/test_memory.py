@@ -6,9 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from nodl.infer.cpp.running.memory import CallOutcome, Memory
+from nodl.infer.cpp.running.memory import AbstractStore, CallOutcome, Memory
 from nodl.infer.cpp.running.notes import Notes
-from nodl.infer.cpp.running.store import AbstractStore
 from nodl.infer.cpp.running.values import Value, literal
 from tests.nodl.infer.cpp.workspace import in_class, infer, names
 
