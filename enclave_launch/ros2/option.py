@@ -24,9 +24,10 @@ from enclave_launch.boundary.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
 from enclave_launch.verb.options import (
-    add_explain_option,
-    add_looking_options,
-    add_policy_options,
+    DENIALS,
+    LOOKING,
+    POLICY,
+    add_options,
     add_security_options,
     build_parser,
 )
@@ -43,10 +44,9 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
     def add_arguments(self, parser: argparse.ArgumentParser, cli_name: str, *, argv: Any = None) -> None:
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
         add_security_options(group)
-        add_policy_options(group)
-        add_explain_option(group)
+        add_options(group, (*POLICY, *DENIALS))
         self._of_secured = tuple(group._group_actions)
-        add_looking_options(group)
+        add_options(group, LOOKING)
         for action in group._group_actions:
             action.default = argparse.SUPPRESS  # what is there then was given
             if "--secure" in action.option_strings:

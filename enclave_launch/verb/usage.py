@@ -10,6 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.errors import UsageError
+from enclave_launch.verb.options import DENIALS, LATE, PASSPHRASE, POLICY, SECURITY, names_of
 
 
 class CommandLine(NamedTuple):
@@ -19,43 +20,13 @@ class CommandLine(NamedTuple):
     given: frozenset[str]
 
 
-FOR_SECURE = frozenset(
-    {
-        "keystore",
-        "no_create_keystore",
-        "strategy",
-        "domain_id",
-        "valid_for",
-        "no_revoke",
-        "warn_expiry",
-        "restart_expiring",
-        "compatible_subjects",
-        "ca_passphrase_file",
-        "ca_passphrase_env",
-        "allow_late",
-        "no_explain_denials",
-    }
-)
+FOR_SECURE = names_of((*SECURITY, *PASSPHRASE, *LATE, *DENIALS)) - {"secure"} | {"restart_expiring"}
 """Options of a keystore or of secured processes."""
 
-FOR_PLAN = frozenset(
-    {
-        "nodl",
-        "library",
-        "missing_nodl",
-        "accept_patterns",
-        "also",
-        "accept_prefix",
-        "accept_middleware",
-        "enclave_scope",
-        "policy",
-    }
-)
+FOR_PLAN = names_of(POLICY)
 """Options of the plan: an unsecured launch makes none."""
 
-FOR_LEARN = frozenset({"learn_for", "learn_isolation", "learn_parameters"})
-"""Options of a learning run."""
-
+_FOR_LEARN = {"learn_for", "learn_isolation", "learn_parameters"}
 _VIEWS = ("explain", "dump_params", "show_args", "print_description")
 
 
@@ -71,35 +42,34 @@ def read_command_line(parser: argparse.ArgumentParser, argv: Sequence[str] | Non
 
 def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
     """Raises ``UsageError`` for options without effect; it names the flag that is missing."""
-    given, options = line.given, line.options
+    given, options, actions = line.given, line.options, parser._actions
     views = [name for name in _VIEWS if name in given]
+    looks = bool(views or options.dry_run)
     if len(views) > 1:
-        raise UsageError(
-            f"{_flags(parser._actions, views)} each print something of their own: give one of them"
-        )
+        raise UsageError(f"{_flags(actions, views)} each print something of their own: give one of them")
     if "format" in given and (views or not options.dry_run):
-        beside = f" beside {_flags(parser._actions, views)}" if views else ""
+        beside = f" beside {_flags(actions, views)}" if views else ""
         raise UsageError(f"--format has no effect{beside}: it is for --dry-run; nothing was started")
     if options.learn is None:
-        check_needs_secure(parser._actions, given & FOR_LEARN, "--learn")
-    elif views or options.dry_run:
+        check_needs_secure(actions, given & _FOR_LEARN, "--learn")
+    elif looks:
         raise UsageError("--learn runs the launch; nothing else is looked at")
     if not options.audit:
-        check_needs_secure(parser._actions, given & {"audit_report"}, "--audit")
-    elif options.secure or options.learn is not None or views or options.dry_run:
+        check_needs_secure(actions, given & {"audit_report"}, "--audit")
+    elif options.secure or options.learn is not None or looks:
         raise UsageError(
             "--audit runs the launch unsecured and tells what --secure would refuse: give it alone"
         )
     if not options.watch:
-        check_needs_secure(parser._actions, given & {"watch_report", "watch_accept"}, "--watch")
-    elif views or options.dry_run or options.audit or options.learn is not None:
+        check_needs_secure(actions, given & {"watch_report", "watch_accept"}, "--watch")
+    elif looks or options.audit or options.learn is not None:
         raise UsageError(
             "--watch is for a launch that runs as planned: it is not for --dry-run, --audit or --learn"
         )
     if not options.secure:
-        check_needs_secure(parser._actions, given & FOR_SECURE)
-        if not views and not options.dry_run and not options.audit and not options.watch:
-            check_needs_secure(parser._actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
+        check_needs_secure(actions, given & FOR_SECURE)
+        if not (looks or options.audit or options.watch):
+            check_needs_secure(actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
 
 
 def check_needs_secure(
@@ -125,8 +95,8 @@ PERMISSIVE_NOTICE = (
 
 def _flags(actions: Iterable[argparse.Action], names: Collection[str]) -> str:
     """As a person writes them, in the order of the help text."""
-    return ", ".join(_long(action) for action in actions if action.dest in names)
-
-
-def _long(action: argparse.Action) -> str:
-    return next((flag for flag in action.option_strings if flag.startswith("--")), action.dest)
+    return ", ".join(
+        next((flag for flag in action.option_strings if flag.startswith("--")), action.dest)
+        for action in actions
+        if action.dest in names
+    )

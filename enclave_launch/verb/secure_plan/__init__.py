@@ -9,6 +9,7 @@ from enclave_launch.boundary.command_line import CommandParser, add_verbosity, a
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.completion import offer_launches
+from enclave_launch.verb.options import EVALUATION, POLICY, Option, add_options
 from enclave_launch.verb.secure_plan import (
     check,
     diff,
@@ -21,7 +22,11 @@ from enclave_launch.verb.secure_plan import (
     show,
     suggest,
 )
+from enclave_launch.verb.secure_plan.plans import WORDS
 
+PLAN: tuple[Option, ...] = (("words", {"nargs": "+", "metavar": WORDS}, ""),)
+RESOLVING = (("what each node may do", POLICY), ("evaluating the launch file", EVALUATION))
+"""As of ``secure-launch``; without effect on a saved plan."""
 VERBS = (show, check, diff, drift, flow, hosts, export, suggest, report, evidence)
 DESCRIPTION = """\
 Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
@@ -41,8 +46,11 @@ def build_parser() -> argparse.ArgumentParser:
         head = verb.__doc__ or ""
         name = verb.__name__.rpartition(".")[2]
         below = verbs.add_parser(name, help=head.partition("\n")[0], description=head, formatter_class=raw)
-        verb.add_arguments(below)
-        below.set_defaults(verb=verb.run)
+        add_options(below, getattr(verb, "WORDS", PLAN))
+        for title, options in (*RESOLVING, *verb.OPTIONS.items()):
+            add_options(below.add_argument_group(title) if title else below, options)
+        # A launch prefix is only of use where something is started.
+        below.set_defaults(verb=verb.run, launch_prefix=None, launch_prefix_filter=None)
     add_verbosity(parser)
     return parser
 

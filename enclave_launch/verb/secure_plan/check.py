@@ -11,28 +11,28 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch import __version__
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.diagnostics import Code
-from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
-from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.options import FLAG, PATH, one_of
+from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
+from enclave_launch.verb.secure_plan.plans import read_plan
 
 if TYPE_CHECKING:
     from enclave_launch.review.document import Told
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan check``."""
-    add_plan_arguments(parser)
-    parser.add_argument("--format", choices=("text", "json", "sarif"), default="text")
-    parser.add_argument("--strict", action="store_true", help="warnings count as errors")
-    parser.add_argument("--keystore", metavar="DIR", type=Path, help="hold the plan against it; reads only")
-    parser.add_argument("--within", metavar="TIME", default=DEFAULT_MARGIN, help="what ends soon (30d)")
-    parser.add_argument("--expect", type=Path, metavar="FILE", help=f"default: {EXPECTATIONS}, if it exists")
+OPTIONS = {
+    "": (
+        ("--format", one_of("text", "json", "sarif"), ""),
+        ("--strict", FLAG, "warnings count as errors"),
+        ("--keystore DIR", PATH, "hold the plan against it; reads only"),
+        WITHIN,
+        EXPECT,
+    )
+}
 
 
 def run(options: argparse.Namespace) -> int:

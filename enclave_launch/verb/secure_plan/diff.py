@@ -20,7 +20,9 @@ import sys
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import json_text
-from enclave_launch.verb.secure_plan.plans import WORDS, add_resolving_options, read_plan
+from enclave_launch.verb.options import TEXT, Option, one_of
+from enclave_launch.verb.secure_plan import plans
+from enclave_launch.verb.secure_plan.plans import read_plan
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Mapping
@@ -28,15 +30,12 @@ if TYPE_CHECKING:
     from enclave_launch.review.changes import FileChange
     from enclave_launch.review.document import GrantedName, PlanDocument
 
-BEFORE = "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan diff``."""
-    parser.add_argument("before", metavar="BEFORE", help=BEFORE)
-    parser.add_argument("words", nargs="+", metavar=WORDS, help="what it is compared with")
-    add_resolving_options(parser)
-    parser.add_argument("--format", choices=("text", "json", "markdown"), default="text")
+WORDS: tuple[Option, ...] = (
+    ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
+    ("words", {"nargs": "+", "metavar": plans.WORDS}, "what it is compared with"),
+)
+OPTIONS = {"": (("--format", one_of("text", "json", "markdown"), ""),)}
 
 
 def run(options: argparse.Namespace) -> int:

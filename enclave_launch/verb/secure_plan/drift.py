@@ -18,7 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.terminal import json_text, message
 from enclave_launch.errors import EnclaveLaunchError, UsageError
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan, read_saved
+from enclave_launch.verb.options import PATH, PATHS, TEXT, TEXTS, one_of
+from enclave_launch.verb.secure_plan.plans import FORM, read_plan, read_saved
 from keystore.errors import KeystoreError
 
 if TYPE_CHECKING:
@@ -37,43 +38,23 @@ class CannotObserve(EnclaveLaunchError):
     exit_status = 3
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan drift``."""
-    add_plan_arguments(parser)
-    group = parser.add_argument_group("what to look at")
-    group.add_argument("--domain-id", type=int, metavar="N", help="default: the domain that the plan is for")
-    group.add_argument("--keystore", type=Path, metavar="DIR", help="of a secured system")
-    group.add_argument("--enclave", metavar="NAME", help="the observer's own")
-    group.add_argument(
-        "--for", dest="longest", type=float, default=30.0, metavar="SECONDS",
-        help="how long what is planned may take to appear (30)",
-    )  # fmt: skip
-    group.add_argument(
-        "--settle",
-        type=float,
-        default=5.0,
-        metavar="SECONDS",
-        help="compare when nothing changed so long (5)",
-    )
-    group.add_argument("--with", dest="observer", choices=("auto", "cyclonedds", "rclpy"), default="auto")
-    group.add_argument(
-        "--graph",
-        type=Path,
-        metavar="RUN.json",
-        help="what secure-nodl observe --save kept, in place of looking",
-    )
-    parser.add_argument(
-        "--accept",
-        action="append",
-        default=[],
-        metavar="NODE",
-        help="may run beside the plan; wildcards (repeatable)",
-    )
-    parser.add_argument(
-        "--also-planned", action="append", default=[], type=Path, metavar="PLAN.json",
-        help="another launch in this domain (repeatable)",
-    )  # fmt: skip
-    parser.add_argument("--format", choices=("text", "json"), default="text")
+OPTIONS = {
+    "what to look at": (
+        ("--domain-id N", {"type": int}, "default: the domain that the plan is for"),
+        ("--keystore DIR", PATH, "of a secured system"),
+        ("--enclave NAME", TEXT, "the observer's own"),
+        ("--for SECONDS", {"type": float, "dest": "longest", "default": 30.0},
+         "how long what is planned may take to appear (30)"),
+        ("--settle SECONDS", {"type": float, "default": 5.0}, "compare when nothing changed so long (5)"),
+        ("--with", {**one_of("auto", "cyclonedds", "rclpy"), "dest": "observer"}, ""),
+        ("--graph RUN.json", PATH, "what secure-nodl observe --save kept, in place of looking"),
+    ),
+    "": (
+        ("--accept NODE", TEXTS, "may run beside the plan; wildcards (repeatable)"),
+        ("--also-planned PLAN.json", PATHS, "another launch in this domain (repeatable)"),
+        FORM,
+    ),
+}  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:

@@ -20,9 +20,10 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.boundary.files import read_bytes
 from enclave_launch.diagnostics import Code
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
-from enclave_launch.verb.secure_plan.keystores import DEFAULT_MARGIN, endings, keystore_errors
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.options import PATH, TEXT
+from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
+from enclave_launch.verb.secure_plan.keystores import endings, keystore_errors
+from enclave_launch.verb.secure_plan.plans import read_plan
 from keystore.errors import InvalidInputError
 
 if TYPE_CHECKING:
@@ -31,24 +32,19 @@ if TYPE_CHECKING:
 SIGNED = "statement.dsse.json"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan evidence``."""
-    add_plan_arguments(parser)
-    parser.add_argument(
-        "-o", "--output", type=Path, metavar="DIR", required=True, help="a new or empty folder"
+OPTIONS = {
+    "": (
+        ("-o --output DIR", {**PATH, "required": True}, "a new or empty folder"),
+        ("--keystore DIR", PATH, "look at its keys, governance and files"),
+        ("--sbom FILE", PATH, "the product's CycloneDX document (JSON)"),
+        ("--sign-key FILE", PATH, "sign the statement with this EC or RSA key"),
+        ("--passphrase-env NAME", TEXT, "the variable with the key's passphrase"),
+        ("--pin-env NAME", TEXT, "the variable with the token's PIN"),
+        ("--at TIME", TEXT, "of the examination, as 2026-11-22T10:00:00Z (default: now)"),
+        WITHIN,
+        EXPECT,
     )
-    parser.add_argument("--keystore", metavar="DIR", type=Path, help="look at its keys, governance and files")
-    parser.add_argument("--sbom", metavar="FILE", type=Path, help="the product's CycloneDX document (JSON)")
-    parser.add_argument(
-        "--sign-key", metavar="FILE", type=Path, help="sign the statement with this EC or RSA key"
-    )
-    parser.add_argument("--passphrase-env", metavar="NAME", help="the variable with the key's passphrase")
-    parser.add_argument("--pin-env", metavar="NAME", help="the variable with the token's PIN")
-    parser.add_argument(
-        "--at", metavar="TIME", help="of the examination, as 2026-11-22T10:00:00Z (default: now)"
-    )
-    parser.add_argument("--within", metavar="TIME", default=DEFAULT_MARGIN, help="what ends soon (30d)")
-    parser.add_argument("--expect", type=Path, metavar="FILE", help=f"default: {EXPECTATIONS}, if it exists")
+}
 
 
 def run(options: argparse.Namespace) -> int:

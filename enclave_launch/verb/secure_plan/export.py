@@ -20,8 +20,9 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.errors import ManifestError, UsageError
-from enclave_launch.verb.secure_plan.hosts import hosts_of
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.options import FLAG, PATH, TEXT, TEXTS
+from enclave_launch.verb.secure_plan.hosts import HOSTS, hosts_of
+from enclave_launch.verb.secure_plan.plans import read_plan
 
 if TYPE_CHECKING:
     from enclave_launch.deployment.deployment import Deployment, File
@@ -31,42 +32,25 @@ if TYPE_CHECKING:
 ENGINES = ("systemd", "compose", "kubernetes")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan export``."""
-    add_plan_arguments(parser)
-    parser.add_argument("--format", choices=ENGINES, required=True)
-    parser.add_argument("-o", "--output", type=Path, required=True, metavar="DIR")
-    parser.add_argument(
-        "--keystore",
-        required=True,
-        metavar="DIR",
-        help="where the plan is provisioned: what its enclaves hold",
-    )
-    parser.add_argument(
-        "--hosts", type=Path, metavar="FILE", help="which nodes or enclaves belong to which host"
-    )
-    parser.add_argument(
-        "--name", help="of target, project or namespace (default: ros- and the launch file's name)"
-    )
-    parser.add_argument(
-        "--accept-unexpressed", action="store_true", help="leave out what the engine cannot express"
-    )
-    parser.add_argument(
-        "--host-keystore",
-        default="/etc/ros/keystore",
-        metavar="PATH",
-        help="where bundles are imported on the hosts (/etc/ros/keystore)",
-    )
-    systemd = parser.add_argument_group("systemd")
-    systemd.add_argument(
-        "--setup", action="append", default=[], metavar="FILE",
-        help="sourced before each process, such as /opt/ros/jazzy/setup.sh; repeatable",
-    )  # fmt: skip
-    containers = parser.add_argument_group("compose and kubernetes")
-    containers.add_argument("--image", help="of every process; its entrypoint sets up ROS")
-    containers.add_argument(
-        "--user", default="10001:10001", help="uid:gid in Compose's containers (10001:10001)"
-    )
+OPTIONS = {
+    "": (
+        ("--format", {"choices": ENGINES, "required": True}, ""),
+        ("-o --output DIR", {**PATH, "required": True}, ""),
+        ("--keystore DIR", {"required": True}, "where the plan is provisioned: what its enclaves hold"),
+        HOSTS,
+        ("--name", TEXT, "of target, project or namespace (default: ros- and the launch file's name)"),
+        ("--accept-unexpressed", FLAG, "leave out what the engine cannot express"),
+        ("--host-keystore PATH", {"default": "/etc/ros/keystore"},
+         "where bundles are imported on the hosts (/etc/ros/keystore)"),
+    ),
+    "systemd": (
+        ("--setup FILE", TEXTS, "sourced before each process, such as /opt/ros/jazzy/setup.sh; repeatable"),
+    ),
+    "compose and kubernetes": (
+        ("--image", TEXT, "of every process; its entrypoint sets up ROS"),
+        ("--user", {"default": "10001:10001"}, "uid:gid in Compose's containers (10001:10001)"),
+    ),
+}  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:

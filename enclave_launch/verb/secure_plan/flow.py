@@ -13,17 +13,16 @@ import argparse
 import sys
 
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.options import FLAG
+from enclave_launch.verb.secure_plan.plans import read_plan
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan flow``."""
-    add_plan_arguments(parser)
-    parser.add_argument(
-        "--from", dest="influence_from", metavar="ENCLAVE|NODE", help="where the influence begins"
+OPTIONS = {
+    "": (
+        ("--from ENCLAVE|NODE", {"dest": "influence_from"}, "where the influence begins"),
+        ("--to ENCLAVE|NODE", {"dest": "influence_to"}, "where it would arrive"),
+        ("--built-in", FLAG, "count what every node has, too"),
     )
-    parser.add_argument("--to", dest="influence_to", metavar="ENCLAVE|NODE", help="where it would arrive")
-    parser.add_argument("--built-in", action="store_true", help="count what every node has, too")
+}
 
 
 def run(options: argparse.Namespace) -> int:

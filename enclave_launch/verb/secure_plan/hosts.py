@@ -15,26 +15,23 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.options import PATH, Option
+from enclave_launch.verb.secure_plan.plans import FORM, read_plan
 from keystore.errors import InvalidInputError
 
 if TYPE_CHECKING:
     from keystore.formats.hosts import Hosts
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan hosts``."""
-    add_plan_arguments(parser)
-    parser.add_argument(
-        "--hosts", type=Path, metavar="FILE", help="which nodes or enclaves belong to which host"
+HOSTS: Option = ("--hosts FILE", PATH, "which nodes or enclaves belong to which host")
+OPTIONS = {
+    "": (
+        HOSTS,
+        FORM,
+        ("--write-enclaves FILE", PATH,
+         "write the hosts with their enclaves, for secure-keystore export --hosts"),
     )
-    parser.add_argument("--format", choices=("text", "json"), default="text")
-    parser.add_argument(
-        "--write-enclaves",
-        type=Path,
-        metavar="FILE",
-        help="write the hosts with their enclaves, for secure-keystore export --hosts",
-    )
+}  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> int:

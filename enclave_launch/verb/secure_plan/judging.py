@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import read_text
 from enclave_launch.errors import UsageError
+from enclave_launch.verb.options import PATH, Option
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
     endings,
@@ -24,6 +25,8 @@ if TYPE_CHECKING:
     from enclave_launch.review.expectations import Expectations
 
 EXPECTATIONS = "enclaves.review.yaml"
+EXPECT: Option = ("--expect FILE", PATH, f"default: {EXPECTATIONS}, if it exists")
+WITHIN: Option = ("--within TIME", {"default": DEFAULT_MARGIN}, "what ends soon (30d)")
 
 
 def judged(

@@ -11,26 +11,12 @@ from typing import Any
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import stdout_is_for_the_plan
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.options import add_evaluation_options, add_policy_options
+from enclave_launch.verb.options import Option, one_of
 from nodl.ament_index import search_prefixes
 
 LARGEST_PLAN = 256 << 20  # bytes
 WORDS = "PLAN.json | PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
-
-
-def add_plan_arguments(parser: argparse.ArgumentParser) -> None:
-    """What says which plan: the words, and how a launch file is resolved."""
-    parser.add_argument("words", nargs="+", metavar=WORDS)
-    add_resolving_options(parser)
-
-
-def add_resolving_options(parser: argparse.ArgumentParser) -> None:
-    """As of ``secure-launch``; without effect on a saved plan."""
-    add_policy_options(parser.add_argument_group("what each node may do"))
-    add_evaluation_options(parser.add_argument_group("evaluating the launch file"))
-    parser.set_defaults(
-        launch_prefix=None, launch_prefix_filter=None
-    )  # only of use where something is started
+FORM: Option = ("--format", one_of("text", "json"), "")
 
 
 def read_plan(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:

@@ -17,20 +17,19 @@ from pathlib import Path
 from typing import Any
 
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.secure_plan.judging import EXPECTATIONS, judged
+from enclave_launch.verb.options import PATH, one_of
+from enclave_launch.verb.secure_plan.judging import EXPECT, judged
 from enclave_launch.verb.secure_plan.keystores import endings
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.secure_plan.plans import read_plan
 
-FORMATS = ("html", "markdown", "dot", "mermaid")
-
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan report``."""
-    add_plan_arguments(parser)
-    parser.add_argument("--format", choices=FORMATS, default="html")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help="default: standard output")
-    parser.add_argument("--keystore", metavar="DIR", type=Path, help="tell what of it differs, and ends when")
-    parser.add_argument("--expect", type=Path, metavar="FILE", help=f"default: {EXPECTATIONS}, if it exists")
+OPTIONS = {
+    "": (
+        ("--format", one_of("html", "markdown", "dot", "mermaid"), ""),
+        ("-o --output FILE", PATH, "default: standard output"),
+        ("--keystore DIR", PATH, "tell what of it differs, and ends when"),
+        EXPECT,
+    )
+}
 
 
 def run(options: argparse.Namespace) -> int:

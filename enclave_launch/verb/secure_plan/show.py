@@ -6,13 +6,9 @@ import argparse
 import sys
 
 from enclave_launch.boundary.terminal import json_text
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.secure_plan.plans import FORM, read_plan
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan show``."""
-    add_plan_arguments(parser)
-    parser.add_argument("--format", choices=("text", "json"), default="text")
+OPTIONS = {"": (FORM,)}
 
 
 def run(options: argparse.Namespace) -> int:

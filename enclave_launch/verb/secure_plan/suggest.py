@@ -5,19 +5,17 @@ from __future__ import annotations
 import argparse
 import sys
 
-from enclave_launch.verb.secure_plan.plans import add_plan_arguments, read_plan
+from enclave_launch.verb.secure_plan.plans import read_plan
 
-
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-plan suggest``."""
-    add_plan_arguments(parser)
-    parser.add_argument(
-        "--similarity",
-        type=float,
-        default=0.5,
-        metavar="0..1",
-        help="least share of common permissions of a merge (default: 0.5)",
+OPTIONS = {
+    "": (
+        (
+            "--similarity 0..1",
+            {"type": float, "default": 0.5},
+            "least share of common permissions of a merge (default: 0.5)",
+        ),
     )
+}
 
 
 def run(options: argparse.Namespace) -> int:
