@@ -13,7 +13,11 @@ cryptography and the operating system are translated where they enter.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager
+
 from enclave_launch.source_location import SourceLocation
+from keystore.errors import KeystoreError
 
 
 class EnclaveLaunchError(Exception):
@@ -58,3 +62,18 @@ class ProvisionError(EnclaveLaunchError):
 
 class RuntimeFailure(EnclaveLaunchError):
     """A process, or what a launch needs to run, could not be started or ended badly."""
+
+
+@contextmanager
+def translated(caught: type[Exception], told: type[EnclaveLaunchError], before: str = "") -> Iterator[None]:
+    """Raise ``told`` in the place of ``caught``: in its own words, those of the operating system without the rest."""
+    try:
+        yield
+    except caught as error:
+        words = error.strerror if isinstance(error, OSError) else error
+        raise told(f"{before}{words}") from error
+
+
+def keystore_errors() -> AbstractContextManager[None]:
+    """Raises ``ProvisionError`` in the place of a ``KeystoreError``."""
+    return translated(KeystoreError, ProvisionError)

@@ -12,7 +12,7 @@ from enclave_launch.admission import AdmissionOptions
 from enclave_launch.boundary.files import as_path
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.enclave import EnclaveScope
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import UsageError, translated
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
@@ -100,10 +100,8 @@ def _several(given: Any) -> tuple[Any, ...]:
 def _read_policy(path: Path) -> PolicyDocument:
     from keystore.formats.policy_xml import read_policy
 
-    try:
+    with translated(KeystoreError, UsageError):
         return read_policy(path)
-    except KeystoreError as error:
-        raise UsageError(str(error)) from error
 
 
 class SecurityOptions(NamedTuple):

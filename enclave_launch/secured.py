@@ -17,7 +17,7 @@ from enclave_launch.admission.middleware import ZENOH, failing, middleware_of
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.admission import handshake_fails
 from enclave_launch.diagnostics.enclaves import enclave_of_several_launches
-from enclave_launch.errors import ProvisionError, RuntimeFailure
+from enclave_launch.errors import ProvisionError, RuntimeFailure, keystore_errors
 from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, on_zenoh
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions, identity
@@ -85,12 +85,11 @@ def provision_policies(
     """All enclaves of ``plan``, or one. Raises ``ProvisionError`` with the keystore's own message, and where the plan
     asks for what it cannot give."""
     policies = plan.derived.policy.enclaves if only is None else (only,)
-    try:
-        return provision(settings.keystore, policies, options=options)
-    except NoGovernanceRuleError as error:
-        raise ProvisionError(f"{error} ({places(plan, error.domains)})") from error
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
+    with keystore_errors():
+        try:
+            return provision(settings.keystore, policies, options=options)
+        except NoGovernanceRuleError as error:
+            raise ProvisionError(f"{error} ({places(plan, error.domains)})") from error
 
 
 def provision_with_zenoh(
@@ -103,10 +102,8 @@ def provision_with_zenoh(
     wanted = zenoh_enclaves(plan, os.environ)
     options = options._replace(types={path: types_text(types) for path, types in wanted.items()})
     report = provision_policies(settings, plan, options)
-    try:
+    with keystore_errors():
         return options, report, write_zenoh(settings.keystore, wanted, options=options_of(options))
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
 
 
 def launch_owner(plan: LaunchPlan) -> str:
@@ -120,10 +117,8 @@ def told_of_shares(plan: LaunchPlan, keystore: str) -> LaunchPlan:
 
     Raises ``ProvisionError`` for shares that cannot be read.
     """
-    try:
+    with keystore_errors():
         found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
     return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
 
 
@@ -173,10 +168,8 @@ def check_router(plan: LaunchPlan, keystore: str) -> None:
 
     if not on_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):
         return
-    try:
+    with keystore_errors():
         address = present_address(KeystoreView(Path(keystore))) or RouterAddress()
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
     try:
         socket.create_connection((address.host, address.port), timeout=5.0).close()
     except OSError:

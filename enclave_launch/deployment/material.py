@@ -7,11 +7,10 @@ from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import NamedTuple
 
-from enclave_launch.errors import ProvisionError
+from enclave_launch.errors import ProvisionError, keystore_errors
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
-from keystore.errors import KeystoreError
 from keystore.steps.expiry import status
 
 PUBLIC_FILES = tuple(name for name in layout.RUNTIME_FILES if name != layout.KEY)
@@ -51,12 +50,10 @@ def read_material(keystore: str, enclaves: Iterable[str]) -> Material:
     wanted = sorted(set(enclaves))
     root = resolve_root(keystore)
     view = KeystoreView(root)
-    try:
+    with keystore_errors():
         view.require_complete()
         found = {name: _enclave(view, name) for name in wanted}
         report = status(root)
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
     first = next(one for one in report.expiries if one.enclave is None or one.enclave in found)
     if not first.is_valid(report.now):
         raise ProvisionError(

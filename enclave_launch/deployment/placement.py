@@ -6,8 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from enclave_launch.deployment.processes import DeployedProcess
-from enclave_launch.errors import UsageError
-from enclave_launch.review.information_flow import FlowGraph, FlowStep
+from enclave_launch.errors import UsageError, translated
+from enclave_launch.review.information_flow import FlowGraph, FlowStep, reached_from
 from keystore.errors import InvalidInputError
 from keystore.formats.hosts import Hosts, refuse_host_name
 
@@ -44,16 +44,14 @@ def place(processes: Iterable[DeployedProcess], hosts: Hosts) -> Placement:
     listed = list(processes)
     found: dict[str, list[DeployedProcess]] = {name: [] for name in hosts.names}
     nowhere = []
-    try:
-        for process in listed:
-            host = _host_of(process, hosts)
-            if host is None:
-                nowhere.append(process)
-            else:
+    for process in listed:
+        host = _host_of(process, hosts)
+        if host is None:
+            nowhere.append(process)
+        else:
+            with translated(InvalidInputError, UsageError):
                 refuse_host_name(host, process.place)
-                found.setdefault(host, []).append(process)
-    except InvalidInputError as error:
-        raise UsageError(str(error)) from error
+            found.setdefault(host, []).append(process)
     if not found:
         return Placement({ONLY_HOST: tuple(listed)})
     return Placement({host: tuple(own) for host, own in found.items()}, tuple(nowhere))
@@ -88,21 +86,8 @@ def restart_order(enclaves: Iterable[str], graph: FlowGraph) -> list[str]:
 
     Enclaves that influence each other in a circle stand together, by name.
     """
-    wanted = sorted(enclaves)
-    reach = {one: _reached(graph, one) for one in wanted}
     # Who reaches more stands before: along a flow the set of what is reached can only shrink.
-    return sorted(wanted, key=lambda one: (-len(reach[one] | {one}), one))
-
-
-def _reached(graph: FlowGraph, source: str) -> set[str]:
-    found: set[str] = set()
-    waiting: list[str] = [source]
-    while waiting:
-        for target in graph.get(waiting.pop(), {}):
-            if target not in found:
-                found.add(target)
-                waiting.append(target)
-    return found
+    return sorted(enclaves, key=lambda one: (-len(reached_from(graph, one)), one))
 
 
 def in_restart_order(processes: Sequence[DeployedProcess], graph: FlowGraph) -> tuple[DeployedProcess, ...]:

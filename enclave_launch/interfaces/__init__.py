@@ -12,7 +12,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.named_tuple import NamedTuple
-from enclave_launch.errors import ManifestError
+from enclave_launch.errors import ManifestError, translated
 from enclave_launch.interfaces.library_access import LibraryAccess
 from enclave_launch.interfaces.started_program import StartedProgram
 from enclave_launch.options import ResolveOptions
@@ -86,14 +86,12 @@ class InterfaceFinder:
                 self._known[subject] = found
         if isinstance(found, Missing) or not any(each.depends for each in found.interfaces):
             return found
-        try:
+        with translated(NoDLError, ManifestError):
             return found._replace(interfaces=self._library.complete(found.interfaces, started, container))
-        except NoDLError as error:
-            raise ManifestError(str(error)) from error
 
     def _find(self, subject: _Subject, started: StartedProgram) -> tuple[Found | Missing, bool]:
         """The answer, and whether it holds for this start alone."""
-        try:
+        with translated(NoDLError, ManifestError):
             manifest = self._lookup.find(
                 subject.package or "", executable=subject.executable, plugin=subject.plugin
             )
@@ -103,8 +101,6 @@ class InterfaceFinder:
             if subject.package == CONTAINER_PACKAGE and subject.executable:
                 return Found((_container(subject),)), False
             return self._without_manifest(subject, manifest, started)
-        except NoDLError as error:
-            raise ManifestError(str(error)) from error
 
     def _lacks(
         self, subject: _Subject, manifest: Lookup, started: StartedProgram

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_launch.boundary.new_file import write_bytes
-from enclave_launch.errors import ManifestError
+from enclave_launch.errors import ManifestError, translated
 from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchControl
@@ -152,10 +152,8 @@ def _manifest(node: LearntNode, path: Path) -> str:
 
 
 def _read(path: Path) -> Record:
-    try:
+    with translated(OSError, ManifestError, f"{path}: cannot be read: "):
         return read_record(path.read_bytes())
-    except OSError as error:
-        raise ManifestError(f"{path}: cannot be read: {error.strerror}") from error
 
 
 def _notes(learnt: Learnt, records: Iterable[Record]) -> Iterable[str]:
@@ -171,8 +169,6 @@ def _notes(learnt: Learnt, records: Iterable[Record]) -> Iterable[str]:
 
 def _write(path: Path, data: bytes) -> None:
     """Whole or not at all."""
-    try:
+    with translated(OSError, ManifestError, f"{path}: cannot be written: "):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(path, data)
-    except OSError as error:
-        raise ManifestError(f"{path}: cannot be written: {error.strerror}") from error

@@ -7,15 +7,13 @@ import sys
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import warn
-from enclave_launch.errors import RuntimeFailure
+from enclave_launch.errors import RuntimeFailure, translated
 from enclave_launch.flow import run
 from enclave_launch.recording.audit import Audit, audit_json, audit_text
 from enclave_launch.recording.learning import new_run
 from enclave_launch.recording.recording import Recording
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from enclave_launch.options import RunSettings
     from enclave_launch.plan import LaunchPlan
 
@@ -29,12 +27,8 @@ def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSet
     report = audit.report()
     sys.stdout.write(audit_text(report))
     if options.audit_report is not None:
-        _write(options.audit_report, audit_json(report))
+        with translated(
+            OSError, RuntimeFailure, f"--audit-report {options.audit_report}: cannot be written: "
+        ):
+            options.audit_report.write_text(audit_json(report), encoding="utf-8")
     return status or report.exit_status
-
-
-def _write(path: Path, text: str) -> None:
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise RuntimeFailure(f"--audit-report {path}: cannot be written: {error.strerror}") from error

@@ -20,7 +20,7 @@ from enclave_launch.boundary.terminal import (
     write_coloured,
 )
 from enclave_launch.boundary.words import did_you_mean
-from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
+from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError, translated
 from enclave_launch.verb.options import build_parser
 from enclave_launch.verb.usage import (
     PERMISSIVE_NOTICE,
@@ -195,18 +195,13 @@ def resolve_options(options: argparse.Namespace) -> ResolveOptions:
 
 
 def _launch_prefix(options: argparse.Namespace) -> Mapping[str, str]:
-    _check_pattern(options.launch_prefix_filter)
-    given = {"launch-prefix": options.launch_prefix, "launch-prefix-filter": options.launch_prefix_filter}
-    return {name: value for name, value in given.items() if value is not None}
-
-
-def _check_pattern(pattern: str | None) -> None:
-    try:
+    pattern = options.launch_prefix_filter
+    with translated(
+        re.error, UsageError, f"--launch-prefix-filter {pattern!r} is not a regular expression: "
+    ):
         re.compile(pattern or "")
-    except re.error as error:
-        raise UsageError(
-            f"--launch-prefix-filter {pattern!r} is not a regular expression: {error}"
-        ) from error
+    given = {"launch-prefix": options.launch_prefix, "launch-prefix-filter": pattern}
+    return {name: value for name, value in given.items() if value is not None}
 
 
 def _show_file(target: LaunchTarget, options: argparse.Namespace) -> int:

@@ -8,10 +8,10 @@ from datetime import timedelta
 
 from enclave_launch.boundary.progress import ProgressBar, wanted
 from enclave_launch.boundary.words import counted, some_of
-from enclave_launch.errors import ProvisionError, UsageError
+from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.options import SecurityOptions
 from enclave_launch.secured import ProvisionedLaunch
-from keystore.errors import InvalidInputError, KeystoreError
+from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import later, parse_duration, parse_end, utc_now
@@ -25,11 +25,9 @@ _NEW_KEYSTORE = "governance signed"
 
 def security_options(options: argparse.Namespace) -> SecurityOptions:
     """Raises ``UsageError`` for a value that is not what its option takes."""
-    try:
+    with translated(InvalidInputError, UsageError):
         parse_duration(options.warn_expiry)  # used after provisioning, refused before
         return SecurityOptions(strategy=options.strategy, keystore=_provision_options(options))
-    except InvalidInputError as error:
-        raise UsageError(str(error)) from error
 
 
 def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
@@ -41,7 +39,9 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
     now = utc_now()
     until = parse_end(options.valid_for, now) if options.valid_for else None
     return ProvisionOptions(
-        domains=domains(options),
+        domains=Domains.parse(options.domain_id)
+        if options.domain_id
+        else None,  # None: those of the processes
         create=not options.no_create_keystore,
         creation=creation,
         valid_until=until,
@@ -52,12 +52,6 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
         access=CaAccess(passphrase=_passphrase(options)),
         progress=ProgressBar("enclaves") if wanted(options.quiet) else None,
     )
-
-
-def domains(options: argparse.Namespace) -> Domains | None:
-    """``--domain-id``; None: those that the plan finds in the environments of the processes. Raises
-    ``InvalidInputError``."""
-    return Domains.parse(options.domain_id) if options.domain_id else None
 
 
 def _passphrase(options: argparse.Namespace) -> Secret | None:
@@ -96,11 +90,7 @@ def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
 
     keystore, known = launch.settings.keystore, launch.report.validities
     enclaves = [enclave.path for enclave in launch.plan.derived.policy.enclaves]
-    try:
+    with keystore_errors(), translated(InvalidInputError, UsageError):
         due = expires_soon(keystore, within, enclaves=enclaves, known=known)
-    except InvalidInputError as error:
-        raise UsageError(str(error)) from error
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
     for one in due:
         yield f"{one.subject} ends {one.not_after:%Y-%m-%d %H:%M} UTC; renew with: secure-keystore renew {keystore}"

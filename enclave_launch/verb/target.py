@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.boundary.words import did_you_mean
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import UsageError, translated
 from enclave_launch.evaluation import evaluate
 from nodl import ament_index
 
@@ -67,7 +67,5 @@ def _meant(package: str, prefixes: Sequence[str]) -> str:
 
 def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """``name:=value`` words. Raises ``UsageError`` with upstream's message for anything else."""
-    try:
+    with translated(RuntimeError, UsageError):
         return tuple(evaluate.parse_arguments(words))
-    except RuntimeError as error:
-        raise UsageError(str(error)) from error

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from enclave_launch.drift.compare import Security
 from enclave_launch.drift.expected import out_of_sight
 from enclave_launch.drift_watch import DriftWatch, WatchOptions
-from enclave_launch.errors import ProvisionError, UsageError
+from enclave_launch.errors import ProvisionError, UsageError, translated
 from enclave_launch.flow import run
 from enclave_launch.report.plan_json import plan_document
 from keystore.errors import KeystoreError
@@ -35,11 +35,9 @@ def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespa
     ``UsageError`` for processes on Zenoh."""
     document = _seen_document(launch.plan)
     root = launch.settings.keystore
-    try:
+    with translated(KeystoreError, ProvisionError, "--watch: "):
         enclave = provide_watcher(root, launch.options)
         security = Security(enclaves_by_guid(root))
-    except KeystoreError as error:
-        raise ProvisionError(f"--watch: {error}") from error
     directory = Path(root) / "enclaves" / enclave.lstrip("/")
     return DriftWatch(document, _options(options, security, directory))
 

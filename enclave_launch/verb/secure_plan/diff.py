@@ -20,6 +20,7 @@ import sys
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import json_text
+from enclave_launch.errors import keystore_errors
 from enclave_launch.verb.options import TEXT, Option, one_of
 from enclave_launch.verb.secure_plan import plans
 from enclave_launch.verb.secure_plan.plans import read_plan
@@ -104,7 +105,6 @@ def _files(options: argparse.Namespace) -> tuple[FileChange, ...]:
     if not _two_keystores(options):
         return ()
     from enclave_launch.review.changes import FileChange
-    from enclave_launch.verb.secure_plan.keystores import keystore_errors
     from keystore.steps.inventory import files_changed
 
     with keystore_errors():

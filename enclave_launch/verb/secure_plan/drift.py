@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.terminal import json_text, message
-from enclave_launch.errors import EnclaveLaunchError, UsageError
+from enclave_launch.errors import EnclaveLaunchError, UsageError, translated
 from enclave_launch.verb.options import PATH, PATHS, TEXT, TEXTS, one_of
 from enclave_launch.verb.secure_plan.plans import FORM, read_plan, read_saved
 from keystore.errors import KeystoreError
@@ -145,10 +145,8 @@ def _security(options: argparse.Namespace) -> Security | None:
         return None
     from keystore.steps.tool_enclaves import enclaves_by_guid
 
-    try:
+    with translated(KeystoreError, UsageError, f"--keystore {options.keystore}: "):
         return Security(enclaves_by_guid(options.keystore), authenticated=options.enclave is not None)
-    except KeystoreError as error:
-        raise UsageError(f"--keystore {options.keystore}: {error}") from error
 
 
 def _enclave_directory(options: argparse.Namespace) -> Path | None:

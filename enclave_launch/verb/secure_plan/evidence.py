@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import read_bytes
 from enclave_launch.diagnostics import Code
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.verb.options import PATH, TEXT
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
-from enclave_launch.verb.secure_plan.keystores import endings, keystore_errors
+from enclave_launch.verb.secure_plan.keystores import endings
 from enclave_launch.verb.secure_plan.plans import read_plan
 from keystore.errors import InvalidInputError
 
@@ -65,13 +65,11 @@ def run(options: argparse.Namespace) -> int:
 
 def _new_folder(folder: Path) -> Path:
     """Raises ``UsageError`` for one that holds something: what is old must not pass for evidence."""
-    try:
+    with translated(OSError, UsageError, f"{folder}: "):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise UsageError(
                 f"{folder} is not empty: name a new folder, so that nothing old is among the evidence"
             )
-    except OSError as error:
-        raise UsageError(f"{folder}: {error.strerror}") from error
     return folder
 
 
@@ -131,13 +129,8 @@ def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
         "verify": {
             "good": report.is_good,
             "findings": [
-                {
-                    "severity": each.severity.value,
-                    "code": each.code,
-                    "place": each.place,
-                    "message": each.message,
-                }
-                for each in report.findings
+                {"severity": one.severity.value, "code": one.code, "place": one.place, "message": one.message}
+                for one in report.findings
             ],
         },
     }
@@ -147,13 +140,10 @@ def _bill_of_materials(file: Path) -> dict[str, Any]:
     """Its BOM-Link (CycloneDX specification, "BOM-Link") and hash. Raises ``UsageError`` for anything else."""
     import hashlib
 
-    try:
+    with translated(OSError, UsageError, f"--sbom {file}: "):
         data = read_bytes(file)
+    with translated(ValueError, UsageError, f"--sbom {file} is not JSON: "):
         content = json.loads(data)
-    except OSError as error:
-        raise UsageError(f"--sbom {file}: {error.strerror}") from error
-    except ValueError as error:
-        raise UsageError(f"--sbom {file} is not JSON: {error}") from error
     if not isinstance(content, Mapping) or content.get("bomFormat") != "CycloneDX":
         raise UsageError(f'--sbom {file} is not a CycloneDX document ("bomFormat": "CycloneDX")')
     serial = str(content.get("serialNumber", "")).removeprefix("urn:uuid:")
@@ -175,10 +165,8 @@ def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
     def secret(variable: str | None) -> Secret | None:
         return Secret(variable=variable) if variable else None
 
-    try:
+    with translated(OSError, UsageError, f"--sign-key {options.sign_key}: "):
         reference = read_bytes(options.sign_key)
-    except OSError as error:
-        raise UsageError(f"--sign-key {options.sign_key}: {error.strerror}") from error
     access = CaAccess(passphrase=secret(options.passphrase_env), pin=secret(options.pin_env))
     with keystore_errors():
         signer = open_signer(reference, str(options.sign_key), access)
@@ -188,9 +176,7 @@ def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
     from enclave_launch.boundary.new_file import write_bytes
 
-    try:
+    with translated(OSError, UsageError, f"{folder}: "):
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             write_bytes(folder / name, data)
-    except OSError as error:
-        raise UsageError(f"{folder}: {error.strerror}") from error

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import json_text
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import UsageError, translated
 from enclave_launch.verb.options import PATH, Option
 from enclave_launch.verb.secure_plan.plans import FORM, read_plan
 from keystore.errors import InvalidInputError
@@ -46,10 +46,8 @@ def run(options: argparse.Namespace) -> int:
     placement = place(deployed_processes(document), hosts_of(options.hosts))
     graph = flow_graph(plan_from_document(document))
     if options.write_enclaves is not None:
-        try:
+        with translated(OSError, UsageError, f"{options.write_enclaves}: "):
             options.write_enclaves.write_text(enclaves_yaml(placement), encoding="utf-8")
-        except OSError as error:
-            raise UsageError(f"{options.write_enclaves}: {error.strerror}") from error
     if options.format == "json":
         sys.stdout.write(json_text(hosts_document(placement, graph), indent=2) + "\n")
     else:
@@ -63,7 +61,5 @@ def hosts_of(file: Path | None) -> Hosts:
 
     if file is None:
         return Hosts()
-    try:
+    with translated(InvalidInputError, UsageError):
         return load_hosts(file)
-    except InvalidInputError as error:
-        raise UsageError(str(error)) from error

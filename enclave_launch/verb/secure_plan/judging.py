@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import read_text
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import UsageError, translated
 from enclave_launch.verb.options import PATH, Option
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
@@ -74,9 +74,5 @@ def expectations(file: Path | None) -> Expectations:
         if not os.path.exists(EXPECTATIONS):
             return Expectations()
         file = Path(EXPECTATIONS)
-    try:
+    with translated(OSError, UsageError, f"{file}: "), translated(yaml.YAMLError, UsageError, f"{file}: "):
         return read_expectations(yaml.safe_load(read_text(file)) or {}, str(file))
-    except OSError as error:
-        raise UsageError(f"{file}: {error.strerror}") from error
-    except yaml.YAMLError as error:
-        raise UsageError(f"{file}: {error}") from error

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enclave_launch.errors import ProvisionError
-from keystore.errors import KeystoreError
+from enclave_launch.errors import keystore_errors
 
 if TYPE_CHECKING:
     from datetime import datetime
@@ -18,15 +16,6 @@ if TYPE_CHECKING:
     from keystore.verification.finding import Finding
 
 DEFAULT_MARGIN = "30d"
-
-
-@contextmanager
-def keystore_errors() -> Iterator[None]:
-    """Raises ``ProvisionError`` in the place of a ``KeystoreError``."""
-    try:
-        yield
-    except KeystoreError as error:
-        raise ProvisionError(str(error)) from error
 
 
 def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:

@@ -16,7 +16,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from enclave_launch.errors import UsageError
+from enclave_launch.errors import UsageError, translated
 from enclave_launch.verb.options import PATH, one_of
 from enclave_launch.verb.secure_plan.judging import EXPECT, judged
 from enclave_launch.verb.secure_plan.keystores import endings
@@ -42,10 +42,8 @@ def run(options: argparse.Namespace) -> int:
     if options.output is None:
         sys.stdout.write(text)
         return 0
-    try:
+    with translated(OSError, UsageError, f"{options.output}: "):
         write_text(options.output, text)
-    except OSError as error:
-        raise UsageError(f"{options.output}: {error.strerror}") from error
     return 0
 
 
