@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.boundary.words import counted, some_of
-from enclave_launch.runtime.run_options import Deadline
+from enclave_launch.options import Deadline
 from keystore.errors import KeystoreError
 from keystore.formats.validity import utc_now
 from keystore.steps.expiry import expires_soon
@@ -90,7 +90,7 @@ def watched(
 def _watch(
     launch: ProvisionedLaunch, say: Callable[[str], None], now: Callable[[], datetime], over: threading.Event
 ) -> None:
-    due = _all_notices(launch, now())
+    due = notices(_ends(launch), launch.settings.keystore, now())
     while due:
         left = min(due[0].at - now(), _LONGEST_SLEEP)
         if left > timedelta(0):
@@ -120,10 +120,6 @@ def deadline_before(ends: Iterable[Expiry], now: datetime) -> Deadline | None:
     return Deadline(
         at, f"{first.subject} ends at {first.not_after:%Y-%m-%d %H:%M:%S} UTC: renewing, starting anew"
     )
-
-
-def _all_notices(launch: ProvisionedLaunch, after: datetime) -> list[Notice]:
-    return notices(_ends(launch), launch.settings.keystore, after)
 
 
 def _ends(launch: ProvisionedLaunch) -> list[Expiry]:

@@ -19,10 +19,10 @@ from enclave_launch.policy import PolicyOptions
 from keystore.errors import KeystoreError
 
 if TYPE_CHECKING:
+    from datetime import datetime
     from pathlib import Path
 
     from enclave_launch.runtime.companion import LaunchCompanion
-    from enclave_launch.runtime.run_options import Deadline
     from keystore.formats.policy_xml import PolicyDocument
     from keystore.steps.options import ProvisionOptions
 
@@ -110,6 +110,17 @@ class SecurityOptions(NamedTuple):
 
     strategy: str = "Enforce"
     keystore: ProvisionOptions | None = None
+
+
+class Deadline:
+    """A moment at which a launch is ended in order, to be started anew by whoever set it.
+
+    ``reached`` once the launch was ended because of it, and for nothing else."""
+
+    def __init__(self, at: datetime, reason: str) -> None:
+        self.at = at
+        self.reason = reason
+        self.reached = False
 
 
 class RunSettings(NamedTuple):

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from functools import partial
 from typing import TYPE_CHECKING, Union
 
 from enclave_launch.boundary.terminal import warn
@@ -16,9 +17,8 @@ from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
 from enclave_launch.runtime.companion import Together
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
-from enclave_launch.runtime.live_launch import LiveLaunch, run_launch, run_launch_async
+from enclave_launch.runtime.live_launch import LiveLaunch, run_launch
 from enclave_launch.runtime.run_events import Observer
-from enclave_launch.runtime.run_options import RunOptions
 
 if TYPE_CHECKING:
     from enclave_launch.options import RunSettings
@@ -35,41 +35,48 @@ _UNSECURED = (LaunchSource, EvaluatedLaunch, LaunchPlan)
 def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -> int:
     """Block until all is over. Before anything was started raises ``RuntimeFailure``, and, for a provisioned launch,
     ``LaunchFileError`` for a program that is not there."""
-    source = _source(launch)
-    gate, options = _gate(launch, settings), _options(launch, settings)
+    live = _live(launch, settings)
     with _expiry_watch(launch):
         _check_programs(launch)
         with _zenoh_router(launch):
-            return run_launch(source.launch_file, source.arguments, gate=gate, options=options, warden=warden)
+            return run_launch(live(warden=warden))
 
 
 async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
     """The same inside a running event loop."""
-    source = _source(launch)
-    gate, options = _gate(launch, settings), _options(launch, settings)
+    live = _live(launch, settings)
     with _expiry_watch(launch):
         _check_programs(launch)
         with _zenoh_router(launch):
-            return await run_launch_async(source.launch_file, source.arguments, gate=gate, options=options)
+            return await live().run()
 
 
 def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     """In a thread of its own. Raises as ``run_launched``, before anything was started."""
     from enclave_launch.runtime.running_launch import RunningLaunch
 
-    source = _source(launch)
-    gate, options = _gate(launch, settings), _options(launch, settings)
+    live = _live(launch, settings)
     _check_programs(launch)
 
     async def main(observe: Observer, hold: Callable[[LiveLaunch], None]) -> int:
         with _expiry_watch(launch), _zenoh_router(launch):
-            service = LiveLaunch(
-                source.launch_file, source.arguments, gate=gate, options=options, observe=observe
-            )
+            service = live(observe=observe)
             hold(service)
             return await service.run()
 
     return RunningLaunch(main)
+
+
+def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
+    """What is to run, but for who watches it and its warden."""
+    own = frozenset[str]() if isinstance(launch, _UNSECURED) else launch.secret_variables
+    return partial(
+        LiveLaunch,
+        _source(launch),
+        settings._replace(secrets=settings.secrets | own, companion=_companion(launch, settings)),
+        gate=_gate(launch, settings),
+        needs_ros_services=_needs_ros_services(launch),
+    )
 
 
 def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
@@ -128,29 +135,10 @@ def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
     )
 
 
-def _options(launch: Launch, settings: RunSettings) -> RunOptions:
-    source = _source(launch)
-    own = frozenset[str]() if isinstance(launch, _UNSECURED) else launch.secret_variables
-    return RunOptions(
-        noninteractive=settings.noninteractive,
-        debug=settings.debug,
-        secrets=settings.secrets | own,
-        log_limit=settings.log_limit,
-        deadline=settings.deadline,
-        prefixes=source.prefixes,
-        needs_ros_services=_needs_ros_services(launch),
-        launch_configurations=source.launch_configurations,
-        host_options=source.host_options,
-        outcomes=source.outcomes,
-        companion=_companion(launch, settings),
-    )
-
-
 def _companion(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
     companion = settings.companion or _recording(launch, settings)
     if companion is None or settings.watch is None:
         return companion or settings.watch
-
     return Together(companion, settings.watch)
 
 
@@ -165,11 +153,7 @@ def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
     from enclave_launch.recording.recording import Recording
 
     source = _source(launch)
-    run = new_run(
-        source.launch_file,
-        source.host_options.distro or os.environ.get("ROS_DISTRO", ""),
-        "none",
-        secured=secured,
-    )
+    distro = source.host_options.distro or os.environ.get("ROS_DISTRO", "")
+    run = new_run(source.launch_file, distro, "none", secured=secured)
     explainers = [] if isinstance(launch, _UNSECURED) else [Explainer(launch.plan)]
     return Recording(run, explainers, optional=settings.record is None)

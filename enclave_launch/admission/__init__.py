@@ -1,8 +1,8 @@
 """What must hold before a process may start secured: nothing on its way takes the enclave away again.
 
 ``wrappers``: what stands between us and the program keeps its environment. ``middleware``: its RMW reads enclaves.
-``domains``: its DDS domain. ``variables``: nothing in its environment turns security off. ``handshakes``: its
-participants and those of other processes can authenticate. The plan asks before anything is signed.
+``domains``: its DDS domain. ``variables``: nothing in its environment turns security off. The plan asks before anything
+is signed.
 """
 
 from enclave_launch.admission.admission import AdmissionOptions, prefix_refusals, refusals, remarks

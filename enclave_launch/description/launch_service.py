@@ -59,8 +59,9 @@ class LaunchService:
             self.__running.shut_down("LaunchService.shutdown() called")
 
     async def __run(self, shutdown_when_idle: bool, *, handle_interrupt: bool) -> int:
+        from enclave_launch.options import RunSettings
+        from enclave_launch.plan import LaunchSource
         from enclave_launch.runtime.live_launch import LiveLaunch
-        from enclave_launch.runtime.run_options import RunOptions
 
         description = self.__description
 
@@ -70,10 +71,9 @@ class LaunchService:
             def description(self) -> LaunchDescription:
                 return description
 
-        options = RunOptions(
-            noninteractive=self.__noninteractive, debug=self.__debug, shutdown_when_idle=shutdown_when_idle
-        )
-        self.__running = InMemory("<script>", (), gate=None, options=options)
+        settings = RunSettings(noninteractive=self.__noninteractive, debug=self.__debug)
+        self.__running = InMemory(LaunchSource("<script>"), settings)
+        self.__running.shutdown_when_idle = shutdown_when_idle
         try:
             if not handle_interrupt:
                 return await self.__running.run()

@@ -6,5 +6,5 @@ supervision       one process over its life: respawn, escalation
 routing, sinks    its output to screen and log files; launch_log, log_directory: launch's own
 gate              its enclave, complete before it starts
 live_host         the evaluation's seam to the world, live
-service           the event loop that drives evaluation and all of the above
+live_launch       the event loop that drives evaluation and all of the above
 """

@@ -27,7 +27,7 @@ from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.live_process import LiveProcess
 from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
 from enclave_launch.runtime.ros_services import ALTERNATIVE, RosServices
-from enclave_launch.runtime.run_events import Observer, ProcessOver, ProcessPlanned, unobserved
+from enclave_launch.runtime.run_events import Observer, ProcessOver, ProcessPlanned
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.lifecycle import LifecycleNode
@@ -35,11 +35,9 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
 
 
-_DEFAULTS = HostOptions()
-
-
 class LiveHost(BaseHost):
-    """``secrets``: variables that no child may see. ``fail`` is told why the launch cannot go on."""
+    """``secrets``: variables that no child may see. ``fail`` is told why the launch cannot go on. ``services`` raises
+    ``RuntimeFailure`` where a launch that was not looked at before needs rclpy, and there is none."""
 
     def __init__(
         self,
@@ -49,12 +47,11 @@ class LiveHost(BaseHost):
         *,
         secrets: frozenset[str],
         fail: Callable[[EnclaveLaunchError], None],
-        services: RosServices | None = None,
-        late_services: Callable[[], RosServices] | None = None,
-        observe: Observer = unobserved,
-        companion: LaunchCompanion | None = None,
-        options: HostOptions = _DEFAULTS,
-        outcomes: Outcomes | None = None,
+        services: Callable[[], RosServices | None],
+        observe: Observer,
+        companion: LaunchCompanion | None,
+        options: HostOptions,
+        outcomes: Outcomes | None,
     ) -> None:
         super().__init__(options, outcomes)
         self._observe = observe
@@ -68,7 +65,6 @@ class LiveHost(BaseHost):
         self._fail = fail
         self._services = services
         self._companion = companion
-        self._late_services = late_services
         self._parameter_directory: Path | None = None
         self._parameter_files: dict[str, str] = {}
         self._tasks: set[asyncio.Task[None]] = set()
@@ -127,7 +123,7 @@ class LiveHost(BaseHost):
             self._gate.ensure_components(components)
         if self._companion is not None:
             self._companion.loading(components)
-        services = self._ros_services()
+        services = self._services()
         assert services is not None  # the service refuses to start without, where the plan has components
         context.add_completion_future(services.load(components))
 
@@ -135,22 +131,16 @@ class LiveHost(BaseHost):
         """Noted in the plan; made by ``ros_services``."""
 
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
-        services = self._ros_services()
+        services = self._services()
         if services is None:
             self._log.log("ERROR", "launch", f"no state change of '{node.node_name}': {ALTERNATIVE}")
             return
         context.add_completion_future(services.change_state(node.node_name, transition_id))
 
-    def _ros_services(self) -> RosServices | None:
-        """Raises ``RuntimeFailure`` where a launch that was not looked at before needs rclpy, and there is none."""
-        if self._services is None and self._late_services is not None:
-            self._services = self._late_services()
-        return self._services
-
     def _watch_state(self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext) -> None:
         if process.kind != "lifecycle_node" or process.fqn is None:
             return
-        services = self._ros_services()
+        services = self._services()
         if services is None:
             return
         from enclave_launch.description.events.lifecycle import StateTransition

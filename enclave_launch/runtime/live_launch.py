@@ -1,7 +1,7 @@
 """The live launch: one event loop that drives evaluation, processes, timers and signals until all is over.
 
-    run_launch(file, arguments, ...)         blocks, takes the signals, returns the exit status
-    run_launch_async(file, arguments, ...)   the same inside a running loop, cancel-safe
+    run_launch(LiveLaunch(source, ...))      blocks, takes the signals, returns the exit status
+    await LiveLaunch(source, ...).run()      the same inside a running loop, cancel-safe
 
 Semantics of launch/launch_service.py: the description is visited while one event is handled; then events,
 newest handler first, until nothing is left to wait for. Stricter than there: SIGTERM, SIGQUIT and SIGHUP
@@ -27,14 +27,14 @@ from enclave_launch.description.events.handlers import OnIncludeLaunchDescriptio
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.evaluation.evaluate import (
-    Arguments,
     forget_elements_of_launch_files,
     launch_file_error,
     top_description,
 )
 from enclave_launch.evaluation.stage import STAGE, Actor
 from enclave_launch.host.current import active_host
-from enclave_launch.host.outcomes import Outcomes
+from enclave_launch.options import RunSettings
+from enclave_launch.plan import LaunchSource
 from enclave_launch.prefixes import prepend_prefixes
 from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.companion import companion_first
@@ -53,68 +53,49 @@ from enclave_launch.runtime.run_events import (
     RunEvent,
     unobserved,
 )
-from enclave_launch.runtime.run_options import RunOptions
 from enclave_launch.runtime.signals import require_signals, signals_to
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 from enclave_launch.runtime.warden_process import WardenProcess
 
 
-def run_launch(
-    launch_file: str | os.PathLike[str],
-    arguments: Arguments = (),
-    *,
-    gate: EnclaveGate | None = None,
-    options: RunOptions | None = None,
-    warden: WardenProcess | None = None,
-) -> int:
-    """Run a launch file to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
+def run_launch(launch: LiveLaunch) -> int:
+    """Run it to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
 
-    ``warden``: one that is starting up already; it ends with the launch.
-
-    :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed, not the
-        main thread.
+    :raises RuntimeFailure: as ``LiveLaunch.run``, and where this is not the main thread.
     """
     require_signals()
-    chosen = options or RunOptions()
-    started = warden or WardenProcess(interactive=not chosen.noninteractive)
 
     async def main() -> int:
-        service = LiveLaunch(launch_file, arguments, gate=gate, options=chosen, warden=started)
-        with signals_to(service.on_signal):
-            return await service.run()
+        with signals_to(launch.on_signal):
+            return await launch.run()
 
     return asyncio.run(main())
 
 
-async def run_launch_async(
-    launch_file: str | os.PathLike[str],
-    arguments: Arguments = (),
-    *,
-    gate: EnclaveGate | None = None,
-    options: RunOptions | None = None,
-) -> int:
-    """As ``run_launch``; signals stay the caller's. Cancelling it shuts down, in order, before it returns."""
-    return await LiveLaunch(launch_file, arguments, gate=gate, options=options or RunOptions()).run()
-
-
 class LiveLaunch:
-    """One run of a launch file. ``shut_down`` may be called from the loop at any time."""
+    """One run of a launch file. ``shut_down`` may be called from the loop at any time.
+
+    ``needs_ros_services``: ``None`` where nobody knows before the file is visited. ``warden``: one that is starting up
+    already; it ends with the launch.
+    """
+
+    shutdown_when_idle = True
 
     def __init__(
         self,
-        launch_file: str | os.PathLike[str],
-        arguments: Arguments,
+        source: LaunchSource,
+        settings: RunSettings | None = None,
         *,
-        gate: EnclaveGate | None,
-        options: RunOptions,
+        gate: EnclaveGate | None = None,
+        needs_ros_services: bool | None = False,
         warden: WardenProcess | None = None,
         observe: Observer = unobserved,
     ) -> None:
-        self._observe = companion_first(options.companion, observe)
-        self._launch_file = os.path.abspath(launch_file)
-        self._arguments = arguments
+        self._settings = settings or RunSettings()
+        self._observe = companion_first(self._settings.companion, observe)
+        self._source = source._replace(launch_file=os.path.abspath(source.launch_file))
         self._gate = gate
-        self._options = options
+        self._needs_ros_services = needs_ros_services
         self._warden = warden
         self._wake = asyncio.Event()
         self._futures: list[asyncio.Future[Any]] = []
@@ -123,13 +104,16 @@ class LiveLaunch:
         self._failed = False
         self._services: RosServices | None = None
         self.warden_pid: int | None = None
-        self._actor = Actor(lambda: prepend_prefixes(options.prefixes), lambda: self._host.prefixes())
+        self._actor = Actor(lambda: prepend_prefixes(source.prefixes), lambda: self._host.prefixes())
         self._log: LaunchLog
         self._host: LiveHost
         self._context: LaunchContext
 
     async def run(self) -> int:
-        """:raises RuntimeFailure: before anything was started."""
+        """To its end; cancelling it shuts down, in order, before it returns. Gives the exit status.
+
+        :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed.
+        """
         async with AsyncExitStack() as stack:
             tree = ProcessTree(self._warden)  # first: the warden starts up while we go on
             self.warden_pid = tree.warden_pid
@@ -137,12 +121,13 @@ class LiveLaunch:
             await stack.enter_async_context(tree)
             stack.enter_context(many_descriptors())
             with STAGE.cleared():
-                self._services = self._ros_services()
+                if self._needs_ros_services:
+                    self.services()  # what is missing for them is said before anything starts
                 stack.callback(self._close_services)
                 self._log = self._open_log(tree)
             stack.callback(self._log.close)
             stack.enter_context(captured_logging(self._log, lambda: STAGE.is_on(self._actor)))
-            companion = self._options.companion
+            companion, outcomes = self._settings.companion, self._source.outcomes
             if companion is not None:
                 companion.opened(self)
                 stack.push_async_callback(companion.closed)
@@ -150,14 +135,14 @@ class LiveLaunch:
                 tree,
                 self._log,
                 self._gate,
-                secrets=self._options.secrets,
+                secrets=self._settings.secrets,
                 fail=self._on_failure,
-                services=self._services,
-                late_services=self._new_services if self._options.needs_ros_services is None else None,
+                services=self.services,
                 observe=self._observe,
                 companion=companion,
-                options=self._options.host_options,
-                outcomes=self._outcomes(),
+                options=self._source.host_options,
+                # What the dry run noted, for the first run that follows it.
+                outcomes=outcomes if outcomes is not None and outcomes.rewind() else None,
             )
             stack.push_async_callback(self._host.close)
             stack.enter_context(active_host(self._host))
@@ -195,10 +180,10 @@ class LiveLaunch:
 
     async def _run_until_over(self, tree: ProcessTree) -> int:
         self._say("INFO", f"All log files can be found below {self._log.directory}")
-        self._say("INFO", f"Default logging verbosity is set to {'DEBUG' if self._options.debug else 'INFO'}")
-        for notice in self._options.notices:
-            self._say("WARNING", notice)
-        companion = self._options.companion
+        self._say(
+            "INFO", f"Default logging verbosity is set to {'DEBUG' if self._settings.debug else 'INFO'}"
+        )
+        companion = self._settings.companion
         recorded = companion is not None and companion.records
         self._observe(LaunchStarted(str(self._log.directory), recorded))
         self._look_at_clock()
@@ -225,7 +210,7 @@ class LiveLaunch:
 
     def _look_at_clock(self) -> None:
         """Every minute, since a clock can be set; more often near the end."""
-        deadline = self._options.deadline
+        deadline = self._settings.deadline
         if deadline is None or self._shutting_down:
             return
         left = (deadline.at - datetime.now(timezone.utc)).total_seconds()
@@ -237,9 +222,11 @@ class LiveLaunch:
         self.shut_down(deadline.reason)
 
     def _begin(self) -> None:
-        argv = [f"{name}:={value}" for name, value in self._arguments]
-        self._context = LaunchContext(argv=argv, noninteractive=self._options.noninteractive, host=self._host)
-        self._context.launch_configurations.update(self._options.launch_configurations)
+        argv = [f"{name}:={value}" for name, value in self._source.arguments]
+        self._context = LaunchContext(
+            argv=argv, noninteractive=self._settings.noninteractive, host=self._host
+        )
+        self._context.launch_configurations.update(self._source.launch_configurations)
         self._context._event_queue.wake = self._wake.set
         self._context.register_event_handler(OnIncludeLaunchDescription())
         self._context.register_event_handler(OnShutdown(on_shutdown=self._on_shutdown_event))
@@ -247,13 +234,13 @@ class LiveLaunch:
 
     def description(self) -> Any:
         """What is launched: the file, as ``ros2 launch`` includes it."""
-        return top_description(self._launch_file, self._arguments)
+        return top_description(self._source.launch_file, self._source.arguments)
 
     async def _turn(self) -> None:
         """Handle one event, or wait for something to happen. Raises ``_Over`` when there is nothing more."""
         queue = self._context._event_queue
         if not queue.empty():
-            if self._options.debug:
+            if self._settings.debug:
                 self._say_event(queue.next)
             with STAGE.turn(self._actor):
                 self._futures += [future for _, future in handle_next(self._context, lambda *_: None)]
@@ -262,7 +249,7 @@ class LiveLaunch:
         pending = self._pending()
         if not pending and self._shutting_down:
             raise _Over
-        if not pending and self._options.shutdown_when_idle:
+        if not pending and self.shutdown_when_idle:
             self.shut_down("idle")
             return
         await self._wait_for(pending)
@@ -304,9 +291,13 @@ class LiveLaunch:
     def _on_error(self, error: Exception) -> None:
         """As launch does, with the place in the launch file where evaluation knows it."""
         self._failed = True
-        told = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, self._launch_file)
+        told = (
+            error
+            if isinstance(error, EnclaveLaunchError)
+            else launch_file_error(error, self._source.launch_file)
+        )
         message = f"Caught exception in launch (see debug for traceback): {told}"
-        if self._options.debug:
+        if self._settings.debug:
             self._say("DEBUG", "".join(traceback.format_exception(error)))
         self._say("ERROR", message)
         self._observe(LaunchFailed(message))
@@ -327,17 +318,13 @@ class LiveLaunch:
             self._say("ERROR", f"ended badly on their own: {', '.join(self._host.failed)}")
         return 1 if self._failed or self._host.failed else 0
 
-    def _outcomes(self) -> Outcomes | None:
-        """What the dry run noted, for the first run that follows it."""
-        outcomes = self._options.outcomes
-        return outcomes if outcomes is not None and outcomes.rewind() else None
+    def services(self) -> RosServices | None:
+        """Made when they are asked for; ``None`` for a launch that is known to need none.
 
-    def _ros_services(self) -> RosServices | None:
-        """Those of a launch that is known to need them: what is missing for it is said before anything starts."""
-        return self._new_services() if self._options.needs_ros_services else None
-
-    def _new_services(self) -> RosServices:
-        self._services = RosServices(self._gate.launcher() if self._gate is not None else None, self.say)
+        :raises RuntimeFailure: they are needed, and there is no rclpy.
+        """
+        if self._services is None and self._needs_ros_services is not False:
+            self._services = RosServices(self._gate.launcher() if self._gate else None, self.say)
         return self._services
 
     def _close_services(self) -> None:
@@ -353,8 +340,10 @@ class LiveLaunch:
             screen=SinkWriter(pressure.on_screen_full, pressure.on_screen_drained),
             files=SinkWriter(pressure.on_files_full, pressure.on_files_drained),
         )
-        screen = ScreenSink(self._options.screen or sys.stdout)
-        log = LaunchLog(directory, screen, writers, os.environ, self._options.debug, self._options.log_limit)
+        screen = ScreenSink(sys.stdout)
+        log = LaunchLog(
+            directory, screen, writers, os.environ, self._settings.debug, self._settings.log_limit
+        )
         pressure.attach(log)
         return log
 

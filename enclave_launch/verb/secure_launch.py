@@ -36,8 +36,6 @@ if TYPE_CHECKING:
     from enclave_launch.options import ResolveOptions, RunSettings
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.runtime.companion import LaunchCompanion
-    from enclave_launch.runtime.run_options import Deadline
-    from enclave_launch.secured import ProvisionedLaunch
     from enclave_launch.verb.target import LaunchTarget
 
 
@@ -117,7 +115,7 @@ def start(
             plan = _resolve(target, options)
             warn(*plan.problems, *plan.warnings)
             print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
-            return watch_plain_launch(plan, options, lambda watch: _run_settings(options, watch=watch))
+            return watch_plain_launch(plan, options, _run_settings(options))
         return _launch_plainly(target, options, companion)
     while (status := _launch(_planned(target, options, keystore), options, keystore, companion)) is None:
         pass  # what it used was about to end: planned, renewed and started once more
@@ -298,7 +296,7 @@ def _launch_plainly(
 
     launch = launch_source(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
-    return run(launch, options=_run_settings(options, companion))
+    return run(launch, options=_run_settings(options)._replace(companion=companion))
 
 
 def _launch(
@@ -319,23 +317,21 @@ def _launch(
     repaired = (*repair_notices(launch), *launch.report.warnings, *launch.handshakes)
     gaps = launch.zenoh.gaps if launch.zenoh is not None else ()
     warn(*repaired, *gaps, *expiry_notices(launch, options.warn_expiry))
-    deadline = _deadline(launch) if options.restart_expiring else None
-    watch = None
+    deadline = watch = None
+    if options.restart_expiring:
+        from enclave_launch.expiry_watch import renewal_deadline
+        from keystore.formats.validity import utc_now
+
+        deadline = renewal_deadline(launch, utc_now())
     if options.watch:
         from enclave_launch.verb.watch import watch_of_secured_launch
 
         watch = watch_of_secured_launch(launch, options)
-    status = run(launch, options=_run_settings(options, companion, deadline, watch))
+    settings = _run_settings(options)._replace(companion=companion, deadline=deadline, watch=watch)
+    status = run(launch, options=settings)
     if watch is not None:
         status = watch.status(status)
     return None if deadline is not None and deadline.reached else status
-
-
-def _deadline(launch: ProvisionedLaunch) -> Deadline | None:
-    from enclave_launch.expiry_watch import renewal_deadline
-    from keystore.formats.validity import utc_now
-
-    return renewal_deadline(launch, utc_now())
 
 
 def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
@@ -357,23 +353,14 @@ def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
         require_rclpy()
 
 
-def _run_settings(
-    options: argparse.Namespace,
-    companion: LaunchCompanion | None = None,
-    deadline: Deadline | None = None,
-    watch: LaunchCompanion | None = None,
-) -> RunSettings:
+def _run_settings(options: argparse.Namespace) -> RunSettings:
     from enclave_launch.options import RunSettings
 
-    secrets = frozenset({options.ca_passphrase_env}) if options.ca_passphrase_env else frozenset()
     return RunSettings(
         noninteractive=options.noninteractive,
         debug=options.debug,
         allow_late=options.allow_late,
-        secrets=secrets,
-        companion=companion,
-        watch=watch,
+        secrets=frozenset(filter(None, [options.ca_passphrase_env])),
         record=False if options.no_explain_denials else None,
         log_limit=options.log_limit,
-        deadline=deadline,
     )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -22,12 +21,10 @@ if TYPE_CHECKING:
     from enclave_launch.secured import ProvisionedLaunch
 
 
-def watch_plain_launch(
-    plan: LaunchPlan, options: argparse.Namespace, settings: Callable[[DriftWatch], RunSettings]
-) -> int:
+def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
     """Of an unsecured launch. Gives its status; 1 for alarms. Raises ``UsageError`` for processes on Zenoh."""
     watch = DriftWatch(_seen_document(plan), _options(options))
-    return watch.status(run(plan, options=settings(watch)))
+    return watch.status(run(plan, options=settings._replace(watch=watch)))
 
 
 def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespace) -> DriftWatch:

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.errors import RuntimeFailure
-from enclave_launch.runtime.live_launch import run_launch, run_launch_async
+from enclave_launch import RuntimeFailure, launch_source, run, run_async
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir")
 
@@ -40,7 +39,7 @@ STRICT = ("-X", "dev", "-W", "error")  # asyncio debug mode; unclosed or never a
 
 STATE = """
 import asyncio, logging, os, resource, signal, sys, threading
-from enclave_launch.runtime.live_launch import run_launch, run_launch_async
+from enclave_launch import launch_source, run, run_async
 
 def state():
     return {
@@ -66,7 +65,7 @@ def test_three_runs_in_a_row_leave_the_process_as_it_was(tmp_path: Path) -> None
 hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
 resource.setrlimit(resource.RLIMIT_NOFILE, (min(256, hard), hard))
 before = state()
-assert [run_launch(sys.argv[1]) for _ in range(3)] == [0, 0, 0]
+assert [run(launch_source(sys.argv[1])) for _ in range(3)] == [0, 0, 0]
 assert not differences(before), differences(before)
 """
     result = python(script, str(launch_file(tmp_path, "echo hello")), options=STRICT)
@@ -77,7 +76,7 @@ assert not differences(before), differences(before)
 def test_cancelled_at_any_moment_it_ends_every_process_and_leaves_nothing(tmp_path: Path) -> None:
     script = f"""{STATE}
 async def cancelled(seconds, times):
-    task = asyncio.ensure_future(run_launch_async(sys.argv[1]))
+    task = asyncio.ensure_future(run_async(launch_source(sys.argv[1])))
     for _ in range(times):
         await asyncio.sleep(seconds)
         task.cancel()
@@ -105,7 +104,7 @@ with open(f"/proc/self/task/{{os.getpid()}}/children") as children:
 def test_with_a_time_limit(tmp_path: Path) -> None:
     async def main() -> None:
         with pytest.raises(asyncio.TimeoutError):
-            await asyncio.wait_for(run_launch_async(launch_file(tmp_path, "sleep 60")), 0.3)
+            await asyncio.wait_for(run_async(launch_source(launch_file(tmp_path, "sleep 60"))), 0.3)
 
     asyncio.run(main())
 
@@ -127,16 +126,16 @@ def in_thread(function: object) -> list[object]:
 
 def test_in_another_thread_signals_cannot_be_taken_and_the_async_call_works(tmp_path: Path) -> None:
     file = launch_file(tmp_path, "true")
-    (refusal,) = in_thread(lambda: run_launch(file))
+    (refusal,) = in_thread(lambda: run(launch_source(file)))
     assert isinstance(refusal, RuntimeFailure)
     assert "main thread" in str(refusal) and "run_async" in str(refusal)
-    assert in_thread(lambda: asyncio.run(run_launch_async(file))) == [0]
+    assert in_thread(lambda: asyncio.run(run_async(launch_source(file)))) == [0]
 
 
 def test_the_blocking_call_in_a_running_loop_says_which_to_use(tmp_path: Path) -> None:
     async def main() -> None:
         with pytest.raises(RuntimeFailure, match=r"await run_async"):
-            run_launch(launch_file(tmp_path, "true"))
+            run(launch_source(launch_file(tmp_path, "true")))
 
     asyncio.run(main())
 
@@ -145,7 +144,9 @@ def test_the_blocking_call_in_a_running_loop_says_which_to_use(tmp_path: Path) -
 def test_started_with_standard_streams_closed(closed: str, tmp_path: Path, ros_log_dir: Path) -> None:
     """As some supervisors do; what we open must not take their places."""
     file = launch_file(tmp_path, "echo hello")
-    script = "import sys; from enclave_launch.runtime.live_launch import run_launch; sys.exit(run_launch(sys.argv[1]))"
+    script = (
+        "import sys; from enclave_launch import launch_source, run; sys.exit(run(launch_source(sys.argv[1])))"
+    )
     command = f'"$0" -c "$1" "$2" {closed}'
     result = subprocess.run(
         ["sh", "-c", command, sys.executable, script, str(file)],
@@ -164,7 +165,9 @@ def test_a_reader_of_our_output_that_goes_away_does_not_end_the_launch(
     tmp_path: Path, ros_log_dir: Path
 ) -> None:
     file = launch_file(tmp_path, "sh -c 'for i in 1 2 3 4 5 6; do echo $i; sleep 0.1; done'")
-    script = "import sys; from enclave_launch.runtime.live_launch import run_launch; sys.exit(run_launch(sys.argv[1]))"
+    script = (
+        "import sys; from enclave_launch import launch_source, run; sys.exit(run(launch_source(sys.argv[1])))"
+    )
     command = '("$0" -c "$1" "$2"; echo "status $?" >&2) | head -n 3'
     result = subprocess.run(
         ["sh", "-c", command, sys.executable, script, str(file)],

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch.plan import LaunchSource
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import LateProcess, StartAdditions
-from enclave_launch.runtime.live_launch import run_launch
-from enclave_launch.runtime.run_options import RunOptions
+from enclave_launch.runtime.live_launch import LiveLaunch, run_launch
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir", "small_ros")
 
@@ -122,7 +122,7 @@ def launched(tmp_path: Path, actions: str, gate: Gate | None = None) -> int:
         "from launch_ros.actions import *\nfrom launch_ros.descriptions import ComposableNode\n"
         f"def generate_launch_description():\n    return LaunchDescription([{actions}])\n"
     )
-    return run_launch(file, gate=gate, options=RunOptions(needs_ros_services=True))
+    return run_launch(LiveLaunch(LaunchSource(str(file)), gate=gate, needs_ros_services=True))
 
 
 class Gate:

@@ -12,10 +12,12 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.errors import ProvisionError, RuntimeFailure
+from enclave_launch.options import RunSettings
+from enclave_launch.plan import LaunchSource
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.runtime.companion import LaunchControl, Together
 from enclave_launch.runtime.gate import StartAdditions
-from enclave_launch.runtime.live_launch import run_launch, run_launch_async
-from enclave_launch.runtime.run_options import RunOptions
+from enclave_launch.runtime.live_launch import LiveLaunch, run_launch
 from tests.runtime.conftest import alive, read_pid
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir")
@@ -63,10 +65,10 @@ class SlowKeystore:
         return None
 
 
-def launch_file(directory: Path, *actions: str) -> Path:
+def launch_file(directory: Path, *actions: str) -> LaunchSource:
     file = directory / "test.launch.xml"
     file.write_text(f"<launch>{''.join(actions)}</launch>")
-    return file
+    return LaunchSource(str(file))
 
 
 def script(directory: Path, name: str, text: str, **attributes: str) -> str:
@@ -83,7 +85,7 @@ def test_each_process_finds_its_enclave_complete_and_gets_what_the_gate_grants(
     say = 'echo "$1 $(cat $ENCLAVE_FILE)"'
     actions = [script(tmp_path, name, say) for name in ("a", "b", "c")]
     keystore = SlowKeystore(tmp_path)
-    assert run_launch(launch_file(tmp_path, *actions), gate=keystore) == 0
+    assert run_launch(LiveLaunch(launch_file(tmp_path, *actions), gate=keystore)) == 0
     assert keystore.order == ["a", "b", "c"]
     shown = capfd.readouterr().out
     for number, name in enumerate("abc", start=1):
@@ -93,7 +95,7 @@ def test_each_process_finds_its_enclave_complete_and_gets_what_the_gate_grants(
 def test_what_needs_no_work_is_granted_at_once_but_overtakes_nobody(tmp_path: Path) -> None:
     actions = [script(tmp_path, name, "true") for name in ("a", "b", "c", "d")]
     keystore = SlowKeystore(tmp_path, untouched=("a", "d"))
-    assert run_launch(launch_file(tmp_path, *actions), gate=keystore) == 0
+    assert run_launch(LiveLaunch(launch_file(tmp_path, *actions), gate=keystore)) == 0
     assert keystore.order == ["a", "b", "c", "d"]
     assert (tmp_path / "d").exists(), "behind b and c it was looked at in its turn"
 
@@ -101,7 +103,7 @@ def test_what_needs_no_work_is_granted_at_once_but_overtakes_nobody(tmp_path: Pa
 def test_the_enclave_is_looked_at_again_before_each_respawn(tmp_path: Path) -> None:
     keystore = SlowKeystore(tmp_path)
     action = script(tmp_path, "a", "exit 0", respawn="true", respawn_max_retries="2")
-    assert run_launch(launch_file(tmp_path, action), gate=keystore) == 0
+    assert run_launch(LiveLaunch(launch_file(tmp_path, action), gate=keystore)) == 0
     assert keystore.order == ["a", "a", "a"]
 
 
@@ -114,7 +116,10 @@ def test_a_failure_to_provision_starts_nothing_more_and_shuts_down_with_the_reas
         script(tmp_path, "later", "echo never"),
     ]
     start = time.monotonic()
-    assert run_launch(launch_file(tmp_path, *actions), gate=SlowKeystore(tmp_path, broken=["bad"])) == 1
+    assert (
+        run_launch(LiveLaunch(launch_file(tmp_path, *actions), gate=SlowKeystore(tmp_path, broken=["bad"])))
+        == 1
+    )
     assert time.monotonic() - start < 10
     shown = capfd.readouterr().out
     assert f"[CRITICAL] [launch]: keystore {tmp_path}: read-only file system" in shown
@@ -128,14 +133,21 @@ def test_secrets_do_not_reach_the_children(
     monkeypatch.setenv("CA_PASSPHRASE", "open sesame")
     monkeypatch.setenv("HARMLESS", "yes")
     file = launch_file(tmp_path, script(tmp_path, "a", 'echo "${CA_PASSPHRASE-absent} $HARMLESS"'))
-    assert run_launch(file, options=RunOptions(secrets=frozenset({"CA_PASSPHRASE"}))) == 0
+    assert run_launch(LiveLaunch(file, RunSettings(secrets=frozenset({"CA_PASSPHRASE"})))) == 0
     assert "[a-1] absent yes" in capfd.readouterr().out
     assert os.environ["CA_PASSPHRASE"] == "open sesame"
 
 
-def test_notices_are_said_at_the_start(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
+class Notice(Together):
+    def opened(self, launch: LaunchControl) -> None:
+        launch.say("WARNING", "/talker ends 2030-01-01")
+
+
+def test_what_a_companion_says_at_once_is_said_at_the_start(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
     file = launch_file(tmp_path, script(tmp_path, "a", "true"))
-    run_launch(file, options=RunOptions(notices=("/talker ends 2030-01-01",)))
+    run_launch(LiveLaunch(file, RunSettings(companion=Notice())))
     lines = capfd.readouterr().out.splitlines()
     assert lines.index("[WARNING] [launch]: /talker ends 2030-01-01") < lines.index(
         next(line for line in lines if "process started" in line)
@@ -146,7 +158,7 @@ def test_inside_a_running_loop_and_cancelled(tmp_path: Path, capfd: pytest.Captu
     file = launch_file(tmp_path, script(tmp_path, "a", f"echo $$ > {tmp_path}/pid; exec sleep 60"))
 
     async def main() -> str:
-        task = asyncio.create_task(run_launch_async(file))
+        task = asyncio.create_task(LiveLaunch(file).run())
         pid = await asyncio.to_thread(read_pid, tmp_path / "pid")
         task.cancel()
         try:
@@ -163,9 +175,9 @@ def test_two_launches_at_once_in_one_event_loop(tmp_path: Path) -> None:
     file = launch_file(tmp_path, script(tmp_path, "a", f"echo $$ > {tmp_path}/pid; exec sleep 60"))
 
     async def main() -> None:
-        first = asyncio.create_task(run_launch_async(file))
+        first = asyncio.create_task(LiveLaunch(file).run())
         await asyncio.to_thread(read_pid, tmp_path / "pid")
-        assert await run_launch_async(launch_file(tmp_path, script(tmp_path, "b", "true"))) == 0
+        assert await LiveLaunch(launch_file(tmp_path, script(tmp_path, "b", "true"))).run() == 0
         assert alive(read_pid(tmp_path / "pid"))
         first.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -177,7 +189,7 @@ def test_two_launches_at_once_in_one_event_loop(tmp_path: Path) -> None:
 def test_a_launch_leaves_our_own_environment_as_it_was(tmp_path: Path) -> None:
     file = tmp_path / "test.launch.xml"
     file.write_text('<launch><set_env name="LAUNCHED" value="1"/></launch>')
-    assert run_launch(file) == 0
+    assert run_launch(LiveLaunch(LaunchSource(str(file)))) == 0
     assert "LAUNCHED" not in os.environ
 
 
@@ -186,5 +198,5 @@ def test_without_rclpy_what_needs_ros_services_is_an_error_before_anything_start
 ) -> None:
     file = launch_file(tmp_path, script(tmp_path, "a", "echo never"))
     with pytest.raises(RuntimeFailure, match=r"rclpy is not importable .* ros2 launch --secure"):
-        run_launch(file, options=RunOptions(needs_ros_services=True))
+        run_launch(LiveLaunch(file, needs_ros_services=True))
     assert "process started" not in capfd.readouterr().out

@@ -23,9 +23,8 @@ from tests.runtime.conftest import alive, eventually, read_pid, require_descript
 PROGRAM = """
 import sys
 from pathlib import Path
-from enclave_launch.runtime.live_launch import run_launch
-from enclave_launch.runtime.run_options import RunOptions
-sys.exit(run_launch(sys.argv[1], options=RunOptions(noninteractive={noninteractive}, debug={debug})))
+from enclave_launch import RunSettings, launch_source, run
+sys.exit(run(launch_source(sys.argv[1]), options=RunSettings(noninteractive={noninteractive}, debug={debug})))
 """
 
 PRELUDE = """
