@@ -101,6 +101,11 @@ class PlannedProcess(NamedTuple):
         return self.process.executable
 
     @property
+    def program(self) -> str:
+        """``package/executable``, or the executable alone."""
+        return self.process.program
+
+    @property
     def cmd(self) -> tuple[str, ...]:
         """Without what ``--secure`` appends."""
         return self.process.cmd
@@ -146,6 +151,11 @@ class PlannedComponent(NamedTuple):
     @property
     def plugin(self) -> str:
         return self.component.plugin
+
+    @property
+    def program(self) -> str:
+        """``package/plugin``."""
+        return self.component.program
 
     @property
     def location(self) -> SourceLocation:

@@ -43,19 +43,18 @@ def problems(
     processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
 ) -> Iterator[Diagnostic]:
     """What ``--secure`` stops at, of each process and then of each component."""
-    for process in processes:
-        if process.missing:
-            yield _missing(process.missing, process.process.location)
-        yield from process.refusals
-        if process.enclave and process.enclave.too_deep:
-            yield enclave_too_deep(
-                process.process.process_name, process.enclave.too_deep, process.process.location
-            )
-        for path, why in process.process.unread_parameter_files:
-            yield parameters_unknown(process.process.process_name, path, why, process.process.location)
+    for item in processes:
+        name, place = item.process.process_name, item.location
+        if item.missing:
+            yield _missing(item.missing, place)
+        yield from item.refusals
+        if item.enclave and item.enclave.too_deep:
+            yield enclave_too_deep(name, item.enclave.too_deep, place)
+        for path, why in item.process.unread_parameter_files:
+            yield parameters_unknown(name, path, why, place)
     for component in components:
         if component.missing:
-            yield _missing(component.missing, component.component.location)
+            yield _missing(component.missing, component.location)
 
 
 def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
@@ -68,58 +67,38 @@ def notes(
 ) -> Iterator[Diagnostic]:
     """What a reader should know of single processes and components."""
     for item in processes:
-        if item.enclave is None and item.process.kind == "executable":
-            yield executable_without_enclave(item.process.process_name, item.process.location)
-        if item.process.machine:
-            yield machine_elsewhere(item.process.process_name, item.process.machine, item.process.location)
+        process = item.process
+        if item.enclave is None and process.kind == "executable":
+            yield executable_without_enclave(process.process_name, process.location)
+        if process.machine:
+            yield machine_elsewhere(process.process_name, process.machine, process.location)
     for component in components:
         if component.container is None:
-            target, place = component.component.container, component.component.location
-            yield container_elsewhere(component.fqn, target, _alike(target, processes), place)
-    yield from _library_versions(processes, components)
-    yield from _lacking_manifests(processes, components)
+            target = component.component.container
+            yield container_elsewhere(component.fqn, target, _alike(target, processes), component.location)
+    started: list[PlannedProcess | PlannedComponent] = [*processes, *components]
+    yield from (library_version(each.program, each.doubt, each.location) for each in started if each.doubt)
+    yield from _lacking_manifests(started)
     yield from _incomplete(nodes_of(processes, components, None))
     for item in processes:
         process, attribute = item.process, item.process.enclave.attribute
         if item.enclave and process.enclave.argument is not None and attribute is not None:
-            yield enclave_attribute_unused(
-                process.process_name, item.enclave.path, attribute, process.location
-            )
+            path, place = item.enclave.path, process.location
+            yield enclave_attribute_unused(process.process_name, path, attribute, place)
     if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
         yield enclave_shared_with_launcher(launcher.enclave)
 
 
-def _library_versions(
-    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
-) -> Iterator[Diagnostic]:
-    for item in processes:
-        if item.doubt:
-            program = f"{item.process.package}/{item.process.executable}"
-            yield library_version(program, item.doubt, item.process.location)
-    for component in components:
-        if component.doubt:
-            program = f"{component.component.package}/{component.component.plugin}"
-            yield library_version(program, component.doubt, component.component.location)
-
-
-def _lacking_manifests(
-    processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
-) -> Iterator[Diagnostic]:
+def _lacking_manifests(started: Iterable[PlannedProcess | PlannedComponent]) -> Iterator[Diagnostic]:
     """Each program once, where it is started first."""
-    started: list[tuple[str, SourceLocation, PlannedProcess | PlannedComponent]] = [
-        (f"{item.process.package}/{item.process.executable}", item.process.location, item)
-        for item in processes
-    ]
-    started += [(f"{c.component.package}/{c.component.plugin}", c.component.location, c) for c in components]
-    told: set[str] = set()
-    for program, place, item in started:
-        if item.lacks and program not in told:
-            told.add(program)
-            manifest = str(item.nodes[0].interface.source) if item.nodes else "of its package"
-            lacks = [
-                f"{each.kind.value.replace('_', ' ')} {each.name} ({each.source})" for each in item.lacks
-            ]
-            yield manifest_lacks(program, manifest, lacks, place)
+    lacking: dict[str, PlannedProcess | PlannedComponent] = {}
+    for item in started:
+        if item.lacks:
+            lacking.setdefault(item.program, item)
+    for program, item in lacking.items():
+        manifest = str(item.nodes[0].interface.source) if item.nodes else "of its package"
+        lacks = [f"{each.kind.value.replace('_', ' ')} {each.name} ({each.source})" for each in item.lacks]
+        yield manifest_lacks(program, manifest, lacks, item.location)
 
 
 def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:

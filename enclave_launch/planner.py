@@ -98,8 +98,7 @@ def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: Encl
         return PlannedProcess(process, enclave, (), found)
     name = found.interfaces[0].name if found.interfaces else None
     enclave = assign_enclave(process, scope, name and name.removesuffix(RANDOM_ENDING))
-    path = enclave.path if enclave else "/"
-    role = _role(process)
+    path, role = enclave.path if enclave else "/", _role(process)
     try:
         nodes = tuple(
             node_of_process(process, interface, path, "node" if interface.own_rules else role)
@@ -124,22 +123,18 @@ def _plan_component(
     found = lookup(component, container.process if container else None)
     if isinstance(found, Missing):
         return PlannedComponent(component, container, (), found)
-    if container is None or container.enclave is None:
-        return PlannedComponent(
-            component, container, (), origin=found.origin, doubt=found.doubt, lacks=found.lacks
-        )
-    try:
-        nodes = tuple(
-            node_of_component(component, container.process, interface, container.enclave.path)
-            for interface in found.interfaces
-        )
-    except UnknownNodeName as error:
-        return PlannedComponent(
-            component, container, (), Missing(component.plugin, error.message, unnamed=True)
-        )
-    return PlannedComponent(
-        component, container, nodes, origin=found.origin, doubt=found.doubt, lacks=found.lacks
+    planned = PlannedComponent(
+        component, container, (), origin=found.origin, doubt=found.doubt, lacks=found.lacks
     )
+    if container is None or container.enclave is None:
+        return planned
+    path = container.enclave.path
+    try:
+        nodes = (node_of_component(component, container.process, each, path) for each in found.interfaces)
+        return planned._replace(nodes=tuple(nodes))
+    except UnknownNodeName as error:
+        missing = Missing(component.plugin, error.message, unnamed=True)
+        return PlannedComponent(component, container, (), missing)
 
 
 def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess]:

@@ -101,6 +101,11 @@ class ResolvedComponent(NamedTuple):
     on_event: str | None = None
 
     @property
+    def program(self) -> str:
+        """``package/plugin``."""
+        return f"{self.package}/{self.plugin}"
+
+    @property
     def fqn(self) -> str:
         name = self.name or UNSPECIFIED_NODE_NAME
         return f"{self.namespace.rstrip('/')}/{name}"

@@ -59,20 +59,9 @@ class LaunchService:
             self.__running.shut_down("LaunchService.shutdown() called")
 
     async def __run(self, shutdown_when_idle: bool, *, handle_interrupt: bool) -> int:
-        from enclave_launch.options import RunSettings
-        from enclave_launch.plan import LaunchSource
-        from enclave_launch.runtime.live_launch import LiveLaunch
+        from enclave_launch.runtime.live_launch import DescribedLaunch
 
-        description = self.__description
-
-        class InMemory(LiveLaunch):
-            """The runtime, launching a description instead of a file."""
-
-            def description(self) -> LaunchDescription:
-                return description
-
-        settings = RunSettings(noninteractive=self.__noninteractive, debug=self.__debug)
-        self.__running = InMemory(LaunchSource("<script>"), settings)
+        self.__running = DescribedLaunch(self.__description, self.__noninteractive, self.__debug)
         self.__running.shutdown_when_idle = shutdown_when_idle
         try:
             if not handle_interrupt:

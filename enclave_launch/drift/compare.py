@@ -7,14 +7,16 @@ with a hash of its certificate's subject, so a table of the keystore's certifica
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from enclave_launch.drift.expected import Expected, ExpectedNode
 from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level, finding
-from enclave_launch.review.document import GrantedName, Operation
+from enclave_launch.policy.derivation import LIST_NAMES
+from enclave_launch.policy.node_permissions import OPERATIONS
+from enclave_launch.review.document import GrantedName
 from keystore.formats.permissions_patterns import covers
 from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
 from nodl.graph.quality import differences, unmet
@@ -23,14 +25,6 @@ from nodl.graph.text import participant_text
 from nodl.graph.wire_names import ros_type
 from nodl.node_interface import EndpointKind
 
-OPERATIONS: Mapping[EndpointKind, Operation] = {
-    EndpointKind.PUBLISHER: "publish",
-    EndpointKind.SUBSCRIPTION: "subscribe",
-    EndpointKind.SERVICE_SERVER: "serve_services",
-    EndpointKind.SERVICE_CLIENT: "call_services",
-    EndpointKind.ACTION_SERVER: "serve_actions",
-    EndpointKind.ACTION_CLIENT: "call_actions",
-}
 _TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 _OR_PLAN_IT = "or plan it: in the launch file or its manifests; or accept it"
 
@@ -58,8 +52,7 @@ def compare(
     expected: Expected, graph: Graph, circumstances: Circumstances | None = None
 ) -> list[DriftFinding]:
     """Every difference, in the order of processes and names."""
-    circumstances = circumstances or Circumstances()
-    return list(_Comparison(expected, graph, circumstances).findings())
+    return list(_Comparison(expected, graph, circumstances or Circumstances()).findings())
 
 
 class _Comparison:
@@ -99,9 +92,8 @@ class _Comparison:
             return
         if known and process.participant.pid in self._strangers:
             names = ", ".join(node.fqn for node in known)
-            yield self._about(
-                Kind.STRANGER, process, f"{names} runs in a process that this launch did not start"
-            )
+            text = f"{names} runs in a process that this launch did not start"
+            yield self._about(Kind.STRANGER, process, text)
         for node in process.nodes:
             yield from self._of_node(node, process, enclave)
 
@@ -120,13 +112,8 @@ class _Comparison:
                 f"it claims the subject of enclave {enclave}, and shows nothing to this observer: its certificate is "
                 "of another CA or revoked, its governance differs, or two DDS implementations fail to shake hands"
             )
-            yield self._about(
-                Kind.NOT_AUTHENTICATED,
-                process,
-                text,
-                enclave=enclave,
-                remedy="look once more with secure-plan drift, which shakes hands anew; else stop it",
-            )
+            remedy = "look once more with secure-plan drift, which shakes hands anew; else stop it"
+            yield self._about(Kind.NOT_AUTHENTICATED, process, text, enclave=enclave, remedy=remedy)
 
     def _enclave(self, process: GraphProcess) -> str:
         """By proof; empty where nothing proves one."""
@@ -136,9 +123,8 @@ class _Comparison:
 
     def _is_opaque(self, process: GraphProcess, enclave: str) -> bool:
         """A program that the plan starts without knowing its nodes, or a node whose name it does not know."""
-        namespaces = {node.fqn.rpartition("/")[0] or "/" for node in process.nodes}
-        unnamed = bool(namespaces) and namespaces <= self._expected.unnamed
-        return unnamed or (enclave in self._expected.opaque)
+        unnamed = bool(process.nodes) and all(map(self._is_unnamed, process.nodes))
+        return unnamed or enclave in self._expected.opaque
 
     def _unplanned(self, process: GraphProcess, enclave: str) -> DriftFinding:
         names = ", ".join(sorted(node.fqn for node in process.nodes))
@@ -146,27 +132,21 @@ class _Comparison:
             return self._nameless(process, enclave)
         kind, text = Kind.UNPLANNED_NODE, f"{names} is not planned"
         if enclave in self._expected.enclaves:
-            kind, text = (
-                Kind.ENCLAVE_OF_ANOTHER,
-                f"{names} uses enclave {enclave}, which the plan gives to others",
-            )
-        return self._about(
-            kind, process, text, subject=names, enclave=enclave, remedy=f"stop it, {_OR_PLAN_IT}"
-        )
+            kind = Kind.ENCLAVE_OF_ANOTHER
+            text = f"{names} uses enclave {enclave}, which the plan gives to others"
+        return self._about(kind, process, text, names, enclave=enclave, remedy=f"stop it, {_OR_PLAN_IT}")
 
     def _nameless(self, process: GraphProcess, enclave: str) -> DriftFinding:
         """Without endpoints it can do nothing: an observer, or what is just starting."""
         topics = sorted({endpoint.topic for endpoint in process.endpoints})
         has = f"with {', '.join(topics[:5])}" if topics else "without endpoints"
-        level = Level.ALARM if topics or enclave in self._expected.enclaves else Level.NOTE
         text = f"a participant {has} is not planned"
-        if (
-            topics and process.participant.pid in self._strangers
-        ):  # whatever name it will have, it is not ours
-            return self._about(
-                Kind.UNPLANNED_PROCESS, process, text, enclave=enclave, certainty=FindingCertainty.FACT
-            )
-        return self._about(Kind.UNPLANNED_PROCESS, process, text, level=level, enclave=enclave)
+        found = self._about(Kind.UNPLANNED_PROCESS, process, text, enclave=enclave)
+        if topics and process.participant.pid in self._strangers:
+            return found._replace(
+                certainty=FindingCertainty.FACT
+            )  # whatever name it will have, it is not ours
+        return found if topics or enclave in self._expected.enclaves else found._replace(level=Level.NOTE)
 
     # one node
 
@@ -180,17 +160,13 @@ class _Comparison:
     def _of_node(self, node: GraphNode, process: GraphProcess, enclave: str) -> Iterator[DriftFinding]:
         planned = self._planned(node)
         if planned is None:
-            if (
-                not self._is_accepted(node)
-                and not self._is_helper(node, process)
-                and not self._is_unnamed(node)
-            ):
+            if not (self._is_accepted(node) or self._is_helper(node, process) or self._is_unnamed(node)):
                 text = f"{node.fqn} is not planned, in a process that is"
-                yield self._about(Kind.UNPLANNED_NODE, process, text, subject=node.fqn, enclave=enclave)
+                yield self._about(Kind.UNPLANNED_NODE, process, text, node.fqn, enclave=enclave)
             return
         if self._security is not None and enclave != planned.enclave:
             text = f"{node.fqn} runs in enclave {enclave}, the plan has it in {planned.enclave or 'none'}"
-            yield self._about(Kind.ENCLAVE_OF_ANOTHER, process, text, subject=node.fqn, enclave=enclave)
+            yield self._about(Kind.ENCLAVE_OF_ANOTHER, process, text, node.fqn, enclave=enclave)
         if planned.described:
             yield from self._beyond(node, planned, process)
             yield from self._absent(node, planned, process)
@@ -219,21 +195,16 @@ class _Comparison:
                 continue
             grant = _grant(interface)
             if not _granted(grant, grants):
-                yield self._about(
-                    Kind.UNPLANNED_ENDPOINT,
-                    process,
-                    f"{node.fqn}: {grant} is not planned",
-                    subject=node.fqn,
-                    name=interface.name,
-                    enclave=planned.enclave,
-                    remedy=f"add it to the description of {planned.program}",
-                )
+                text = f"{node.fqn}: {grant} is not planned"
+                found = self._about(Kind.UNPLANNED_ENDPOINT, process, text, node.fqn, name=interface.name)
+                remedy = f"add it to the description of {planned.program}"
+                yield found._replace(enclave=planned.enclave, remedy=remedy)
             elif grant in types and interface.type and types[grant] != interface.type:
                 text = f"{node.fqn}: {grant} has the type {interface.type}, planned is {types[grant]}"
-                yield self._about(Kind.TYPE_DIFFERS, process, text, subject=node.fqn, name=interface.name)
+                yield self._about(Kind.TYPE_DIFFERS, process, text, node.fqn, name=interface.name)
             for why in _other_quality(interface, [e.qos for e in planned.interfaces if e.grant == grant]):
                 text = f"{node.fqn}: {grant}: {why}"
-                yield self._about(Kind.QOS_DIFFERS, process, text, subject=node.fqn, name=interface.name)
+                yield self._about(Kind.QOS_DIFFERS, process, text, node.fqn, name=interface.name)
 
     def _absent(
         self, node: GraphNode, planned: ExpectedNode, process: GraphProcess
@@ -244,14 +215,7 @@ class _Comparison:
         for each in planned.interfaces:
             if each.certain and each.grant not in there:
                 text = f"{node.fqn}: {each.grant} is planned and not there"
-                yield self._about(
-                    Kind.MISSING_ENDPOINT,
-                    process,
-                    text,
-                    subject=node.fqn,
-                    name=each.grant.name,
-                    level=Level.ALARM,
-                )
+                yield self._about(Kind.MISSING_ENDPOINT, process, text, node.fqn, name=each.grant.name)
 
     # all together
 
@@ -299,26 +263,14 @@ class _Comparison:
         kind: Kind,
         process: GraphProcess,
         text: str,
-        *,
         subject: str = "",
+        *,
         name: str = "",
-        level: Level = Level.ALARM,
         enclave: str = "",
         remedy: str = "",
-        certainty: FindingCertainty | None = None,
     ) -> DriftFinding:
         who = participant_text(process)
-        return finding(
-            kind,
-            subject or who,
-            text,
-            name=name,
-            level=level,
-            enclave=enclave,
-            who=who,
-            remedy=remedy,
-            certainty=certainty,
-        )
+        return finding(kind, subject or who, text, name=name, enclave=enclave, who=who, remedy=remedy)
 
 
 class _End(NamedTuple):
@@ -350,14 +302,11 @@ def _other_quality(interface: SeenInterface, planned: Sequence[Mapping[str, Any]
 
 
 def _grant(interface: SeenInterface) -> GrantedName:
-    return GrantedName(OPERATIONS[interface.kind], interface.name)
+    return GrantedName(LIST_NAMES[OPERATIONS[interface.kind]], interface.name)
 
 
 def _granted(grant: GrantedName, grants: Iterable[GrantedName]) -> bool:
     return any(
-        each.operation == grant.operation and (each.name == grant.name or _covers(each.name, grant.name))
+        each.operation == grant.operation and (each.name == grant.name or covers(each.name, grant.name))
         for each in grants
     )
-
-
-_covers: Callable[[str, str], bool] = covers

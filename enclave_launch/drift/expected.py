@@ -8,11 +8,10 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE
 from enclave_launch.review.document import GrantedName
 from keystore.formats.permissions_patterns import has_wildcard
 
-_UNSPECIFIED = "<node_name_unspecified>"
-_NO_NAMESPACE = "<node_namespace_unspecified>"
 _STATED = ("--nodl", "manifest of the package")
 """Origins that say what a node has; the others may name what it has only now and then."""
 _LIFECYCLE = "/change_state"
@@ -49,9 +48,6 @@ class Expected(NamedTuple):
     unnamed: frozenset[str]
     enclaves: frozenset[str]
 
-    def nodes_of(self, enclave: str) -> Iterable[ExpectedNode]:
-        return (node for node in self.nodes.values() if node.enclave == enclave)
-
 
 def out_of_sight(documents: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
     """Processes on Zenoh. An observer takes part in DDS: to it they would look as if they were missing, and what
@@ -81,7 +77,7 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
     }
     for fqn, count in Counter(_fqn(each) for each in started if each["fqn"]).items():
         starter = next(each for each in started if each["fqn"] and _fqn(each) == fqn)
-        if fqn not in nodes and _UNSPECIFIED not in fqn:
+        if fqn not in nodes and UNSPECIFIED_NODE_NAME not in fqn:
             program = f"{starter['package']}/{starter.get('executable') or starter.get('plugin')}"
             nodes[fqn] = ExpectedNode(
                 fqn, _enclave(starter), program, described=False, always=starter["on_event"] is None
@@ -91,7 +87,7 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
     unnamed = frozenset(
         _fqn(each).rpartition("/")[0] or "/"
         for each in started
-        if each["fqn"] and _UNSPECIFIED in each["fqn"]
+        if each["fqn"] and UNSPECIFIED_NODE_NAME in each["fqn"]
     )
     opaque = frozenset(_enclave(each) for each in here if not each["fqn"])
     return Expected(nodes, opaque, unnamed, frozenset(path for path in enclaves if path))
@@ -99,7 +95,7 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
 
 def _fqn(started: Mapping[str, Any]) -> str:
     """As rcl has it: where launch gives no namespace, the root one."""
-    return str(started["fqn"]).replace(_NO_NAMESPACE, "")
+    return str(started["fqn"]).replace(UNSPECIFIED_NODE_NAMESPACE, "")
 
 
 def _enclave(started: Mapping[str, Any]) -> str:

@@ -79,17 +79,8 @@ until its lease ends (10 s on Cyclone DDS, 20 s on Fast DDS), so that a respawne
 
 
 def finding(
-    kind: Kind,
-    subject: str,
-    text: str,
-    *,
-    name: str = "",
-    level: Level = Level.ALARM,
-    enclave: str = "",
-    who: str = "",
-    remedy: str = "",
-    certainty: FindingCertainty | None = None,
+    kind: Kind, subject: str, text: str, *, name: str = "", enclave: str = "", who: str = "", remedy: str = ""
 ) -> DriftFinding:
-    """With the certainty that its kind has, where none is given."""
-    certainty = certainty or _CERTAINTY.get(kind, FindingCertainty.FACT)
-    return DriftFinding(kind, subject, name, text, certainty, level, enclave, who, remedy)
+    """An alarm, with the certainty that its kind has."""
+    certainty = _CERTAINTY.get(kind, FindingCertainty.FACT)
+    return DriftFinding(kind, subject, name, text, certainty, Level.ALARM, enclave, who, remedy)

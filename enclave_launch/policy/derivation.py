@@ -9,7 +9,7 @@ away takes exactly its permissions away. Time is linear in nodes and interfaces.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 
     Reasons = dict[Rule, list[Reason]]
 
-# How the operations are called where names are listed for people and programs.
-LIST_NAMES: dict[Operation, str] = {
+ListName = Literal["publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"]
+LIST_NAMES: dict[Operation, ListName] = {
     Operation.PUBLISH: "publish",
     Operation.SUBSCRIBE: "subscribe",
     Operation.REQUEST: "call_services",
@@ -33,6 +33,7 @@ LIST_NAMES: dict[Operation, str] = {
     Operation.CALL: "call_actions",
     Operation.EXECUTE: "serve_actions",
 }
+"""How the operations are called where names are listed for people and programs."""
 
 
 def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:

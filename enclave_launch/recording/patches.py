@@ -11,22 +11,15 @@ import re
 from typing import NamedTuple
 from xml.sax.saxutils import quoteattr
 
+from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.node_permissions import OPERATIONS
-from keystore.formats.policy import Operation
+from enclave_launch.review.document import KIND_OF
 from nodl.document.v2_schema import NAME_PATTERN, TYPE_PATTERN
 from nodl.names import split_fqn
 from nodl.node_interface import EndpointKind
 from nodl.record.asked import Asked
 
 _HISTORY = {1: "KEEP_LAST", 2: "KEEP_ALL"}
-_POLICY_ELEMENTS = {
-    Operation.PUBLISH: ("topics", "topic"),
-    Operation.SUBSCRIBE: ("topics", "topic"),
-    Operation.REPLY: ("services", "service"),
-    Operation.REQUEST: ("services", "service"),
-    Operation.EXECUTE: ("actions", "action"),
-    Operation.CALL: ("actions", "action"),
-}
 POLICY_FILE = "allow.policy.xml"
 
 
@@ -52,7 +45,7 @@ def manifest_patch(file: str, text: str, line: int, asked: Asked) -> Patch | Non
 def policy_patch(enclave: str, node: str, asked: Asked) -> Patch:
     """A policy file that adds the one permission to what is derived."""
     operation = OPERATIONS[asked.kind]
-    group, element = _POLICY_ELEMENTS[operation]
+    element = KIND_OF[LIST_NAMES[operation]]
     namespace, name = split_fqn(node)
     text = (
         '<policy version="0.2.0">\n'
@@ -60,9 +53,9 @@ def policy_patch(enclave: str, node: str, asked: Asked) -> Patch:
         f"    <enclave path={quoteattr(enclave)}>\n"
         "      <profiles>\n"
         f"        <profile ns={quoteattr(namespace)} node={quoteattr(name)}>\n"
-        f'          <{group} {operation.value}="ALLOW">\n'
+        f'          <{element}s {operation.value}="ALLOW">\n'
         f"            <{element}>{asked.final}</{element}>\n"
-        f"          </{group}>\n"
+        f"          </{element}s>\n"
         "        </profile>\n"
         "      </profiles>\n"
         "    </enclave>\n"

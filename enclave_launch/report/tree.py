@@ -15,7 +15,7 @@ from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import EnclavePolicy
 
-_LABELS = {listed: operation.verb for operation, listed in LIST_NAMES.items()}
+_LABELS: dict[str, str] = {listed: operation.verb for operation, listed in LIST_NAMES.items()}
 
 
 class Branch(NamedTuple):

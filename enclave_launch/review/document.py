@@ -10,19 +10,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any, Literal, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
+from enclave_launch.policy.derivation import LIST_NAMES, ListName
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 
-Operation = Literal[
-    "publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"
-]
-OPERATIONS: tuple[Operation, ...] = (
-    "publish",
-    "subscribe",
-    "call_services",
-    "serve_services",
-    "call_actions",
-    "serve_actions",
-)
+Operation = ListName
+OPERATIONS = tuple(LIST_NAMES.values())
 Kind = Literal["topic", "service", "action"]
 KIND_OF: Mapping[str, Kind] = {
     "publish": "topic",

@@ -8,20 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from enclave_launch.review.document import GrantedName, Operation, PlanDocument
+from enclave_launch.policy.derivation import LIST_NAMES
+from enclave_launch.review.document import GrantedName, PlanDocument
 from keystore.formats.permissions_names import add_dds_topics, ros_rules
-from keystore.formats.policy import Operation as Rules
 from keystore.formats.policy import Rule
 
-_RULES: Mapping[Operation, Rules] = {
-    "publish": Rules.PUBLISH,
-    "subscribe": Rules.SUBSCRIBE,
-    "call_services": Rules.REQUEST,
-    "serve_services": Rules.REPLY,
-    "call_actions": Rules.CALL,
-    "serve_actions": Rules.EXECUTE,
-}
-_OPERATIONS: Mapping[Rules, Operation] = {rule: operation for operation, rule in _RULES.items()}
+_RULES = {listed: operation for operation, listed in LIST_NAMES.items()}
 
 
 def as_signed(grants: Iterable[GrantedName]) -> frozenset[GrantedName]:
@@ -35,7 +27,7 @@ def as_signed(grants: Iterable[GrantedName]) -> frozenset[GrantedName]:
 
 def grants_of_rules(rules: Iterable[Rule]) -> frozenset[GrantedName]:
     """Rules of a policy, read back from signed permissions, as the plan names them."""
-    return frozenset(GrantedName(_OPERATIONS[rule.operation], rule.expression) for rule in rules)
+    return frozenset(GrantedName(LIST_NAMES[rule.operation], rule.expression) for rule in rules)
 
 
 def plan_as_signed(plan: PlanDocument) -> PlanDocument:

@@ -81,7 +81,7 @@ def _process_facts(process: ResolvedProcess) -> _Facts:
 def _component_facts(component: ResolvedComponent) -> _Facts:
     return {
         "container": component.container,
-        "plugin": f"{component.package}/{component.plugin}",
+        "plugin": component.program,
         "node": component.fqn,
         "remap rules": tuple(f"{rule.source}:={rule.target}" for rule in component.remaps),
         "use_sim_time": component.parameters.get("use_sim_time"),

@@ -138,7 +138,7 @@ class PlannedGate:
         """
         late = (item for item in components if component_identity(item) not in self._components)
         for component in late:
-            what = f"component {component.package}/{component.plugin} for {component.container}"
+            what = f"component {component.program} for {component.container}"
             raise LateProcess(
                 _refusal(
                     f"{what} at {component.location}",

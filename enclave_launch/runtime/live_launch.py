@@ -351,5 +351,16 @@ class LiveLaunch:
         self._log.log(level, "launch", message)
 
 
+class DescribedLaunch(LiveLaunch):
+    """A launch of a description that a program made, in the place of a file."""
+
+    def __init__(self, description: Any, noninteractive: bool, debug: bool) -> None:
+        super().__init__(LaunchSource("<script>"), RunSettings(noninteractive=noninteractive, debug=debug))
+        self._description = description
+
+    def description(self) -> Any:
+        return self._description
+
+
 class _Over(Exception):
     """Nothing is left to wait for."""
