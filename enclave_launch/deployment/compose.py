@@ -34,8 +34,7 @@ def compose_files(deployment: Deployment, *, image: str, user: str, keystore: st
     given = {name: part for name, part in content.items() if part}
     files = {"compose.yaml": File(deployment.header() + note + yaml_text(given))}
     for process in deployment.processes:
-        for name, text in zip(process.parameter_names(), process.parameter_files.values(), strict=True):
-            files[f"parameters/{name}"] = File(deployment.header() + text)
+        files |= deployment.parameter_files(process)
     return files
 
 
@@ -72,7 +71,7 @@ def _files_of(deployment: Deployment, process: DeployedProcess) -> dict[str, Any
     material = deployment.enclave_of(process)
     configs = [
         {"source": name.removesuffix(".yaml"), "target": f"{_PARAMETERS}/{name}"}
-        for name in process.parameter_names()
+        for name in process.parameter_texts()
     ]
     if material is None:
         return {"configs": configs} if configs else {}
@@ -98,7 +97,7 @@ def _parameters(deployment: Deployment) -> dict[str, Any]:
     return {
         name.removesuffix(".yaml"): {"file": f"./parameters/{name}"}
         for process in deployment.processes
-        for name in process.parameter_names()
+        for name in process.parameter_texts()
     }
 
 

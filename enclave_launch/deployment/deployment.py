@@ -33,6 +33,11 @@ class Deployment(NamedTuple):
     def enclave_of(self, process: DeployedProcess) -> EnclaveMaterial | None:
         return self.material.enclaves[process.enclave] if process.enclave is not None else None
 
+    def parameter_files(self, process: DeployedProcess) -> dict[str, File]:
+        """File name -> file."""
+        texts = process.parameter_texts().items()
+        return {f"parameters/{name}": File(self.header() + text) for name, text in texts}
+
     def header(self) -> str:
         """Comment lines that say where the file comes from, when its enclaves end, and what it does not do."""
         return "".join(f"# {one_line(line)}\n" for line in self._header())

@@ -74,7 +74,7 @@ def _config_map(deployment: Deployment, material: EnclaveMaterial) -> dict[str, 
 
 
 def _parameters(deployment: Deployment, process: DeployedProcess) -> dict[str, Any]:
-    data = dict(zip(process.parameter_names(), process.parameter_files.values(), strict=True))
+    data = process.parameter_texts()
     return {**_object(deployment, "ConfigMap", _parameters_name(process)), "immutable": True, "data": data}
 
 

@@ -66,13 +66,14 @@ class DeployedProcess(NamedTuple):
 
     def words(self, folder: str) -> tuple[str, ...]:
         """The command with its generated parameter files below ``folder``; launch gives a shell the words joined."""
-        names = dict(zip(self.parameter_files, self.parameter_names(), strict=True))
+        names = dict(zip(self.parameter_files, self.parameter_texts(), strict=True))
         words = tuple(f"{folder}/{names[word]}" if word in names else word for word in self.command)
         return ("/bin/sh", "-c", " ".join(words)) if self.shell else words
 
-    def parameter_names(self) -> tuple[str, ...]:
-        """File names of ``parameter_files``, in their order."""
-        return tuple(f"{self.name}-{number}.yaml" for number in range(1, len(self.parameter_files) + 1))
+    def parameter_texts(self) -> dict[str, str]:
+        """File name -> content of each of ``parameter_files``, in their order."""
+        texts = self.parameter_files.values()
+        return {f"{self.name}-{number}.yaml": text for number, text in enumerate(texts, 1)}
 
 
 def deployed_processes(document: Mapping[str, Any]) -> tuple[DeployedProcess, ...]:

@@ -54,8 +54,7 @@ def systemd_files(
     for process in deployment.processes:
         unit = _service(deployment, process, keystore, parameters, setup)
         files[unit_name(deployment, process)] = File(unit)
-        for name, text in zip(process.parameter_names(), process.parameter_files.values(), strict=True):
-            files[f"parameters/{name}"] = File(deployment.header() + text)
+        files |= deployment.parameter_files(process)
     files["rolling-restart"] = File(_rolling_restart(deployment), 0o755)
     return files
 

@@ -83,8 +83,7 @@ class LibraryAccess:
     ) -> tuple[NodeInterface, ...]:
         """The nodes of one start, those that they bring along included. Raises ``InvalidNoDLError`` and, for a remap
         rule at which the process would end, ``LaunchFileError``."""
-        found = [node for each in interfaces for node in self._complete(each, started, container)]
-        return tuple(found)
+        return tuple(node for each in interfaces for node in self._complete(each, started, container))
 
     def _complete(
         self,
@@ -120,11 +119,8 @@ class LibraryAccess:
         started: ResolvedProcess | ResolvedComponent,
         container: ResolvedProcess | None,
     ) -> Situation:
-        from enclave_launch.interfaces.situation import situation_of_component, situation_of_process
+        from enclave_launch.interfaces.situation import situation_of
 
         installed = self._installed if (started.package or "") in self._installed else None
-        if isinstance(started, ResolvedProcess):
-            situation = situation_of_process(started, interface, self._distro, installed)
-        else:
-            situation = situation_of_component(started, container, interface, self._distro, installed)
+        situation = situation_of(started, container, interface, self._distro, installed)
         return situation if self._launch is None else situation._replace(launched=self._launched)

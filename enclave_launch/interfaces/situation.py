@@ -19,43 +19,30 @@ from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
 
 
-def situation_of_process(
-    process: ResolvedProcess, interface: NodeInterface, distro: str, installed: frozenset[str] | None
-) -> Situation:
-    """Of one node of ``process``. Raises ``LaunchFileError`` for a remap rule at which the process would end."""
-    node = node_of_process(process, interface, "/", "node")
-    return Situation(
-        distro=distro,
-        node=node.name,
-        namespace=node.namespace,
-        parameters={
-            **parameters_of_node(process, node.namespace, node.name),
-            **dict(interface.own_parameters),
-        },
-        words=tuple(own_words(process)),
-        installed=installed,
-        remap=_remap(node),
-    )
-
-
-def situation_of_component(
-    component: ResolvedComponent,
+def situation_of(
+    started: ResolvedProcess | ResolvedComponent,
     container: ResolvedProcess | None,
     interface: NodeInterface,
     distro: str,
-    installed: frozenset[str] | None,
+    installed: frozenset[str] | None = None,
 ) -> Situation:
-    """Of one node of ``component``: its main node gets what the load request says, a further one what the container's
-    command line says. Raises ``LaunchFileError`` as ``situation_of_process``."""
-    node = node_of_component(component, container, interface, "/")
-    parameters: Mapping[str, object] = component.parameters
-    if interface.own_rules:
-        parameters = parameters_of_node(container, node.namespace, node.name) if container else {}
+    """Of one node of what launch starts. A component's main node gets what the load request says, a further one what
+    the container's command line says. Raises ``LaunchFileError`` for a remap rule at which the process would end."""
+    parameters: Mapping[str, object] = started.parameters
+    words: tuple[str, ...] = ()
+    if isinstance(started, ResolvedProcess):
+        node = node_of_process(started, interface, "/", "node")
+        parameters, words = parameters_of_node(started, node.namespace, node.name), tuple(own_words(started))
+    else:
+        node = node_of_component(started, container, interface, "/")
+        if interface.own_rules:
+            parameters = parameters_of_node(container, node.namespace, node.name) if container else {}
     return Situation(
         distro=distro,
         node=node.name,
         namespace=node.namespace,
         parameters={**parameters, **dict(interface.own_parameters)},
+        words=words,
         installed=installed,
         remap=_remap(node),
     )

@@ -36,7 +36,7 @@ class StartedProgram:
         return situation.node, situation.namespace
 
     def _situation(self, node: str | None) -> Situation:
-        from enclave_launch.interfaces.situation import situation_of_component, situation_of_process
+        from enclave_launch.interfaces.situation import situation_of
 
         started = self._started
         interface = NodeInterface(
@@ -48,6 +48,4 @@ class StartedProgram:
             endpoints=(),
             source=SourceRef(str(started.location)),
         )
-        if isinstance(started, ResolvedProcess):
-            return situation_of_process(started, interface, self._distro, None)
-        return situation_of_component(started, self._container, interface, self._distro, None)
+        return situation_of(started, self._container, interface, self._distro)

@@ -15,7 +15,6 @@ from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import permissions_large, policy_answers
 from enclave_launch.policy.running_node import RunningNode
-from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 
 if TYPE_CHECKING:
@@ -56,13 +55,13 @@ class PolicyOptions(NamedTuple):
     """``accept_patterns``: partly known names become wildcards, each with a warning.
 
     ``also``: what every node gets beyond what it has by itself (``conditions.ALSO``).
-    ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: whether rcl remaps action
-    names; by default what the distribution does.
+    ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: rcl remaps action names, in
+    any distribution.
     """
 
     accept_patterns: bool = False
     policy_file: PolicyDocument | None = None
-    actions_as_a_whole: bool | None = None
+    actions_as_a_whole: bool = False
     also: frozenset[str] = frozenset()
 
 
@@ -99,23 +98,13 @@ def derive_policy(
     Raises ``ValueError`` for an unknown distribution.
     """
     chosen = options or PolicyOptions()
-    whole = chosen.actions_as_a_whole
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
         from enclave_launch.policy.node_permissions import (
-            node_permissions,  # where nothing is known, not needed
-        )
+            node_permissions,
+        )  # where nothing is known, not needed
 
-        collection.add(
-            node_permissions(
-                node,
-                distro=distro,
-                actions_as_a_whole=distro in REMAPS_WHOLE_ACTIONS if whole is None else whole,
-                accept_patterns=chosen.accept_patterns,
-                also=chosen.also,
-            ),
-            chosen.policy_file,
-        )
+        collection.add(node_permissions(node, distro=distro, options=chosen), chosen.policy_file)
     derived = collection.result()
     if chosen.policy_file is not None:
         derived = _merged(derived, chosen.policy_file)

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from enclave_launch.boundary.named_tuple import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
@@ -22,6 +22,7 @@ from enclave_launch.diagnostics.permissions import (
 )
 from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
+from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from nodl.builtin_interfaces import BuiltinCondition, built_in_interfaces
@@ -29,6 +30,9 @@ from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import MAX_NAME_LENGTH, InvalidNameError, join, validate_namespace, validate_node_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind
 from nodl.remap import ACTION_SERVICES, NodeNames, ParsedRule, Resolved
+
+if TYPE_CHECKING:
+    from enclave_launch.policy.derivation import PolicyOptions
 
 Origin = Literal["declared", "built-in", "policy file"]
 
@@ -90,36 +94,19 @@ class NodePermissions(NamedTuple):
     warnings: list[Diagnostic]
 
 
-def node_permissions(
-    node: RunningNode,
-    *,
-    distro: str,
-    actions_as_a_whole: bool,
-    accept_patterns: bool,
-    also: frozenset[str] = frozenset(),
-) -> NodePermissions:
-    """All that ``node`` needs under its final name, with what ``also`` adds (``conditions.ALSO``).
-
-    Raises ``ValueError`` for an unknown distribution.
-    """
-    return _Collector(node, distro, actions_as_a_whole, accept_patterns, also).collect()
+def node_permissions(node: RunningNode, *, distro: str, options: PolicyOptions) -> NodePermissions:
+    """All that ``node`` needs under its final name, with what ``options`` add. Raises ``ValueError`` for an unknown
+    distribution."""
+    return _Collector(node, distro, options).collect()
 
 
 class _Collector:
-    def __init__(
-        self,
-        node: RunningNode,
-        distro: str,
-        actions_as_a_whole: bool,
-        accept_patterns: bool,
-        also: frozenset[str],
-    ):
-        self._also = also
+    def __init__(self, node: RunningNode, distro: str, options: PolicyOptions):
+        self._options = options
         self._node = node
         self._fqn = node.fqn
         self._distro = distro
-        self._whole = actions_as_a_whole
-        self._accept_patterns = accept_patterns
+        self._whole = distro in REMAPS_WHOLE_ACTIONS or options.actions_as_a_whole
         self._names = NodeNames(node.name, node.namespace, node.rules)
         self._result = NodePermissions(node, [], [], [])
 
@@ -132,9 +119,9 @@ class _Collector:
             return self._result
         for endpoint in self._node.interface.endpoints:
             self._endpoint(endpoint)
-        if "service-events" in self._also:
+        if "service-events" in self._options.also:
             self._service_events()
-        conditions = conditions_of(self._node, self._also)
+        conditions = conditions_of(self._node, self._options.also)
         self._built_in(_built_in_rows(self._distro, self._node.interface.library, conditions))
         for gap in self._node.interface.gaps:
             self._unresolved(None, str(gap.source), gap.why)
@@ -199,17 +186,15 @@ class _Collector:
         for operation, name, reason in tuple(self._result.permissions):
             if operation in _SERVICES:
                 events = reason._replace(note="service introspection, by --also service-events")
-                self._result.permissions.append(
-                    Permission(Operation.PUBLISH, f"{name}/_service_event", events)
-                )
+                event = Permission(Operation.PUBLISH, f"{name}/_service_event", events)
+                self._result.permissions.append(event)
 
     def _helper(self, operation: Operation, name: str, place: str) -> Permission:
         """What a node of this process serves whose name nobody can foresee."""
         final = join(self._node.process_namespace, name)
         note = "a pattern, because its name is made up at each start"
-        self._result.warnings.append(
-            pattern_accepted(self._fqn, operation.verb, final, f"{note} ({place})", self._node.location)
-        )
+        told = pattern_accepted(self._fqn, operation.verb, final, f"{note} ({place})", self._node.location)
+        self._result.warnings.append(told)
         return Permission(operation, final, Reason(self._fqn, "built-in", place, name, (), note))
 
     def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
@@ -245,12 +230,9 @@ class _Collector:
         if together is not None:
             yield operation, Resolved(together, (*action.rules, *parts.rules))
             return
-        service, topic = _PARTS[operation]
-        for operation_of_part, resolved in (
-            *((service, part) for part in parts.services.values()),
-            *((topic, part) for part in parts.topics.values()),
-        ):
-            yield operation_of_part, Resolved(resolved.name, (*action.rules, *resolved.rules))
+        for part_operation, resolved in zip(_PARTS[operation], (parts.services, parts.topics), strict=True):
+            for part in resolved.values():
+                yield part_operation, Resolved(part.name, (*action.rules, *part.rules))
 
     def _plain(self, operation: Operation, name: str) -> Resolved:
         return self._names.topic(name) if operation in _TOPICS else self._names.service(name)
@@ -266,26 +248,21 @@ class _Collector:
         operation, place = OPERATIONS[endpoint.kind], str(endpoint.source)
         text = template.text
         why = "; ".join(p.why for p in template.parts if isinstance(p, UnknownPart) and p.why)
-        if not self._accept_patterns or not text.replace("*", "").strip("/~"):
-            self._unresolved(
-                operation,
-                place,
-                f"the name of what it would {operation.verb} is not known ({template}: {why})",
-            )
+        if not self._options.accept_patterns or not text.replace("*", "").strip("/~"):
+            unknown = f"the name of what it would {operation.verb} is not known ({template}: {why})"
+            self._unresolved(operation, place, unknown)
             return
         try:
             name = _expand_pattern(self._names, text)
         except InvalidNameError as error:
             self._unresolved(operation, place, str(error))
             return
-        note = (
-            f"a pattern, because {why or 'only a part of the name is known'}; accepted by --accept-patterns"
-        )
+        why = why or "only a part of the name is known"
+        note = f"a pattern, because {why}; accepted by --accept-patterns"
         reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note, endpoint.type)
         self._result.permissions.append(Permission(operation, name, reason))
-        self._result.warnings.append(
-            pattern_accepted(self._fqn, operation.verb, name, note, SourceLocation.read(place))
-        )
+        told = pattern_accepted(self._fqn, operation.verb, name, note, SourceLocation.read(place))
+        self._result.warnings.append(told)
 
     def _impossible(self, error: InvalidNameError) -> None:
         impossible = node_name_impossible(self._fqn, str(error), self._node.location)

@@ -16,7 +16,7 @@ from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.recording import Unrecorded
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Rule
-from nodl.record.asked import EndpointRole, asked_endpoint, role_of
+from nodl.record.asked import EndpointRole, role_of
 from nodl.record.lines import EndpointMade, Line
 
 
@@ -67,10 +67,10 @@ class Audit(Listener):
             return
         assert self._recording is not None
         process, node = self._recording.record.node_of(line)
-        asked = asked_endpoint(process, node, line)
-        need = self._grants.need(process, node, asked) if asked is not None else None
-        if need is None or asked is None:
+        found = self._grants.need(process, node, line)
+        if found is None:
             return
+        need, asked = found
         self._checked += 1
         if need not in self._asked:
             self._asked.add(need)
@@ -133,10 +133,8 @@ def audit_text(report: AuditReport) -> str:
         refused = [each for each in report.refusals if each.need.enclave == enclave]
         lines += [f"  would be refused: {refusal.text}" for refusal in refused]
         rules = report.never_asked.get(enclave, ())
-        lines += [
-            f"  granted, never asked for: {WORDS[rule.operation]} {printable(rule.expression)}"
-            for rule in rules
-        ]
+        granted = (f"{WORDS[rule.operation]} {printable(rule.expression)}" for rule in rules)
+        lines += [f"  granted, never asked for: {each}" for each in granted]
     lines += [f"not recorded: {item.process}: {printable(item.why)}" for item in report.unrecorded]
     lines += [f"the record is not complete: {printable(why)}" for why in report.complaints]
     return "\n".join([*lines, ""])
@@ -150,10 +148,8 @@ def audit_json(report: AuditReport) -> str:
         "checked": report.checked,
         "would_be_refused": [
             {
-                "enclave": refusal.need.enclave,
-                "node": refusal.need.node,
+                **refusal.need._asdict(),
                 "operation": refusal.need.operation.value,
-                "name": refusal.need.name,
                 "written": refusal.written,
                 "type": refusal.type,
                 "described_by": refusal.described_by,

@@ -20,7 +20,7 @@ from enclave_launch.recording.grants import WORDS, Description, Need, PlannedGra
 from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
-from nodl.record.asked import REFUSED, Asked, EndpointRole, asked_endpoint, role_of
+from nodl.record.asked import REFUSED, Asked, EndpointRole, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade
 
@@ -105,10 +105,8 @@ class Explainer(Listener):
 
     def added(self, line: Line) -> None:
         assert self._recording is not None
-        if isinstance(line, EndpointMade) and line.rc == REFUSED:
+        if isinstance(line, EndpointMade) and (line.rc == REFUSED or (line.rc == 0 and self._on_zenoh)):
             self._endpoint(line, *self._recording.record.node_of(line))
-        elif isinstance(line, EndpointMade) and line.rc == 0 and self._on_zenoh:
-            self._silently_refused(line)
         elif isinstance(line, NodeMade) and line.rc == REFUSED:
             process, _ = self._recording.record.node_of(line)
             if not self._endpoint_was_refused(process, line):
@@ -136,41 +134,26 @@ class Explainer(Listener):
         known = set(self._middlewares)
         self._middlewares.add(line.middleware)
         if line.middleware and known and line.middleware not in known and len(self._middlewares) == 2:
-            said = " and ".join(sorted(self._middlewares))
-            text = (
-                f"processes of this launch use {said}: {MIXED_MIDDLEWARES.what}; {MIXED_MIDDLEWARES.remedy}"
-            )
+            said, why = " and ".join(sorted(self._middlewares)), MIXED_MIDDLEWARES
             if self._launch is not None:
-                self._launch.say("WARNING", text)
+                self._launch.say("WARNING", f"processes of this launch use {said}: {why.what}; {why.remedy}")
 
     def _endpoint(self, line: EndpointMade, process: RecordedProcess, node: RecordedNode) -> None:
-        if role_of(line) is EndpointRole.PART_OF_ACTION:
-            return  # the action's own line follows
-        asked = asked_endpoint(process, node, line)
-        need = self._grants.need(process, node, asked) if asked is not None else None
-        if asked is None or need is None or need in self._told:
+        """Refused, or made all the same (``rc`` 0) by a Zenoh router that refuses without a word to the node."""
+        silent, name = line.rc == 0, _name(process)
+        if role_of(line) is EndpointRole.PART_OF_ACTION or (silent and name not in self._on_zenoh):
+            return  # of an action: its own line follows
+        found = self._grants.need(process, node, line)
+        if found is None or found[0] in self._told:
             return
-        self._told.add(need)
+        need, asked = found
         granted, described = self._grants.permits(need), self._grants.described(process, node)
-        patch = None if granted else _patch(need, asked, described)
-        cause = cause_of((*asked.error, *self._printed.get(_name(process), ()))) if granted else None
-        self._tell(Denial(_name(process), need, asked, described, granted, patch, cause))
-
-    def _silently_refused(self, line: EndpointMade) -> None:
-        """A Zenoh router refuses without a word to the node: what was made and is not granted is told here."""
-        assert self._recording is not None
-        process, node = self._recording.record.node_of(line)
-        if _name(process) not in self._on_zenoh or role_of(line) is EndpointRole.PART_OF_ACTION:
-            return
-        asked = asked_endpoint(process, node, line)
-        need = self._grants.need(process, node, asked) if asked is not None else None
-        if asked is None or need is None or need in self._told or self._grants.permits(need):
+        if silent and granted:
             return
         self._told.add(need)
-        described = self._grants.described(process, node)
-        self._tell(
-            Denial(_name(process), need, asked, described, False, _patch(need, asked, described), silent=True)
-        )
+        patch = None if granted else _patch(need, asked, described)
+        cause = cause_of((*asked.error, *self._printed.get(name, ()))) if granted else None
+        self._tell(Denial(name, need, asked, described, granted, patch, cause, silent))
 
     def _endpoint_was_refused(self, process: RecordedProcess, line: NodeMade) -> bool:
         """A node that fails because one of its own endpoints was refused has been explained by that."""
@@ -199,10 +182,7 @@ def _name(process: RecordedProcess) -> str:
 
 def _patch(need: Need, asked: Asked, described: Description) -> Patch:
     """In the node's manifest where it is a file that can be read, else in a policy file."""
-    from enclave_launch.recording.patches import (  # not before something is refused
-        manifest_patch,
-        policy_patch,
-    )
+    from enclave_launch.recording.patches import manifest_patch, policy_patch  # once something is refused
 
     source = described.node.interface.source if described.node is not None else None
     if source is not None and _MANIFEST.search(source.file):

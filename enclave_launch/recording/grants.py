@@ -13,8 +13,9 @@ from keystore.formats.permissions import DdsRules, dds_rules
 from keystore.formats.permissions_names import dds_topics
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Qualifier, Rule
-from nodl.record.asked import Asked
+from nodl.record.asked import Asked, asked_endpoint
 from nodl.record.assembly import RecordedNode, RecordedProcess
+from nodl.record.lines import EndpointMade
 
 WORDS = {
     Operation.PUBLISH: "publish topic",
@@ -77,21 +78,21 @@ class PlannedGrants:
             return NO_ENCLAVE_YET if planned.missing is not None else None
         return planned.enclave.path
 
-    def need(self, process: RecordedProcess, node: RecordedNode, asked: Asked) -> Need | None:
-        """The permission for ``asked``; ``None`` where nothing is enforced, or no name is known."""
-        enclave = self.enclave_of(process)
-        if enclave is None or not asked.final:
+    def need(
+        self, process: RecordedProcess, node: RecordedNode, line: EndpointMade
+    ) -> tuple[Need, Asked] | None:
+        """The permission for what ``line`` asked for; ``None`` where nothing is enforced, or no name is known."""
+        enclave, asked = self.enclave_of(process), asked_endpoint(process, node, line)
+        if enclave is None or asked is None or not asked.final:
             return None
-        return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final)
+        return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final), asked
 
     def permits(self, need: Need) -> bool:
         rules = self._rules.get(need.enclave)
         if rules is None:
             return False
-        publish, subscribe = dds_topics(need.operation, need.name)
-        return all(_allowed(rules, topic, "publish") for topic in publish) and all(
-            _allowed(rules, topic, "subscribe") for topic in subscribe
-        )
+        topics = dict(zip(("publish", "subscribe"), dds_topics(need.operation, need.name), strict=True))
+        return all(_allowed(rules, topic, direction) for direction in topics for topic in topics[direction])
 
     def described(self, process: RecordedProcess, node: RecordedNode) -> Description:
         """Who describes this node in the plan."""
