@@ -14,9 +14,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from enclave_launch.admission.middleware import halves, middleware_of, why_not
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.admission import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable

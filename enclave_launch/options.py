@@ -6,11 +6,10 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
 
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.host.protocol import HostOptions

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
@@ -21,7 +20,7 @@ from enclave_launch.admission.middleware import (
     mixed_pairs,
     vendor_of,
 )
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope
 from enclave_launch.host.outcomes import Outcomes

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.light import TYPE_CHECKING
 from nodl.ament_index import PREFIX_VARIABLE
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from collections.abc import Mapping
 from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.admission.variables import ZENOH_CLEARED, ZENOH_SESSION
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.enclave import AssignmentReason
 from enclave_launch.plan import PlannedProcess
 from keystore.disk import layout

@@ -8,7 +8,8 @@ first use, so that ``import nodl`` costs nothing.
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from nodl import errors, types

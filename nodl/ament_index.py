@@ -16,8 +16,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from enclave_launch.boundary.files import is_program, read_text
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, late_pattern
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")

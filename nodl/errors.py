@@ -21,8 +21,8 @@ The author of the package has to act on all of them.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.light import TYPE_CHECKING
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:

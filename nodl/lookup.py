@@ -17,10 +17,9 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
 from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, ManifestNode, read_document, resource_key
 from nodl.errors import ConflictingNoDLError

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import re
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import late_pattern
 from enclave_launch.boundary.terminal import quoted
 
 MAX_NODE_NAME_LENGTH = 255

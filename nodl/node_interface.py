@@ -8,9 +8,8 @@ whoever derives permissions from them no longer asks where they came from, but c
 from __future__ import annotations
 
 from enum import Enum
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.name_template import NameTemplate
 from nodl.source_ref import SourceRef
 

@@ -13,8 +13,7 @@ import re
 from collections.abc import Iterable
 from enum import Enum
 
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, late_pattern
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"  # that it holds no "__" is checked apart

@@ -6,9 +6,7 @@ but what they unfold to is limited, as are size and depth. Pure; PyYAML does the
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.errors import InvalidYAMLError
 from nodl.names import shown
 from nodl.source_ref import SourceRef

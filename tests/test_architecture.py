@@ -203,7 +203,7 @@ def test_a_dry_run_imports_only_what_its_path_needs(form: str) -> None:
     )
     assert {"nodl.document.v1", "enclave_launch.plan"} <= loaded
     heavy = {"cryptography", "pydantic", "asyncio", "yaml", "lxml", "hashlib", "cyclonedds", "tree_sitter"}
-    slow_to_define = {"dataclasses", "inspect"}  # value types are ``boundary.named_tuple``'s
+    slow_to_define = {"dataclasses", "inspect", "typing"}  # see ``boundary.light``
     assert loaded.isdisjoint(heavy | slow_to_define)
 
 

@@ -8,7 +8,7 @@ from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.middleware import VARIABLE, ZENOH, Vendor, middleware_of, vendor_of, why_not
 from enclave_launch.admission.variables import overridden, own_security, preloaded
 from enclave_launch.admission.wrappers import obstacles
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics import admission as diagnostics
 from enclave_launch.errors import UsageError

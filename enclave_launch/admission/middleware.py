@@ -15,9 +15,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from enum import Enum
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
     from keystore.formats.subject import Half

@@ -11,8 +11,7 @@ import re
 from collections.abc import Iterator, Mapping
 
 from enclave_launch.boundary.files import text_or_nothing
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, late_pattern
 
 OURS = (
     "ROS_SECURITY_ENABLE",

@@ -9,8 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterator, Sequence
 
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, late_pattern
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.ros_rules.ros_arguments import shell_words
 

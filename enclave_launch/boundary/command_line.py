@@ -7,10 +7,9 @@ import os
 import re
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, NoReturn
 
 from enclave_launch.boundary.dependencies import missing_dependency
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import Any, NoReturn, late_pattern
 from enclave_launch.boundary.words import did_you_mean
 
 _INVALID_CHOICE = late_pattern(r"^(.*invalid choice: '([^']*)') \(choose from .*\)$", re.DOTALL)

@@ -10,7 +10,8 @@ from __future__ import annotations
 import errno
 import os
 import stat
-from typing import TYPE_CHECKING
+
+from enclave_launch.boundary.light import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from pathlib import Path

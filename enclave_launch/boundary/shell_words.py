@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import late_pattern
 
 _BLANKS = " \t\r\n"
 _PIECE = late_pattern(

@@ -14,9 +14,8 @@ import sys
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from os import PathLike
-from typing import Any, TextIO, cast
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import Any, TextIO, cast, late_pattern
 
 _PERHAPS_UNSAFE = late_pattern(r"[^ -~\n\t]")
 

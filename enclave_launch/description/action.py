@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.entity import LaunchDescriptionEntity, creation_location
 from enclave_launch.description.events.event import ExecutionComplete
 from enclave_launch.host.user_code import executed_once, is_users

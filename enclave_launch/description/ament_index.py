@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import warnings
-from typing import TYPE_CHECKING, Literal
 
 from enclave_launch.boundary.files import as_path
+from enclave_launch.boundary.light import TYPE_CHECKING, Literal
 from enclave_launch.host.current import current_host
 from nodl import ament_index
 from nodl.ament_index import INDEX_FOLDER as RESOURCE_INDEX_SUBFOLDER

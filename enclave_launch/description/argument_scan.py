@@ -8,9 +8,8 @@ everything below at each include; here each file is summed up once (``LoadCache`
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from enclave_launch.description.actions.arguments import DeclareLaunchArgument
 from enclave_launch.description.actions.configurations import ResetLaunchConfigurations
 from enclave_launch.description.actions.includes import IncludeLaunchDescription

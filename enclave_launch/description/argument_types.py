@@ -5,7 +5,8 @@ from __future__ import annotations
 import collections.abc
 import os
 from collections.abc import Iterable
-from typing import Any, Union
+
+from enclave_launch.boundary.light import Any
 
 
 def isclassinstance(obj: object) -> bool:
@@ -53,4 +54,4 @@ def ensure_argument_type(
         raise TypeError(_ARGUMENT_ERROR.format(start, argument_name, names, argument, type(argument)))
 
 
-FilePath = Union[str, bytes, "os.PathLike[str]", "os.PathLike[bytes]"]
+FilePath = str | bytes | os.PathLike[str] | os.PathLike[bytes]

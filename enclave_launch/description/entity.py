@@ -6,8 +6,8 @@ import collections.abc
 import sys
 from collections.abc import Iterable
 from types import FrameType
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:

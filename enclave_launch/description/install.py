@@ -13,8 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any, cast
 
+from enclave_launch.boundary.light import Any, cast
 from enclave_launch.description.public_modules import exists, hidden_modules, public_module
 
 PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")

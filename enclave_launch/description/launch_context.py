@@ -5,9 +5,8 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, MutableMapping
-from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from enclave_launch.description.events.dispatch import Buckets, EventQueue, HandlerTable, QueuedEvent
 from enclave_launch.description.watched_configurations import WatchedConfigurations
 from enclave_launch.host.current import current_host

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.description.argument_scan import collect_arguments
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.diagnostics.evaluation import launch_file_deprecated

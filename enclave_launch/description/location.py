@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.frontend import error_location
 from enclave_launch.source_location import SourceLocation
 

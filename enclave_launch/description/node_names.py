@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from typing import Any
 
+from enclave_launch.boundary.light import Any
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.diagnostics.evaluation import node_name_repeated
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute as make_namespace_absolute

@@ -9,9 +9,8 @@ from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
 from types import ModuleType
-from typing import Any
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple
 from enclave_launch.description.upstream_paths import GATES, PATHS
 from enclave_launch.host.current import current_release
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from types import ModuleType
-from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.parser import (
     InvalidFrontendLaunchFileError as InvalidFrontendLaunchFileError,

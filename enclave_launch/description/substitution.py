@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import MEBIBYTE
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.host.current import current_release
 from enclave_launch.host.user_code import is_users, once
 from enclave_launch.ros_rules.distro import Feature

@@ -12,9 +12,8 @@ lists of substitutions, to be performed when the action is executed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from enclave_launch.description.action import Action
 from enclave_launch.description.substitution import Substitution, normalize_to_list_of_substitutions
 

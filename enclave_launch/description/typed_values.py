@@ -1,4 +1,4 @@
-"""Coercion and checking of typed attributes and parameter values (API of ``launch.utilities.type_utils``).
+"""Coercion and checking of typed attributes and parameter values (functions of ``launch.utilities.type_utils``).
 
 Allowed are ``int``, ``float``, ``bool``, ``str`` and uniform ``List``s of them. A value on its way is
 
@@ -9,12 +9,11 @@ Allowed are ``int``, ``float``, ``bool``, ``str`` and uniform ``List``s of them.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any, List, TypeAlias, Union  # noqa: UP035  (upstream names typing.List)
+from collections.abc import Iterable
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.substitution import (
-    SomeSubstitutionsType,
     Substitution,
     normalize_to_list_of_substitutions,
     perform_substitutions,
@@ -28,34 +27,15 @@ if TYPE_CHECKING:
 
 
 ScalarTypesTuple = (int, float, bool, str)
-ListTypesTuple = (List[int], List[float], List[bool], List[str])  # noqa: UP006
-AllowedTypesTuple = (*ScalarTypesTuple, *ListTypesTuple)
-
-ScalarTypesType: TypeAlias = type[Union[int, float, bool, str]]  # noqa: UP007
-ListTypesType: TypeAlias = type[Union[list[int], list[float], list[bool], list[str]]]  # noqa: UP007
-AllowedTypesType: TypeAlias = Union[ScalarTypesType, ListTypesType]  # noqa: UP007
-ScalarValueType: TypeAlias = Union[int, float, bool, str]  # noqa: UP007
-ListValueType: TypeAlias = Union[list[int], list[float], list[bool], list[str]]  # noqa: UP007
-SequenceValueType: TypeAlias = Union[  # noqa: UP007
-    Sequence[int], Sequence[float], Sequence[bool], Sequence[str]
-]
-AllowedValueType: TypeAlias = Union[ScalarValueType, SequenceValueType]  # noqa: UP007
-SomeScalarType: TypeAlias = Union[SomeSubstitutionsType, ScalarValueType]  # noqa: UP007
-SomeSequenceType: TypeAlias = Sequence[Union[int, float, bool, str, SomeSubstitutionsType]]  # noqa: UP007
-SomeValueType: TypeAlias = Union[SomeScalarType, SomeSequenceType]  # noqa: UP007
-NormalizedScalarType: TypeAlias = Union[list[Substitution], ScalarValueType]  # noqa: UP007
-NormalizedSequenceType: TypeAlias = list[Union[int, float, bool, str, list[Substitution]]]  # noqa: UP007
-NormalizedValueType: TypeAlias = Union[NormalizedScalarType, NormalizedSequenceType]  # noqa: UP007
-StrSomeScalarType: TypeAlias = SomeScalarType
-StrSomeSequenceType: TypeAlias = Sequence[Union[int, float, bool, str]]  # noqa: UP007
-StrSomeValueType: TypeAlias = Union[StrSomeScalarType, StrSomeSequenceType]  # noqa: UP007
 
 
 def is_typing_list(data_type: Any) -> bool:
     """Whether ``data_type`` is ``typing.List`` or a subscription of it or of ``list``."""
-    if data_type is List:  # noqa: UP006
-        return True
-    return getattr(data_type, "__origin__", None) is list and hasattr(data_type, "__args__")
+    from typing import List  # noqa: UP035  (upstream names typing.List)
+
+    return data_type is List or (  # noqa: UP006
+        getattr(data_type, "__origin__", None) is list and hasattr(data_type, "__args__")
+    )
 
 
 def is_valid_scalar_type(data_type: Any) -> bool:
@@ -65,11 +45,12 @@ def is_valid_scalar_type(data_type: Any) -> bool:
 
 def extract_type(data_type: Any) -> tuple[Any, bool]:
     """``List[int]`` -> ``(int, True)``, ``bool`` -> ``(bool, False)``; ``ValueError`` for any other type."""
-    is_list = is_typing_list(data_type) and bool(getattr(data_type, "__args__", None))
-    scalar_type = data_type.__args__[0] if is_list else data_type
-    if not is_valid_scalar_type(scalar_type):
+    if is_valid_scalar_type(data_type):
+        return data_type, False
+    items = getattr(data_type, "__args__", None)
+    if not items or not is_typing_list(data_type) or not is_valid_scalar_type(items[0]):
         raise ValueError(f"Unrecognized data type: {data_type}")
-    return scalar_type, is_list
+    return items[0], True
 
 
 def is_instance_of_valid_type(value: Any, *, can_be_str: bool = False) -> bool:

@@ -180,7 +180,7 @@ PATHS: dict[str, dict[str, str]] = {
         "normalize_to_list_of_substitutions_impl": "substitution: normalize_to_list_of_substitutions",
         "perform_substitutions_impl": "substitution: perform_substitutions",
         "signal_management": "launch_service: AsyncSafeSignalManager",
-        "type_utils": "typed_values: | *",
+        "type_utils": "type_utils: | *",
         "typing_file_path": "argument_types: | FilePath",
         "visit_all_entities_and_collect_futures_impl": "visit: visit_all_entities_and_collect_futures",
     },

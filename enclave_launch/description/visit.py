@@ -6,8 +6,8 @@ Each entity is visited, then all that its visit gave, then its next sibling.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.includes import IncludeLaunchDescription, OpenFile, opened
 from enclave_launch.description.location import annotate, includes_below
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from enclave_launch.boundary.light import Any
 
 
 class WatchedConfigurations(dict[str, Any]):

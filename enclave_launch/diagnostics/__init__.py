@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.source_location import SourceLocation
 
 

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from enum import Enum
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,

@@ -10,9 +10,9 @@ import os
 import sys
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
-from typing import TYPE_CHECKING, Any
 
 import enclave_launch
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.description.argument_scan import check_is_description
 from enclave_launch.description.install import installed

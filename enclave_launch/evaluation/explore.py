@@ -8,8 +8,7 @@ put back afterwards: one supposition must not colour the next. What a handler st
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import EmitEvent
 from enclave_launch.description.events.dispatch import chain, run_handler
 from enclave_launch.description.events.event import Shutdown, TimerEvent

@@ -19,9 +19,8 @@ from contextlib import ExitStack, contextmanager
 from functools import lru_cache
 from importlib.machinery import ModuleSpec
 from types import ModuleType
-from typing import Any
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import Any, late_pattern
 
 _NAMES = ("load", "dump", "safe_load", "safe_dump")
 _LOADERS = {

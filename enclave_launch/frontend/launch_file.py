@@ -10,9 +10,9 @@ import io
 import os
 from collections import OrderedDict
 from collections.abc import Callable
-from typing import Any, TextIO, TypeVar
 
 from enclave_launch.boundary.files import check_regular, read_text
+from enclave_launch.boundary.light import Any, TextIO, TypeVar
 
 MAX_CHARACTERS = 64 * 2**20  # of one launch file; a generated file with 100,000 nodes has about a third
 _MAX_KEPT_CHARACTERS = 32 * 2**20  # text of all kept files; their trees take about ten times that

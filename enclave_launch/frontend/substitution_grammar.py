@@ -18,10 +18,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import TypeAlias
 
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, TypeAlias, late_pattern
 
 MAX_NESTING = 128  # where upstream ends in a RecursionError, too
 

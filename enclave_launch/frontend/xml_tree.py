@@ -12,7 +12,7 @@ from __future__ import annotations
 from functools import partial
 from xml.parsers import expat
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import late_pattern
 from enclave_launch.boundary.xml_tree import RefusedXml, XmlElement, collect_elements
 
 MAX_ENTITY_LENGTH = 256  # characters of one declared entity

@@ -7,9 +7,8 @@ is only loaded (20 ms) and run (50 us a value) for the rest. ``tests/frontend`` 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import Any, late_pattern
 
 # PyYAML types a plain scalar by its first character; one of these can only become text, a bool or null.
 # Printable ASCII without ': ' and ' #' has no other meaning in YAML once the first character is harmless.

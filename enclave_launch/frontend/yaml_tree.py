@@ -9,12 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Generator
-from typing import Any
 
 import yaml
 
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple, late_pattern
 from enclave_launch.boundary.yaml_nodes import (
     RefusedYaml,
     SafeLoader,

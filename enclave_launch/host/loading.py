@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.host.environment import environment_snapshot
 
 if TYPE_CHECKING:

@@ -14,10 +14,8 @@ import stat
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple, late_pattern
 from enclave_launch.host.environment import environment_snapshot
 
 if TYPE_CHECKING:

@@ -20,9 +20,8 @@ import os
 import sys
 from collections import deque
 from collections.abc import Callable, Hashable, Iterable, Iterator
-from typing import TYPE_CHECKING, Any, TypeVar
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple, TypeVar
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.substitution import Substitution
 from enclave_launch.host.environment import changed, environment_snapshot

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.host.base_host import BaseHost
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.host.virtual_loop import VirtualLoop

@@ -7,8 +7,8 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Iterable
 from functools import wraps
 from types import CodeType
-from typing import TYPE_CHECKING, Any, TypeVar
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeVar
 from enclave_launch.description.events.event import Shutdown
 from enclave_launch.description.location import location_of
 from enclave_launch.diagnostics.evaluation import function_called_again

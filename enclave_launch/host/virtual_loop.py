@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Coroutine
-from typing import Any, NoReturn
+
+from enclave_launch.boundary.light import Any, NoReturn
 
 
 class VirtualFuture:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from enclave_launch.errors import ManifestError, translated
 from enclave_launch.interfaces.library_access import LibraryAccess
 from enclave_launch.interfaces.started_program import StartedProgram

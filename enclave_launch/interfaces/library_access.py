@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.errors import UsageError
 from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.program_inputs import own_words

@@ -6,8 +6,8 @@ Takes a process or component of the evaluation; used by ``nodl.infer`` as its ``
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from nodl.node_interface import NodeInterface
 from nodl.source_ref import SourceRef

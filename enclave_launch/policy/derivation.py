@@ -9,9 +9,8 @@ away takes exactly its permissions away. Time is linear in nodes and interfaces.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Literal
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Literal, NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import permissions_large, policy_answers
 from enclave_launch.policy.running_node import RunningNode

@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TextIO
 
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, TextIO, late_pattern
 from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.diagnostics import Diagnostic

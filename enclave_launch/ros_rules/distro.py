@@ -18,7 +18,7 @@ from enum import Enum
 from functools import lru_cache
 
 from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)

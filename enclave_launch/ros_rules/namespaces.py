@@ -9,7 +9,8 @@ push of a namespace joins its enclave text, or else its namespace, in the way na
 from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping
-from typing import Any, overload
+
+from enclave_launch.boundary.light import Any, overload
 
 NAMESPACE = "ros_namespace"
 ENCLAVE_SCOPE = "ros_enclave_scope"

@@ -6,7 +6,8 @@ Rules and messages of launch/logging/__init__.py (``get_output_loggers``).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Literal
+
+from enclave_launch.boundary.light import Literal
 
 Source = Literal["stdout", "stderr", "both"]
 OutputSetting = str | Mapping[str, str | Iterable[str]]

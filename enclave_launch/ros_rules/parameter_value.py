@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import re
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import late_pattern
 
 Scalar = bool | int | float | str
 ParameterValue = Scalar | bytes | tuple[Scalar | bytes, ...]

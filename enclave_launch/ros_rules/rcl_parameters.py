@@ -15,11 +15,9 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, TypeVar
 
 from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.late_pattern import late_pattern
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple, TypeVar, late_pattern
 from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
 from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 

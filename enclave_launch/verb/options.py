@@ -6,10 +6,10 @@ import argparse
 import os
 import re
 from collections.abc import Iterable, Mapping
-from typing import Any
 
 from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version
 from enclave_launch.boundary.files import as_path
+from enclave_launch.boundary.light import Any
 from enclave_launch.ros_rules.distro import Distro
 
 DESCRIPTION = """\

@@ -8,9 +8,9 @@ import os
 import re
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.command_line import complete, guarded
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import (
     printable,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.evaluation import evaluate

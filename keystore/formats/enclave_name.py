@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import late_pattern
 from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError, printable
 
 # RMW_TOPIC_MAX_NAME_LENGTH (247) minus two, where SROS2's namespace check stops; rcl itself allows 255.

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from keystore.formats.permissions_names import dds_topics, full_name
 from keystore.formats.policy import EnclavePolicy, Operation, Profile
 

@@ -12,7 +12,7 @@ import re
 from collections.abc import Iterable, Mapping
 from enum import Enum
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import late_pattern
 
 # X.520 ub-common-name; cryptography >= 43 enforces it.
 MAX_COMMON_NAME = 64

@@ -6,9 +6,8 @@ from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains

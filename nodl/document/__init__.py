@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import read_bytes
+from enclave_launch.boundary.light import TYPE_CHECKING
 from nodl.document.manifest_node import ManifestNode
 from nodl.errors import InvalidNoDLError
 from nodl.source_ref import SourceRef

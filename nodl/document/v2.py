@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.document.manifest_node import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services

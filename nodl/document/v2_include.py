@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from enclave_launch.boundary.files import read_bytes
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.ament_index import INDEX_FOLDER, find_resource
 from nodl.document import RESOURCE_TYPE, resource_key
 from nodl.document.v2_schema import check_document

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.boundary.words import counted
 from nodl.document.v2_section import IDENTITY_KEY
 from nodl.errors import InvalidElementError

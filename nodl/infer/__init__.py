@@ -7,7 +7,8 @@ at what launch starts as ``lib/<package>/<executable>``. What could not be found
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+
+from enclave_launch.boundary.light import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from nodl.infer.executable import InferredExecutable, infer_executable

@@ -20,7 +20,7 @@ import re
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.analysis import is_node
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run

@@ -6,7 +6,7 @@ Everything here only grows, in whatever order branches and loops are analysed; `
 
 from __future__ import annotations
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.values import BOTTOM, FieldCells, Unknown, Value, join
 from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef

@@ -11,7 +11,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from enclave_launch.boundary.files import text_or_nothing
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")

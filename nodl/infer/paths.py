@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord
 from nodl.infer.interpreter.conditions import OPPOSITE
 from nodl.infer.interpreter.decisions import Decisions, TooManyPaths

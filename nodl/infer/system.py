@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.analysis import analyse_rest, start
 from nodl.infer.collector import without_collector
 from nodl.infer.coverage import may_make_interfaces, unsettled_places

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.document import read_root
 from nodl.document.v2 import parse_root
 from nodl.document.v2_section import plain, section_of

@@ -6,7 +6,8 @@ import os
 import sys
 import warnings
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.nodes import Node

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.node_extensions import NodeActionExtension, installed_extensions
 from enclave_launch.description.actions.processes import ExecuteProcess
 from enclave_launch.description.argument_types import ensure_argument_type

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import Shutdown
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.ros_rules.distro import Feature

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeAlias
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeAlias
 from enclave_launch.description.action import Action
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.events.event import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, List, TypeVar, overload  # noqa: UP035  (upstream names typing.List)
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeVar, overload
 
 if TYPE_CHECKING:
     from collections.abc import Container
@@ -90,17 +90,7 @@ class Entity:
 
 # Types that front ends can be asked for (API of ``launch.frontend.type_utils``).
 
-_TYPE_OF_IDENTIFIER: dict[str, Any] = {
-    "str": str,
-    "bool": bool,
-    "float": float,
-    "int": int,
-    "list_of_str": List[str],  # noqa: UP006
-    "list_of_bool": List[bool],  # noqa: UP006
-    "list_of_float": List[float],  # noqa: UP006
-    "list_of_int": List[int],  # noqa: UP006
-    "yaml": None,
-}
+_SCALARS = {"str": str, "bool": bool, "float": float, "int": int}
 
 
 def check_is_list_entity(data_type: Any) -> bool:
@@ -113,6 +103,13 @@ def check_is_list_entity(data_type: Any) -> bool:
 
 def get_data_type_from_identifier(type_identifier: str) -> Any:
     """``'list_of_int'`` -> ``List[int]``; ``'yaml'`` -> ``None``. ``ValueError`` for an unknown one."""
-    if type_identifier not in _TYPE_OF_IDENTIFIER:
+    if type_identifier == "yaml":
+        return None
+    scalar = _SCALARS.get(type_identifier.removeprefix("list_of_"))
+    if scalar is None:
         raise ValueError(f"Got invalid type identifier '{type_identifier}'")
-    return _TYPE_OF_IDENTIFIER[type_identifier]
+    if type_identifier.startswith("list_of_"):
+        from typing import List  # noqa: UP035  (upstream names typing.List)
+
+        return List[scalar]  # type: ignore[valid-type]  # noqa: UP006
+    return scalar

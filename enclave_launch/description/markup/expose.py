@@ -10,8 +10,8 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable
 from types import FunctionType, MethodType
-from typing import TYPE_CHECKING, Any, TypeVar
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeVar
 from enclave_launch.description.markup import extensions
 from enclave_launch.frontend import error_location
 from enclave_launch.host.current import current_release

@@ -7,8 +7,8 @@ own substitutions never change once built, so what a text gave is kept and its o
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.markup import expose
 from enclave_launch.description.substitution import TextSubstitution
 from enclave_launch.frontend.substitution_grammar import (

@@ -6,8 +6,8 @@ import itertools
 import os
 import warnings
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, TextIO
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, TextIO
 from enclave_launch.description.markup import expose, extensions, parse_substitution
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.frontend import launch_file

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, TextIO
-
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, TextIO
 from enclave_launch.description.markup.entity import Entity as BaseEntity
 from enclave_launch.description.markup.entity import check_is_list_entity
 from enclave_launch.description.markup.parser import FilePath

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any, cast
 
 from enclave_launch.boundary.files import as_path, read_text
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, cast
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
 from enclave_launch.description.parameters import yaml_text

@@ -5,9 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from functools import lru_cache
-from typing import Any
 
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import Any, late_pattern
 from enclave_launch.description.substitution import TextSubstitution
 from enclave_launch.frontend import yaml_scalar
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (

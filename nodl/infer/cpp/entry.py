@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple
 from nodl.node_interface import Gap, NodeInterface
 
 

@@ -10,10 +10,9 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.files import as_path, read_text
-from enclave_launch.boundary.late_pattern import late_pattern
+from enclave_launch.boundary.light import TYPE_CHECKING, late_pattern
 from nodl.infer.cpp.entry import Answer
 
 if TYPE_CHECKING:

@@ -9,9 +9,8 @@ from __future__ import annotations
 import ast
 import itertools
 from collections.abc import Callable
-from typing import Any
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.interpreter.allocations import Allocations
 from nodl.infer.interpreter.decisions import Decisions

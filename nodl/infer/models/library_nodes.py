@@ -5,7 +5,7 @@ Source: nav2_simple_commander/robot_navigator.py (humble to rolling; the union, 
 
 from __future__ import annotations
 
-from enclave_launch.boundary.named_tuple import NamedTuple
+from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.models.signatures import ACTION_CLIENT, CLIENT, PUBLISHER, SUBSCRIPTION, FixedEndpoint
 
 

@@ -1,18 +1,72 @@
-"""``typing.NamedTuple`` at a fraction of what it costs to define one, for the value types that every dry run defines.
+"""What every dry run uses of ``typing`` and ``re``, at a fraction of what it costs to import and to define.
 
-``typing`` compiles each annotation and the constructor when a class is defined. Here annotations stay text and the
-constructor is compiled for a class with many instances, which few of the hundred classes have. ``bench/resolve.py``
-shows what start-up costs. Type checkers see ``typing``'s own, whose interface this has.
+* ``typing`` takes a twentieth of a small dry run to import. Our annotations stay text and nobody evaluates them, so
+  that its names need to be there only, and a ``Protocol`` is a plain class.
+* ``typing.NamedTuple`` compiles each annotation and the constructor when a class is defined. Here the constructor is
+  compiled for a class with many instances, which few of the hundred classes have.
+* A pattern takes as long to compile as a small module to import, and a launch meets the texts for a few only.
+
+Type checkers see the real things, whose interface these have. ``bench/resolve.py`` shows what start-up costs,
+docs/speed.md what this saves. Modules that no dry run loads import ``typing`` itself. Pure.
 """
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import re
+
+TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from typing import Any as Any
+    from typing import ClassVar as ClassVar
+    from typing import Literal as Literal
     from typing import NamedTuple as NamedTuple
+    from typing import NoReturn as NoReturn
+    from typing import Protocol as Protocol
+    from typing import TextIO as TextIO
+    from typing import TypeAlias as TypeAlias
+    from typing import TypeVar as TypeVar
+    from typing import cast as cast
+    from typing import overload as overload
+
+    def late_pattern(text: str, flags: int = 0) -> re.Pattern[str]:
+        """As ``re.compile`` when something is searched with it; errors of ``text`` come then."""
+
 else:
     from collections import namedtuple
+
+    class _Name:
+        """A name of annotations, also with something in brackets; or a type variable."""
+
+        def __init__(self, *described):
+            pass
+
+        def __getitem__(self, described):
+            return self
+
+    Any = ClassVar = Literal = NoReturn = TextIO = TypeAlias = _Name()
+    TypeVar = _Name
+
+    class Protocol:
+        """What has these methods; nothing asks whether an object is one."""
+
+    def cast(kind, value):
+        """``value``."""
+        return value
+
+    def overload(function):
+        """``function``, which the last of its name replaces."""
+        return function
+
+    class late_pattern:
+        """What ``re.compile`` gives, as soon as it is asked for anything."""
+
+        def __init__(self, text, flags=0):
+            self._given = text, flags
+
+        def __getattr__(self, name):
+            found = vars(self)[name] = getattr(re.compile(*vars(self)["_given"]), name)
+            return found
 
     _FEW = 20  # instances that are made sooner than a constructor is compiled
     _Field = type(namedtuple("_One", "field").field)

@@ -10,10 +10,10 @@ from collections.abc import Callable
 
 import pytest
 
-from enclave_launch.boundary import named_tuple
+from enclave_launch.boundary import light
 
 
-class Ours(named_tuple.NamedTuple):
+class Ours(light.NamedTuple):
     """A remap rule."""
 
     source: str
@@ -101,7 +101,7 @@ def test_a_subclass_adds_methods() -> None:
 
 
 def test_classes_of_equal_fields_stay_apart() -> None:
-    class Other(named_tuple.NamedTuple):
+    class Other(light.NamedTuple):
         source: str
         target: str
 
