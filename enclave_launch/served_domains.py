@@ -6,9 +6,9 @@ Takes a plan, gives the keystore's options; what cannot be served is refused wit
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
 
 from enclave_launch.admission.domains import domain_of
+from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.admission import domain_not_served
 from enclave_launch.errors import ManifestError

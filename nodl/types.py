@@ -6,7 +6,8 @@ Inside this project the model is ``nodl.node_interface``; these are made from it
 from __future__ import annotations
 
 from enum import Enum, unique
-from typing import Any, TypeVar
+
+from enclave_launch.boundary.light import Any, TypeVar
 
 
 @unique

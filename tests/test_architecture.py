@@ -173,7 +173,7 @@ def test_only_the_disk_room_of_the_keystore_makes_files_that_may_hold_a_key() ->
 
 
 def modules_loaded_by(arguments: list[str], **environment: str) -> set[str]:
-    """What a whole run of ``secure-launch`` imports."""
+    """What a whole run of ``secure-launch`` imports; without ``site``, where an editable installation imports more."""
     code = (
         "import sys\n"
         "from enclave_launch.verb.secure_launch import main\n"
@@ -182,7 +182,7 @@ def modules_loaded_by(arguments: list[str], **environment: str) -> set[str]:
         "sys.exit(status)\n"
     )
     run = subprocess.run(
-        [sys.executable, "-c", code],
+        [sys.executable, "-S", "-c", code],
         capture_output=True, text=True, check=True, cwd=ROOT, env={**os.environ, **environment},
     )  # fmt: skip
     return set(run.stderr.split())

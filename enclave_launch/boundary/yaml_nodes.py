@@ -7,9 +7,10 @@ few lines can stand for billions of values. libyaml's loader also recurses in C,
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import yaml
+
+from enclave_launch.boundary.light import Any
 
 MAX_NESTING = 250  # the recursion of PyYAML, and of launch, ends at about this depth
 FREE_EXPANSION = 10_000  # values that aliases may stand for in any document, and

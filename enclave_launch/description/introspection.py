@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.log import LogInfo

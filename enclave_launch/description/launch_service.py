@@ -5,8 +5,8 @@ from __future__ import annotations
 import signal
 from collections.abc import Callable, Iterable
 from types import TracebackType
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import EmitEvent
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.launch_description import LaunchDescription

@@ -7,8 +7,8 @@ the runtime's business; nothing here creates a file.
 from __future__ import annotations
 
 import os
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.host.current import current_host
 
 if TYPE_CHECKING:

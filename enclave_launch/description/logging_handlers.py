@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import logging.handlers
-from typing import Any
+
+from enclave_launch.boundary.light import Any
 
 StreamHandler = logging.StreamHandler
 FileHandler = logging.FileHandler

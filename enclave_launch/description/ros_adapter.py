@@ -7,8 +7,8 @@ never does: what would be asked of the node is recorded as a ``LauncherCall`` in
 from __future__ import annotations
 
 import os
-from typing import Any
 
+from enclave_launch.boundary.light import Any
 from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
 

@@ -9,9 +9,9 @@ from __future__ import annotations
 import os
 import re
 import sys
-from typing import cast
 
 from enclave_launch.boundary.dependencies import missing_dependency
+from enclave_launch.boundary.light import cast
 from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.description.conditions import InvalidConditionExpressionError

@@ -11,9 +11,9 @@ from functools import lru_cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from types import CodeType, ModuleType
-from typing import Any
 
 from enclave_launch.boundary.files import check_regular, read_bytes
+from enclave_launch.boundary.light import Any
 from enclave_launch.frontend.error_location import frames
 from enclave_launch.source_location import SourceLocation
 

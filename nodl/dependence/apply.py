@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from typing import NamedTuple, Protocol
 
+from enclave_launch.boundary.light import NamedTuple, Protocol
 from nodl.dependence import (
     Configuration,
     Dependence,

@@ -12,8 +12,8 @@ import sys
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from nodl.ament_index import PackageNotFoundError, package_prefix
 from nodl.infer.cpp.cache.codec import decoded, encoded
 from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.nodes import Node, parse_remaps
 from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
 from enclave_launch.description.markup.entity import Entity

@@ -5,8 +5,8 @@ and pop their scope.
 from __future__ import annotations
 
 import os
-from typing import Any
 
+from enclave_launch.boundary.light import Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.entity import Entity

@@ -5,8 +5,8 @@ from __future__ import annotations
 import collections.abc
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.configurations import (
     PopLaunchConfigurations,

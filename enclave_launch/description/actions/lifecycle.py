@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from typing import Any, ClassVar
 
+from enclave_launch.boundary.light import Any, ClassVar
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.flow import OpaqueFunction

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.logging import get_logger
 from enclave_launch.description.markup.expose import expose_action

@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
-
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.location import location_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.action import Action
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.argument_types import ensure_argument_type

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, ClassVar
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, ClassVar
 from enclave_launch.description import node_names
 from enclave_launch.description.events.event import Event
 from enclave_launch.description.lifecycle_msgs import State, Transition

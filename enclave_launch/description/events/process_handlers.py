@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.processes import ExecuteLocal, ExecuteProcess
 from enclave_launch.description.events.handlers import OnActionEventBase
 from enclave_launch.description.events.process import (

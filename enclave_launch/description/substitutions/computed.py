@@ -5,10 +5,10 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary import shell_words
 from enclave_launch.boundary.files import read_text
+from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
     MAX_TEXT,

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
 
+from enclave_launch.boundary.light import Any
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (

@@ -6,9 +6,9 @@
 from __future__ import annotations
 
 import os
-from typing import NamedTuple
 
 from enclave_launch.boundary.files import read_bytes
+from enclave_launch.boundary.light import NamedTuple
 from nodl.dependence import Situation
 from nodl.errors import InvalidNoDLError
 from nodl.node_interface import Endpoint, Gap
