@@ -6,7 +6,6 @@ short_paths.py   a path -> the name that a person in this folder would type
 xml_tree.py      XML text -> elements with line numbers
 yaml_nodes.py    YAML text -> PyYAML's nodes: bounded depth, aliases that cannot multiply
 shell_words.py   a command line as text -> its words, in linear time
-late_pattern.py  a regular expression -> compiled at its first use
 command_line.py  options, version, slips of the fingers: what all commands do alike
 words.py         numbers, lists and mistyped words in sentences
 terminal.py      text that others chose -> text that is safe to show on a terminal
@@ -14,6 +13,6 @@ progress.py      what is still being done, on a terminal
 environment.py   variables of our own environment, set for a while
 dependencies.py  a Python package that is not installed -> one line
 public_names.py  the names that a package offers, imported when first used
-named_tuple.py   value types that cost little to define
+light.py         typing's names, value types and patterns at little cost for start-up
 version.py       the version of all three packages
 """
