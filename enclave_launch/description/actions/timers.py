@@ -207,6 +207,7 @@ class ROSTimer(TimerAction):
     ):
         ensure_argument_type(period, (*SomeSubstitutionsType_types_tuple, float), "period", "ROSTimer")
         super().__init__(period=period, actions=actions, **kwargs)
+        normalize_typed_substitution(period, float)  # a text is taken by TimerAction only
 
 
 RosTimer = ROSTimer  # the older name, the only one in humble
