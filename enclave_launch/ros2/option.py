@@ -31,9 +31,9 @@ from enclave_launch.verb.options import (
     add_security_options,
     build_parser,
 )
-from enclave_launch.verb.secure_launch import only_looking, resolve_options, show_plan, start
+from enclave_launch.verb.secure_launch import resolve_options, show_plan, start
 from enclave_launch.verb.target import LaunchTarget
-from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, check_needs_secure
+from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, CommandLine, check_needs_secure, check_views
 
 SECURE = "secure_enclaves"
 
@@ -44,10 +44,9 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
     def add_arguments(self, parser: argparse.ArgumentParser, cli_name: str, *, argv: Any = None) -> None:
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
         add_security_options(group)
-        add_options(group, (*POLICY, *DENIALS))
-        self._of_secured = tuple(group._group_actions)
-        add_options(group, LOOKING)
-        for action in group._group_actions:
+        add_options(group, (*POLICY, *DENIALS, *LOOKING))
+        self._ours = tuple(group._group_actions)
+        for action in self._ours:
             action.default = argparse.SUPPRESS  # what is there then was given
             if "--secure" in action.option_strings:
                 action.dest = SECURE
@@ -63,10 +62,13 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
             if isinstance(keystore, str):
                 args.keystore = Path(keystore)
             options = _with_our_defaults(args)
-            if only_looking(options):
+            given = vars(args).keys() & {action.dest for action in self._ours}
+            looking = check_views(CommandLine(options, frozenset(given)), self._ours)
+            if not keystore:
+                check_needs_secure(self._ours, given & (FOR_SECURE if looking else FOR_SECURE | FOR_PLAN))
+            if looking:
                 raise SystemExit(_looked_at(options))
             if not keystore:
-                check_needs_secure(self._of_secured, vars(args).keys() & (FOR_SECURE | FOR_PLAN))
                 return (launch_description,)
             raise SystemExit(_launched(launch_description, options))
         except EnclaveLaunchError as error:

@@ -43,13 +43,7 @@ def read_command_line(parser: argparse.ArgumentParser, argv: Sequence[str] | Non
 def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
     """Raises ``UsageError`` for options without effect; it names the flag that is missing."""
     given, options, actions = line.given, line.options, parser._actions
-    views = [name for name in _VIEWS if name in given]
-    looks = bool(views or options.dry_run)
-    if len(views) > 1:
-        raise UsageError(f"{_flags(actions, views)} each print something of their own: give one of them")
-    if "format" in given and (views or not options.dry_run):
-        beside = f" beside {_flags(actions, views)}" if views else ""
-        raise UsageError(f"--format has no effect{beside}: it is for --dry-run; nothing was started")
+    looks = check_views(line, actions)
     if options.learn is None:
         check_needs_secure(actions, given & _FOR_LEARN, "--learn")
     elif looks:
@@ -70,6 +64,19 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
         check_needs_secure(actions, given & FOR_SECURE)
         if not (looks or options.audit or options.watch):
             check_needs_secure(actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
+
+
+def check_views(line: CommandLine, actions: Sequence[argparse.Action]) -> bool:
+    """Whether the launch is only looked at. Raises ``UsageError`` where two options print or one has no effect."""
+    views = [name for name in _VIEWS if name in line.given]
+    if len(views) > 1:
+        raise UsageError(f"{_flags(actions, views)} each print something of their own: give one of them")
+    if "format" in line.given and (views or not line.options.dry_run):
+        beside = f" beside {_flags(actions, views)}" if views else ""
+        raise UsageError(f"--format has no effect{beside}: it is for --dry-run; nothing was started")
+    if "explain" in line.given and not line.options.explain:  # as of a variable that is not set
+        raise UsageError("--explain needs the name of an enclave, node or topic; nothing was started")
+    return bool(views) or line.options.dry_run
 
 
 def check_needs_secure(

@@ -40,6 +40,7 @@ LOOKING = {
     "an explanation has one format": (("--dry-run", "--format", "json", "--explain", "/"), "--format"),
     "two views at once": (("--explain", "/", "--dump-params"), "give one of them"),
     "arguments and description": (("-s", "-p"), "give one of them"),
+    "an explanation of nothing, as of an unset variable": (("--explain", ""), "needs the name"),
 }
 
 

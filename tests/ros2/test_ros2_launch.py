@@ -475,6 +475,24 @@ def test_looking_first_as_with_secure_launch(demo: Workspace) -> None:
 
 
 @pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--format", "json"), "--format has no effect: it is for --dry-run"),
+        (("--explain", "/robot/news", "--format", "json"), "--format has no effect beside --explain"),
+        (("--explain", "/robot/news", "--dump-params"), "each print something of their own"),
+        (("--explain", ""), "--explain needs the name of an enclave, node or topic"),
+        (("--dry-run", "--keystore", "ks"), "--keystore has no effect without --secure"),
+    ],
+)
+def test_what_would_have_no_effect_starts_nothing(
+    demo: Workspace, words: tuple[str, ...], complaint: str
+) -> None:
+    status, screen = launch(demo, *words, "demo", "demo.launch.xml")
+    assert status != 0 and complaint in screen
+    assert "process started" not in screen and "enclave=" not in screen
+
+
+@pytest.mark.parametrize(
     "words",
     [("--secure", "{ks}", "demo", "demo.launch.xml"), ("demo", "demo.launch.xml", "--secure", "{ks}")],
 )
