@@ -8,7 +8,7 @@ from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.explanation import explain
 from enclave_launch.report.tree import origin_text
-from enclave_launch.report.unknown import UNKNOWN, is_unknown, label, unknown_by_enclave
+from enclave_launch.report.unknown import UNKNOWN, is_unknown, label, shown_fqn, unknown_by_enclave
 
 
 def explained(plan: LaunchPlan, subject: str) -> list[str]:
@@ -20,7 +20,7 @@ def explained(plan: LaunchPlan, subject: str) -> list[str]:
     for item in planned:
         if path in {node.fqn for node in item.nodes} and item.origin:
             lines.append(f"  interfaces of {label(item)}: {origin_text(item)}")
-        if subject.strip("[]") == label(item) or (is_unknown(item) and path == item.fqn):
+        if subject.strip("[]") == label(item) or (is_unknown(item) and path == shown_fqn(item)):
             lines += _of_process(plan, item)
     if lines and any(item.middleware == ZENOH for item in plan.processes):
         from enclave_launch.report.on_zenoh import zenoh_lines
@@ -34,6 +34,7 @@ def explainable(plan: LaunchPlan) -> set[str]:
     planned: list[PlannedProcess | PlannedComponent] = [*plan.processes, *plan.components]
     names = {enclave.path for enclave in plan.derived.policy.enclaves} | {label(item) for item in planned}
     names |= {node.fqn for item in planned for node in item.nodes}
+    names |= {shown_fqn(item) for item in planned if is_unknown(item)} - {""}
     return names | {rule.expression for reasons in plan.derived.reasons.values() for rule in reasons}
 
 

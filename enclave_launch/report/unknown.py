@@ -36,7 +36,7 @@ def label(item: PlannedProcess | PlannedComponent) -> str:
     return item.process.process_name if isinstance(item, PlannedProcess) else item.fqn
 
 
-def shown_fqn(item: PlannedProcess) -> str:
+def shown_fqn(item: PlannedProcess | PlannedComponent) -> str:
     """Its nodes, or what launch knows of the name: without a placeholder for a namespace that nobody gave, and nothing
     where nobody gave a name."""
     names = " ".join(dict.fromkeys(node.fqn for node in item.nodes))

@@ -85,6 +85,12 @@ def test_explain_speaks_of_what_it_does_not_know(look: Callable[..., str]) -> No
     assert look(text, "--explain", "[talker-2]") == two
 
 
+@pytest.mark.parametrize("name", ["/left", "left", "/wheels/right", "engine-1"])
+def test_each_name_that_the_tree_prints_is_one_to_explain(look: Callable[..., str], name: str) -> None:
+    text = ENGINE.format('name="left"') + ENGINE.format('name="right" namespace="wheels"')
+    assert "permissions unknown: no NoDL manifest" in look(text, "--explain", name)
+
+
 def test_unknown_components_are_marked(look: Callable[..., str]) -> None:
     tree = look(COMPONENTS)
     assert "component robot robot::Wheel as /wheel  (permissions unknown)" in tree
