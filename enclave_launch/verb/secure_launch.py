@@ -86,7 +86,7 @@ def _main(options: argparse.Namespace) -> int:
         with ament_prefixes(options.prefix):
             return _show_file(target, options)
     keystore = _keystore(options)
-    if only_looking(options):
+    if options.dry_run or options.explain or options.dump_params:  # only looked at
         with stdout_is_for_the_plan():
             plan = _planned(target, options, keystore)
         return show_plan(plan, options, keystore)
@@ -137,11 +137,6 @@ def _check_prefixes(prefixes: Iterable[Path]) -> None:
     for prefix in prefixes:
         if not prefix.is_dir():
             raise UsageError(f"--prefix {prefix}: no such directory")
-
-
-def only_looking(options: argparse.Namespace) -> bool:
-    """Do ``options`` ask for the plan, or a part of it, in the place of a start?"""
-    return bool(options.dry_run or options.explain or options.dump_params)
 
 
 def _keystore(options: argparse.Namespace) -> str | None:
