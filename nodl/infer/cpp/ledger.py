@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS
-from nodl.infer.cpp.syntax import Node, text
+from nodl.infer.cpp.syntax import Node, field_of, text
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -338,10 +338,10 @@ def _mentioned_how(node: Node | None, handled: set[int]) -> str:
     while node is not None and node.parent is not None:
         parent = node.parent
         if parent.type == "call_expression":
-            is_callee = parent.child_by_field_name("function") == node
+            is_callee = field_of(parent, "function") == node
             return "followed" if is_callee and parent.start_byte in handled else "open"
         if parent.type in ("new_expression", "compound_literal_expression"):
-            is_made = parent.child_by_field_name("type") == node
+            is_made = field_of(parent, "type") == node
             return "followed" if is_made and parent.start_byte in handled else "open"
         if parent.type in ("declaration", "field_initializer"):
             arguments = parent.named_children[-1].start_byte if parent.named_children else 0
@@ -351,7 +351,7 @@ def _mentioned_how(node: Node | None, handled: set[int]) -> str:
                 "type"
                 if inside_type
                 or (
-                    parent.child_by_field_name("type") == node
+                    field_of(parent, "type") == node
                     and _POINTER.search((parent.text or b"").decode("utf-8", "replace"))
                 )
                 else "open"

@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 else:
     Node = Tree = object  # the extra may not be installed, and only annotations name them
 
-__all__ = ["Node", "Tree", "check_support", "children", "line_of", "parse", "parse_expression", "text", "unwrapped",
-           "walk", "words_in"]  # fmt: skip
+__all__ = ["Node", "Tree", "check_support", "children", "field_of", "line_of", "parse", "parse_expression", "text",
+           "unwrapped", "walk", "words_in"]  # fmt: skip
 
 
 @lru_cache(maxsize=1)
@@ -46,8 +46,13 @@ def parse_expression(source: str) -> Node | None:
     root = parse(f"auto x_ = {source};".encode()).root_node
     for node in walk(root):
         if node.type == "init_declarator":
-            return node.child_by_field_name("value")
+            return field_of(node, "value")
     return None
+
+
+def field_of(node: Node | None, name: str) -> Node | None:
+    """The part of ``node`` that the grammar calls so; ``None`` without one, or for no node."""
+    return node.child_by_field_name(name) if node is not None else None
 
 
 def text(node: Node | None) -> str:

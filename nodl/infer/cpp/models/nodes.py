@@ -35,7 +35,7 @@ from nodl.infer.cpp.running.values import (
     truth,
     unknown,
 )
-from nodl.infer.cpp.syntax import text
+from nodl.infer.cpp.syntax import field_of, text
 from nodl.node_interface import EndpointKind
 
 OPTIONS = "rclcpp::NodeOptions"
@@ -250,8 +250,8 @@ def _options(run: Machine, call: Call) -> Value | None:
 )  # fmt: skip
 def _setter(run: Machine, call: Call) -> Value:
     """``options.arguments({...})`` and kin return the options."""
-    function = call.node.child_by_field_name("function")
-    name = text(function.child_by_field_name("field")) if function is not None else ""
+    function = field_of(call.node, "function")
+    name = text(field_of(function, "field"))
     if not call.values:
         known = run.store.get((call.this, name))
         return known or ((Seq(()),) if name == "arguments" else unknown(f"the {name} of node options"))

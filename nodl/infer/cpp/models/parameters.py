@@ -28,7 +28,7 @@ from nodl.infer.cpp.running.values import (
     literal,
     unknown,
 )
-from nodl.infer.cpp.syntax import unwrapped
+from nodl.infer.cpp.syntax import field_of, unwrapped
 
 
 def parameter_names(run: Machine, value: Value) -> list[str | None]:
@@ -79,7 +79,7 @@ def _write(run: Machine, call: Call, value: Value) -> None:
     """To the second argument."""
     target = unwrapped(call.given[1]) if len(call.given) > 1 else None
     if target is not None and target.type == "pointer_expression":
-        target = target.child_by_field_name("argument")
+        target = field_of(target, "argument")
     if target is not None:
         assign(run, target, value, call.frame)
 

@@ -12,7 +12,7 @@ from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import Param, Value, join, literal, unknown
-from nodl.infer.cpp.syntax import text
+from nodl.infer.cpp.syntax import field_of, text
 
 
 @library_class("pluginlib::ClassLoader")
@@ -56,7 +56,7 @@ def _asks(run: Machine, call: Call) -> Value:
     names = parameter_names(run, call.value(0))
     if len(names) == 1 and names[0] is not None and len(call.values) == 1:
         entry = run.names.plugins.get(names[0])
-        asked = text(call.node.child_by_field_name("function"))
+        asked = text(field_of(call.node, "function"))
         if asked.endswith("getClassType") and entry is not None:
             return literal(entry)
         if asked.endswith("getName"):

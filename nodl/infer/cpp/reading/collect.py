@@ -22,7 +22,7 @@ from nodl.infer.cpp.reading.declarations import (
 from nodl.infer.cpp.reading.parameter_lists import parameters_of, template_defaults, template_names
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.type_names import split_type
-from nodl.infer.cpp.syntax import Node, children, line_of, parse, parse_expression, text, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, line_of, parse, parse_expression, text, walk
 
 _USING = re.compile(r"\busing\s+namespace\s+([\w:]+)\s*;")
 
@@ -53,7 +53,7 @@ class _Collector:
     def one(self, child: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
         kind = child.type
         if kind == "namespace_definition":
-            name = text(child.child_by_field_name("name"))
+            name = text(field_of(child, "name"))
             inner = (
                 *scope,
                 *(part.strip() for part in name.removeprefix("inline").split("::") if part.strip()),
@@ -64,8 +64,8 @@ class _Collector:
         elif kind == "function_definition":
             self.function(child, scope, templates, cls)
         elif kind == "template_declaration":
-            names = template_names(child.child_by_field_name("parameters"))
-            self.defaults = template_defaults(child.child_by_field_name("parameters"))
+            names = template_names(field_of(child, "parameters"))
+            self.defaults = template_defaults(field_of(child, "parameters"))
             for inner_node in child.named_children[1:]:
                 self.one(inner_node, scope, [*templates, *names], cls)
         elif kind in (
@@ -88,8 +88,8 @@ class _Collector:
     # --- classes ----------------------------------------------------------------------------------------
 
     def class_(self, node: Node, scope: Scope, templates: list[str]) -> None:
-        body = node.child_by_field_name("body")
-        named = node.child_by_field_name("name")
+        body = field_of(node, "body")
+        named = field_of(node, "name")
         if body is None:
             return
         written = text(named).partition("<")[0]
@@ -113,17 +113,17 @@ class _Collector:
         self.collect(body, inner, [], made)
 
     def enum(self, node: Node, scope: Scope) -> None:
-        name = text(node.child_by_field_name("name"))
-        body = node.child_by_field_name("body")
+        name = text(field_of(node, "name"))
+        body = field_of(node, "body")
         prefix = "::".join((*scope, *([name] if name else [])))
         self.index.enums.add(name)
         number: int | None = -1
         numbers: dict[str, int] = {}
         for child in children(body):
             if child.type == "enumerator":
-                constant = text(child.child_by_field_name("name"))
+                constant = text(field_of(child, "name"))
                 full = f"{prefix}::{constant}" if prefix else constant
-                number = _enumerated(child.child_by_field_name("value"), number, numbers)
+                number = _enumerated(field_of(child, "value"), number, numbers)
                 if number is not None:
                     numbers[constant] = self.index.enumerator_numbers[full] = number
                 for key in (constant, f"{name}::{constant}", full):
@@ -189,7 +189,7 @@ class _Collector:
     # --- the rest ---------------------------------------------------------------------------------------
 
     def declaration(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
-        kind = node.child_by_field_name("type")
+        kind = field_of(node, "type")
         if kind is not None and kind.type in ("class_specifier", "struct_specifier"):
             self.class_(kind, scope, templates)
         elif kind is not None and kind.type == "enum_specifier":
@@ -207,9 +207,9 @@ class _Collector:
     def _object_or_function(self, node: Node, made: Function) -> None:
         """``Foo foo(bar);`` is a variable where ``bar`` is one."""
         declarator = function_declarator(node)
-        listed = text(declarator.child_by_field_name("parameters")) if declarator is not None else "()"
+        listed = text(field_of(declarator, "parameters")) if declarator is not None else "()"
         call = parse_expression(f"f{listed}")
-        given = call.child_by_field_name("arguments") if call is not None else None
+        given = field_of(call, "arguments")
         self.index.maybe.append(
             Global(made.name, type_text(node), given, node, made.scope, self.index, False)
         )
@@ -246,7 +246,7 @@ class _Collector:
             return
         if node.type == "type_definition":
             names = [child for child in node.named_children if child.type == "type_identifier"]
-            kind = node.child_by_field_name("type")
+            kind = field_of(node, "type")
             if kind is not None and kind.type in ("struct_specifier", "class_specifier"):
                 self.class_(kind, scope, [])
             if kind is not None and kind.type == "enum_specifier":
@@ -272,13 +272,13 @@ def _specialised(name: str, templates: list[str]) -> tuple[str, ...] | None:
 
 
 def _required(node: Node, name: str) -> Node:
-    return node.child_by_field_name(name) or node
+    return field_of(node, name) or node
 
 
 def _is_variable(node: Node) -> bool:
     """``Foo member(1, this);`` reads as a function that takes types named 1 and this."""
     declarator = function_declarator(node)
-    listed = children(declarator.child_by_field_name("parameters")) if declarator is not None else []
+    listed = children(field_of(declarator, "parameters")) if declarator is not None else []
     return any(text(item) in ("this", "*this", "nullptr", "true", "false") for item in listed)
 
 
@@ -330,10 +330,10 @@ def declared_names(node: Node) -> list[DeclaredVariable]:
             "qualified_identifier",
         ):
             if inner.type == "init_declarator":
-                value = inner.child_by_field_name("value")
+                value = field_of(inner, "value")
             pointer = pointer or inner.type in ("pointer_declarator", "reference_declarator")
             array = array or inner.type == "array_declarator"
-            inner = inner.child_by_field_name("declarator") or next(
+            inner = field_of(inner, "declarator") or next(
                 (c for c in inner.named_children if c.type.endswith(("declarator", "identifier"))), None
             )
         if inner is not None:

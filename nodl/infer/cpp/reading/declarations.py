@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.writes import Writes
-from nodl.infer.cpp.syntax import Node, Tree, line_of, text
+from nodl.infer.cpp.syntax import Node, Tree, field_of, line_of, text
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.ledger import Site
@@ -158,30 +158,30 @@ class FileIndex:
 
 def conversion(node: Node) -> Node | None:
     """The declarator of a conversion operator: ``operator T()``; ``None`` for all else."""
-    declarator = node.child_by_field_name("declarator") if node.type == "function_definition" else None
+    declarator = field_of(node, "declarator") if node.type == "function_definition" else None
     while declarator is not None and declarator.type == "qualified_identifier":
-        declarator = declarator.child_by_field_name("name")
+        declarator = field_of(declarator, "name")
     return declarator if declarator is not None and declarator.type == "operator_cast" else None
 
 
 def written_name(node: Node, declarator: Node) -> str:
     """The name in a function's declarator: ``Foo::bar``, ``Foo::operator bool``."""
     if declarator.type != "operator_cast":
-        return text(declarator.child_by_field_name("declarator"))
-    whole = text(node.child_by_field_name("declarator"))
+        return text(field_of(declarator, "declarator"))
+    whole = text(field_of(node, "declarator"))
     return f"{whole.partition('operator')[0]}operator {text(declarator.child_by_field_name('type')).replace('::', '.')}"
 
 
 def function_declarator(node: Node) -> Node | None:
     """The declarator with the parameters; ``None`` for variables, arrays and pointers to functions."""
-    declarator = node.child_by_field_name("declarator")
+    declarator = field_of(node, "declarator")
     while declarator is not None and declarator.type != "function_declarator":
         if declarator.type in ("init_declarator", "array_declarator"):
             return None
-        declarator = declarator.child_by_field_name("declarator") or next(
+        declarator = field_of(declarator, "declarator") or next(
             (c for c in declarator.named_children if c.type.endswith("_declarator")), None
         )
-    inner = declarator.child_by_field_name("declarator") if declarator is not None else None
+    inner = field_of(declarator, "declarator")
     if inner is not None and inner.type == "parenthesized_declarator":
         return None  # a pointer to a function
     return declarator
@@ -189,4 +189,4 @@ def function_declarator(node: Node) -> Node | None:
 
 def type_text(node: Node) -> str:
     """The type as written, on one line, without ``const``, ``&`` and ``*`` around it; may be empty."""
-    return " ".join(text(node.child_by_field_name("type")).split())
+    return " ".join(text(field_of(node, "type")).split())

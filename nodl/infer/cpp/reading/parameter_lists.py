@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, type_text
-from nodl.infer.cpp.syntax import Node, children, text, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, text, walk
 
 
 def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:
     """Parameters in order, without a lone ``void``; ``...`` or a pack marks ``function`` as variadic."""
-    listed = declarator.child_by_field_name("parameters")
+    listed = field_of(declarator, "parameters")
     found = []
     for child in listed.named_children if listed is not None else ():
         if child.type in ("variadic_parameter_declaration", "variadic_parameter") and function is not None:
             function.variadic = True
         if not child.type.endswith("parameter_declaration"):
             continue
-        declared = child.child_by_field_name("declarator")
+        declared = field_of(child, "declarator")
         names = [n for n in walk(declared) if n.type == "identifier"] if declared is not None else []
         constant = any(text(c) == "const" for c in child.named_children if c.type == "type_qualifier")
         written = ("const " if constant else "") + type_text(child) + _marks(declared)
         if written == "void" and not names:
             continue
         found.append(
-            FunctionParameter(
-                text(names[0]) if names else "", written, child.child_by_field_name("default_value")
-            )
+            FunctionParameter(text(names[0]) if names else "", written, field_of(child, "default_value"))
         )
     return found
 
@@ -43,10 +41,10 @@ def template_names(node: Node | None) -> list[str]:
     for child in children(node):
         identifiers = [c for c in walk(child) if c.type in ("type_identifier", "identifier")]
         if child.type in ("parameter_declaration", "optional_parameter_declaration"):
-            declarator = child.child_by_field_name("declarator")
+            declarator = field_of(child, "declarator")
             names.append(text(declarator) if declarator is not None else "")
         elif identifiers:
-            named = child.child_by_field_name("name")
+            named = field_of(child, "name")
             names.append(text(named or identifiers[0]))
         else:
             names.append("")
@@ -57,8 +55,8 @@ def template_defaults(node: Node | None) -> dict[str, str]:
     """The defaults of a template's parameters, by their names."""
     found = {}
     for child in children(node):
-        default = child.child_by_field_name("default_type") or child.child_by_field_name("default_value")
-        name = child.child_by_field_name("name") or child.child_by_field_name("declarator")
+        default = field_of(child, "default_type") or field_of(child, "default_value")
+        name = field_of(child, "name") or field_of(child, "declarator")
         if default is not None and name is not None:
             found[text(name)] = text(default)
     return found

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from nodl.infer.cpp.syntax import Node, text, walk
+from nodl.infer.cpp.syntax import Node, field_of, text, walk
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _READING = frozenset({
@@ -45,46 +45,46 @@ def writes_of(node: Node) -> Writes:
 
 def _replaced(node: Node) -> set[str]:
     if node.type == "assignment_expression":
-        return _in(node.child_by_field_name("left"))
-    callee = node.child_by_field_name("function") if node.type == "call_expression" else None
-    if callee is not None and text(callee.child_by_field_name("field")) in ("reset", "swap"):
-        return _in(callee.child_by_field_name("argument"))
+        return _in(field_of(node, "left"))
+    callee = field_of(node, "function") if node.type == "call_expression" else None
+    if callee is not None and text(field_of(callee, "field")) in ("reset", "swap"):
+        return _in(field_of(callee, "argument"))
     return set()
 
 
 def _words_of(node: Node) -> set[str]:
     """The variables that ``node`` itself may change."""
     if node.type == "assignment_expression":
-        return _in(node.child_by_field_name("left"))
+        return _in(field_of(node, "left"))
     if node.type == "update_expression":
-        return _in(node.child_by_field_name("argument"))
-    if node.type == "binary_expression" and text(node.child_by_field_name("operator")) == ">>":
-        return _in(node.child_by_field_name("right"))
+        return _in(field_of(node, "argument"))
+    if node.type == "binary_expression" and text(field_of(node, "operator")) == ">>":
+        return _in(field_of(node, "right"))
     if node.type == "call_expression":
         return _called(node)
     if node.type in ("for_range_loop", "declaration") and _is_alias(node):
-        return _in(node.child_by_field_name("right")) or _in(node.child_by_field_name("declarator"))
+        return _in(field_of(node, "right")) or _in(field_of(node, "declarator"))
     return set()
 
 
 def _called(node: Node) -> set[str]:
-    callee = node.child_by_field_name("function")
-    arguments = node.child_by_field_name("arguments")
+    callee = field_of(node, "function")
+    arguments = field_of(node, "arguments")
     given = arguments.named_children if arguments is not None else []
     found: set[str] = set()
     for each in given:  # an argument may be a reference
         if each.type in ("identifier", "field_expression", "pointer_expression", "subscript_expression"):
             found |= _in(each)
     if callee is not None and callee.type == "field_expression":
-        name = text(callee.child_by_field_name("field"))
+        name = text(field_of(callee, "field"))
         if name not in _READING:
-            found |= _in(callee.child_by_field_name("argument"))
+            found |= _in(field_of(callee, "argument"))
     return found
 
 
 def _is_alias(node: Node) -> bool:
     """A reference or pointer that is not to a constant."""
-    return "const" not in text(node.child_by_field_name("type")) and any(
+    return "const" not in text(field_of(node, "type")) and any(
         each.type in ("reference_declarator", "pointer_declarator")
         or (each.type == "init_declarator" and text(each)[:1] in "&*")
         for each in node.named_children

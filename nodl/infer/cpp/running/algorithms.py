@@ -11,7 +11,7 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import is_written_back
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, unknown
-from nodl.infer.cpp.syntax import Node
+from nodl.infer.cpp.syntax import Node, field_of
 
 _BY_ARGUMENT = re.compile(
     r"for_each(?:_n)?|transform|(?:stable_|partial_)?sort|reverse|rotate|shuffle|fill(?:_n)?|generate(?:_n)?|copy(?:_if|_n)?|"
@@ -45,7 +45,7 @@ def _callable(run: Machine, atom: Obj) -> bool:
 
 def _writes(run: Machine, atom: object) -> bool:
     if isinstance(atom, Lambda):
-        declarator = atom.node.child_by_field_name("declarator")
+        declarator = field_of(atom.node, "declarator")
         given = [p.name for p in parameters_of(declarator) if is_written_back(p)] if declarator else []
         return bool(given) and not writes_of(atom.node).changed.isdisjoint(given)
     if isinstance(atom, Bound):

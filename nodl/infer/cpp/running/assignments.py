@@ -28,7 +28,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import current_object, declared_type, static_by_name, static_member
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 from nodl.name_template import UnknownPart
 
 
@@ -37,8 +37,8 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     """Writes to the left side and gives what was written, before a number took the type of that side."""
     from nodl.infer.cpp.running.operators import has_text
 
-    left, operator = node.child_by_field_name("left"), text(node.child_by_field_name("operator"))
-    right = node.child_by_field_name("right")
+    left, operator = field_of(node, "left"), text(field_of(node, "operator"))
+    right = field_of(node, "right")
     if left is None:
         return BOTTOM
     misread = next((child for child in node.children if child.is_error), None)
@@ -186,13 +186,13 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
     elif inner.type == "subscript_expression":
         _assign_element(run, inner, value, frame)
     elif inner.type == "pointer_expression":
-        argument = inner.child_by_field_name("argument")
+        argument = field_of(inner, "argument")
         if argument is not None:
             _through_pointer(run, argument, value, frame)
             assign(run, argument, value, frame)
     elif inner.type == "conditional_expression":
         for side in ("consequence", "alternative"):
-            target_side = inner.child_by_field_name(side)
+            target_side = field_of(inner, side)
             if target_side is not None:
                 assign(run, target_side, join(run.evaluate(target_side, frame), value), frame)
     elif inner.type == "call_expression":
@@ -203,9 +203,9 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
     """``f() = x``: an option or element of a known library; else what is written is not known."""
     from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
 
-    function = call.child_by_field_name("function")
-    name = text(function.child_by_field_name("field")) if function is not None else ""
-    owner = function.child_by_field_name("argument") if function is not None else None
+    function = field_of(call, "function")
+    name = text(field_of(function, "field"))
+    owner = field_of(function, "argument")
     holders = run.evaluate(owner, frame) if owner is not None else BOTTOM
     models = [LIBRARY_METHODS.get((atom.type.name, name)) for atom in holders if isinstance(atom, Obj)]
     if models and all(models):
@@ -221,7 +221,7 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
 def _gives_reference(run: Machine, callee: Node | None) -> bool:
     """Whether a function of the program gives a reference."""
     listed = run.names.functions_by_name.get(text(callee).partition("<")[0].rpartition("::")[2], ())
-    declarators = [each.node.child_by_field_name("declarator") for each in listed]
+    declarators = [field_of(each.node, "declarator") for each in listed]
     return any(each is not None and each.type == "reference_declarator" for each in declarators)
 
 
@@ -285,8 +285,8 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
 
 
 def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
-    owners = run.evaluate(node.child_by_field_name("argument"), frame)
-    name = text(node.child_by_field_name("field")).rpartition("::")[2]
+    owners = run.evaluate(field_of(node, "argument"), frame)
+    name = text(field_of(node, "field")).rpartition("::")[2]
     objects = [atom for atom in owners if isinstance(atom, Obj)]
     if is_plain(value) and re.search(r"->second\.", text(node)) and not objects:
         through(run, node, frame)
@@ -303,10 +303,10 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
 
 def _assign_half(run: Machine, node: Node, owners: Value, name: str, value: Value, frame: Frame) -> None:
     """``pair.first = x``; through an iterator it is not known whose entry is written."""
-    argument = node.child_by_field_name("argument")
+    argument = field_of(node, "argument")
     if not is_plain(value):
         return
-    if argument is None or text(node.child_by_field_name("operator")) == "->":
+    if argument is None or text(field_of(node, "operator")) == "->":
         through(run, node, frame)
         return
     halves = [
@@ -318,8 +318,8 @@ def _assign_half(run: Machine, node: Node, owners: Value, name: str, value: Valu
 
 
 def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> None:
-    container = node.child_by_field_name("argument")
-    keys = [run.evaluate(child, frame) for child in children(node.child_by_field_name("indices"))]
+    container = field_of(node, "argument")
+    keys = [run.evaluate(child, frame) for child in children(field_of(node, "indices"))]
     if container is None:
         return
     found: list[Value] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.syntax import Node, text
+from nodl.infer.cpp.syntax import Node, field_of, text
 
 
 def callee_name(callee: Node) -> str:
@@ -29,13 +29,9 @@ def types_of(run: Machine, callee: Node, frame: Frame) -> list[Type]:
 def _template_arguments(node: Node | None) -> list[Node]:
     """Those of ``f<A, B>`` and ``x.f<A>`` and ``a::f<A>``."""
     while node is not None and node.type in ("field_expression", "qualified_identifier", "dependent_name"):
-        inner = node.child_by_field_name("field") or node.child_by_field_name("name")
+        inner = field_of(node, "field") or field_of(node, "name")
         node = inner if inner is not None else (node.named_children[0] if node.named_children else None)
-    listed = (
-        node.child_by_field_name("arguments")
-        if node is not None and node.type.startswith("template_")
-        else None
-    )
+    listed = field_of(node, "arguments") if node is not None and node.type.startswith("template_") else None
     return [child for child in listed.named_children if child.type != "comment"] if listed is not None else []
 
 

@@ -23,16 +23,16 @@ from nodl.infer.cpp.running.standard import CASTS, STANDARD, may_write
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, join, unknown
 from nodl.infer.cpp.running.variables import current_object, member, variable
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 
 @expression("call_expression")
 def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     """Calls a method on an object, something by its name, or else whatever the callee evaluates to."""
-    callee = unwrapped(node.child_by_field_name("function"))
+    callee = unwrapped(field_of(node, "function"))
     if callee is None:
         return unknown("a call")
-    arguments = node.child_by_field_name("arguments")
+    arguments = field_of(node, "arguments")
     if callee.type == "field_expression":
         return method_call(run, node, callee, children(arguments), frame)
     if callee.type in (

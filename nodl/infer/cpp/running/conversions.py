@@ -13,7 +13,7 @@ from nodl.infer.cpp.running.assignments import object_class
 from nodl.infer.cpp.running.invocation import call_methods
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.values import Obj, Value, join, unknown
-from nodl.infer.cpp.syntax import Node, text
+from nodl.infer.cpp.syntax import Node, field_of, text
 
 _BRACKETS = ("parenthesized_expression", "condition_clause")
 _CONDITIONS = ("if_statement", "while_statement", "do_statement", "for_statement", "conditional_expression")
@@ -61,10 +61,10 @@ def _operators(run: Machine, cls: Class) -> dict[str, list[Function]]:
 
 def _is_condition(place: Node, inner: Node) -> bool:
     if place.type in _CONDITIONS:
-        return place.child_by_field_name("condition") == inner
+        return field_of(place, "condition") == inner
     if place.type == "declaration":  # if (auto x = ...)
         return place.parent is not None and place.parent.type == "condition_clause"
-    sign = text(place.child_by_field_name("operator"))
+    sign = text(field_of(place, "operator"))
     return sign in (("!", "not") if place.type == "unary_expression" else ("&&", "||", "and", "or"))
 
 
@@ -96,9 +96,9 @@ def _stays(run: Machine, cls: Class, place: Node, inner: Node, frame: Frame) -> 
     if place.type == "pointer_expression":
         return text(place).startswith("&")
     if place.type == "assignment_expression":
-        return place.child_by_field_name("left") == inner
+        return field_of(place, "left") == inner
     if place.type == "init_declarator":
-        written = text(place.parent.child_by_field_name("type")) if place.parent is not None else ""
+        written = text(field_of(place.parent, "type")) if place.parent is not None else ""
         kind = run.type_of(written, frame)
         return "auto" in written.split() or run.names.class_of(kind, frame.scope, frame.file) is cls
     if place.type == "binary_expression":
@@ -113,7 +113,7 @@ def _stays(run: Machine, cls: Class, place: Node, inner: Node, frame: Frame) -> 
 
 def _as_parameter(run: Machine, cls: Class, place: Node, inner: Node) -> bool:
     """Whether every function of that name in reach takes an object of the class there."""
-    callee = place.parent.child_by_field_name("function") if place.parent is not None else None
+    callee = field_of(place.parent, "function") if place.parent is not None else None
     listed = run.names.functions_by_name.get(text(callee).rpartition("::")[2], ())
     position = place.named_children.index(inner)
     kinds = [each.parameters[position].type for each in listed if position < len(each.parameters)]

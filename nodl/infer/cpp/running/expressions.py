@@ -14,7 +14,7 @@ from nodl.infer.cpp.running.own_operators import by_operator
 from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
 from nodl.infer.cpp.running.variables import variable
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
 
 _ESCAPES = {"n": "\n", "t": "\t", "\\": "\\", '"': '"', "'": "'", "0": "\0", "r": "\r"}
 
@@ -158,7 +158,7 @@ def initializer_list(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("initializer_pair")
 def initializer_pair(run: Machine, node: Node, frame: Frame) -> Value:
     """Of ``.field = value`` the value; who fills an aggregate reads the field."""
-    return run.evaluate(node.child_by_field_name("value"), frame)
+    return run.evaluate(field_of(node, "value"), frame)
 
 
 @expression("argument_list")
@@ -175,17 +175,17 @@ def argument_list(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("compound_literal_expression")
 def compound_literal(run: Machine, node: Node, frame: Frame) -> Value:
     """``Foo{...}``: what the items in the braces make of the type."""
-    kind = run.type_of(text(node.child_by_field_name("type")), frame)
-    return made(run, node, kind, children(node.child_by_field_name("value")), frame)
+    kind = run.type_of(text(field_of(node, "type")), frame)
+    return made(run, node, kind, children(field_of(node, "value")), frame)
 
 
 @expression("new_expression")
 def new(run: Machine, node: Node, frame: Frame) -> Value:
     """``new Foo(...)``: what its constructor makes, on the heap, so that assigning it copies nothing."""
-    kind = run.type_of(text(node.child_by_field_name("type")), frame)
-    given = children(node.child_by_field_name("arguments"))
+    kind = run.type_of(text(field_of(node, "type")), frame)
+    given = children(field_of(node, "arguments"))
     values = [run.evaluate(child, frame) for child in given]
-    if kind.name in SIZES and node.child_by_field_name("declarator") is not None:
+    if kind.name in SIZES and field_of(node, "declarator") is not None:
         return unknown("an array of numbers")
     found = construct(run, kind._replace(pointer=False), values, node, frame, heap=True)
     keep_references(run, found, given, frame)
@@ -195,7 +195,7 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("sizeof_expression")
 def size_of(run: Machine, node: Node, frame: Frame) -> Value:
     """The bytes of a fundamental type on 64 bit Linux; unknown for any other operand."""
-    size = SIZES.get(text(node.child_by_field_name("type") or node.child_by_field_name("value")).strip("() "))
+    size = SIZES.get(text(field_of(node, "type") or field_of(node, "value")).strip("() "))
     return unknown("a size") if size is None else (size,)
 
 
@@ -213,8 +213,8 @@ def nothing_known(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("cast_expression")
 def c_cast(run: Machine, node: Node, frame: Frame) -> Value:
     """``(T) x``, converted like ``static_cast<T>(x)``."""
-    kind = run.type_of(text(node.child_by_field_name("type")), frame)
-    return cast(run, kind, run.evaluate(node.child_by_field_name("value"), frame))
+    kind = run.type_of(text(field_of(node, "type")), frame)
+    return cast(run, kind, run.evaluate(field_of(node, "value"), frame))
 
 
 @expression("lambda_expression")
@@ -228,7 +228,7 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
     outer: Frame | None = frame
     while outer is not None:
         outer.captured, outer = True, outer.outer
-    captures = children(node.child_by_field_name("captures"))
+    captures = children(field_of(node, "captures"))
     for child in captures:
         if child.type == "lambda_capture_initializer" and len(children(child)) >= 2:
             named = children(child)
@@ -237,7 +237,7 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         owners = {name: frame.owner_of(name) for name in words_of(node)}
         inner.kept = {name: owner for name, owner in owners.items() if owner is not None}
     names = {text(child) for child in captures if child.type == "identifier" and not _is_by_reference(child)}
-    if "=" in {text(child) for child in captures} | {text(node.child_by_field_name("captures"))[1:2]}:
+    if "=" in {text(child) for child in captures} | {text(field_of(node, "captures"))[1:2]}:
         names |= set(words_of(node))
     for name in sorted(names):
         owner = frame.owner_of(name)

@@ -15,7 +15,7 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.callees import callee_name, types_of
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
 
 
 def cell_of(run: Machine, owner: Obj, name: str, seen: Class | None) -> str:
@@ -50,13 +50,13 @@ def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Fra
     """
     if atom.cls is None:
         return None
-    head = text(access.child_by_field_name("field")).rpartition("::")[0]
+    head = text(field_of(access, "field")).rpartition("::")[0]
     if head:
         named = run.names.class_of(run.type_of(head, frame), frame.scope, frame.file)
         return next((c for c in run.names.ancestry(atom.cls) if c is named or c.name == head), atom.cls)
     if name not in hidden(run.names, atom.cls):
         return atom.cls
-    argument = access.child_by_field_name("argument")
+    argument = field_of(access, "argument")
     seen = seen_class(run, argument, frame)
     if seen is None:
         what = f"which {name} of {text(argument)[:40]} is meant is not known: a derived class hides it"
@@ -70,11 +70,11 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     if node is None:
         return NO_TYPE
     if node.type == "pointer_expression":
-        return seen_type(run, node.child_by_field_name("argument"), frame)
+        return seen_type(run, field_of(node, "argument"), frame)
     if node.type in ("compound_literal_expression", "new_expression", "cast_expression"):
-        return run.type_of(text(node.child_by_field_name("type")), frame)
+        return run.type_of(text(field_of(node, "type")), frame)
     if node.type == "subscript_expression":
-        return element_type(seen_type(run, node.child_by_field_name("argument"), frame))
+        return element_type(seen_type(run, field_of(node, "argument"), frame))
     if node.type == "this":
         return _of_this(run, frame)
     if node.type == "field_expression":
@@ -98,8 +98,8 @@ def _of_this(run: Machine, frame: Frame) -> Type:
 
 
 def _of_member(run: Machine, node: Node, frame: Frame) -> Type:
-    owner = seen_class(run, node.child_by_field_name("argument"), frame)
-    name = text(node.child_by_field_name("field"))
+    owner = seen_class(run, field_of(node, "argument"), frame)
+    name = text(field_of(node, "field"))
     for each in run.names.ancestry(owner) if owner is not None else ():
         if name in each.fields:
             kind = run.names.resolve(each.fields[name].type, each.scope, each.file)
@@ -115,16 +115,16 @@ _GIVES_ELEMENT = frozenset({"at", "front", "back", "top"})
 
 
 def _of_call(run: Machine, node: Node, frame: Frame) -> Type:
-    callee = unwrapped(node.child_by_field_name("function"))
+    callee = unwrapped(field_of(node, "function"))
     if callee is None:
         return NO_TYPE
     if callee.type == "field_expression":
-        inner = seen_type(run, callee.child_by_field_name("argument"), frame)
-        name = callee_name(callee.child_by_field_name("field") or callee)
+        inner = seen_type(run, field_of(callee, "argument"), frame)
+        name = callee_name(field_of(callee, "field") or callee)
         if name in _GIVES_INNER | _GIVES_ELEMENT:
             return inner if name in _GIVES_INNER else element_type(inner)
         return _returned(run, inner, name, frame)
-    name, given = callee_name(callee), children(node.child_by_field_name("arguments"))
+    name, given = callee_name(callee), children(field_of(node, "arguments"))
     if name in _KEEPS and given:
         return seen_type(run, given[0], frame)
     if re.search(r"_cast$|(?:^|::)make_(?:shared|unique)$", name):
@@ -166,9 +166,6 @@ def _initialised(run: Machine, name: str, around: Node, frame: Frame) -> Type:
         if each.type == "declaration":
             values = [value for declared, value, *_ in declared_names(each) if declared == name]
             found |= {seen_type(run, value, frame) for value in values}
-        elif (
-            each.type == "for_range_loop"
-            and text(each.child_by_field_name("declarator")).lstrip("& *") == name
-        ):
-            found.add(element_type(seen_type(run, each.child_by_field_name("right"), frame)))
+        elif each.type == "for_range_loop" and text(field_of(each, "declarator")).lstrip("& *") == name:
+            found.add(element_type(seen_type(run, field_of(each, "right"), frame)))
     return found.pop() if len(found) == 1 else NO_TYPE

@@ -19,7 +19,7 @@ from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.running.written_back import write_back
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 
 def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame) -> Value:
@@ -39,7 +39,7 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             inner, fixed = atom.data["partial"]
             found.append(call_values(run, inner, _placed(fixed, values), node, frame))
         else:
-            name = text(node.child_by_field_name("function"))[:60]
+            name = text(field_of(node, "function"))[:60]
             if "*" in name and ("->*" in name or ".*" in name):
                 run.gap(node, frame, f"which method {name} is is not known; it may make interfaces")
             handed_over(run, f"{name}()", values, node, frame)
@@ -86,19 +86,19 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     )  # fmt: skip
     inner = run.frame((atom, inner.path), inner)
     inner.active, inner.mark = True, run.store.mark()
-    declarator = atom.node.child_by_field_name("declarator")
+    declarator = field_of(atom.node, "declarator")
     for index, parameter in enumerate(parameters_of(declarator) if declarator is not None else ()):
         value = values[index] if index < len(values) else unknown(f"the argument {parameter.name}")
         run.local(
             inner, parameter.name, as_parameter(run, parameter, value, atom.node, inner), parameter.type
         )
-    body = atom.node.child_by_field_name("body")
+    body = field_of(atom.node, "body")
     outcome = run.execute(body, inner) if body is not None else NEXT
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     inner.active = False
     given = parameters_of(declarator) if declarator is not None else []
     left = {p.name: run.store.get((inner, p.name)) for p in given if is_written_back(p)}
-    if left and len(children(node.child_by_field_name("arguments"))) == len(values):
+    if left and len(children(field_of(node, "arguments"))) == len(values):
         write_back(run, given, left, node, frame)
     return inner.returned
 
@@ -283,7 +283,7 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
 
 def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
     """What a function gives back, of an object of a derived class what the type it returns has of it."""
-    declarator = function.node.child_by_field_name("declarator")
+    declarator = field_of(function.node, "declarator")
     if declarator is None or declarator.type != "function_declarator":
         return inner.returned  # a reference or pointer
     if not any(isinstance(atom, Obj) and atom.cls is not None and atom.cls.bases for atom in inner.returned):
@@ -324,12 +324,12 @@ def _class_bindings(run: Machine, function: Function, this_object: Obj) -> dict[
 def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -> dict[str, Type]:
     """``T`` of a parameter ``std::list<T> &``, from the container that is given."""
     bound: dict[str, Type] = {}
-    given = children(node.child_by_field_name("arguments")) if function.templates else []
+    given = children(field_of(node, "arguments")) if function.templates else []
     for parameter, argument in zip(function.parameters, given, strict=False):
         match = re.search(r"<\s*(\w+)\s*>", parameter.type)
         target = unwrapped(argument)
         if target is not None and target.type == "pointer_expression":
-            target = target.child_by_field_name("argument")
+            target = field_of(target, "argument")
         if match is None or match[1] not in function.templates or target is None:
             continue
         written = declared_type(run, target, frame)

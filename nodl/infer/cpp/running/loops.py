@@ -14,7 +14,7 @@ from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import elements_written
 from nodl.infer.cpp.running.statements import bind_names, condition_value, in_a_block
 from nodl.infer.cpp.running.values import Value, join, unknown
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
 
 MAX_UNROLLED = 64
 MAX_ROUNDS = 3
@@ -24,11 +24,11 @@ MAX_ROUNDS = 3
 @in_a_block
 def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     """One turn for each item; each turn may also be left out where the items are not exactly known."""
-    right = node.child_by_field_name("right")
+    right = field_of(node, "right")
     subject = run.evaluate(right, frame)
     items, exact = iterated(run, subject, node, frame)
-    body = node.child_by_field_name("body")
-    declarator = node.child_by_field_name("declarator")
+    body = field_of(node, "body")
+    declarator = field_of(node, "declarator")
     written = type_text(node)
 
     def bind(item: Value) -> None:
@@ -112,36 +112,26 @@ def _iteration(run: Machine, body: Node, frame: Frame, start: int, breaks: list[
 @in_a_block
 def for_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Runs like ``while``; with an iterator up to ``end()``, one turn for each element of the container."""
-    initializer = node.child_by_field_name("initializer")
+    initializer = field_of(node, "initializer")
     iterator = _iterator(node)
     if iterator is not None:
         return _over_iterator(run, node, *iterator, frame)
     if initializer is not None:
         run.execute(initializer, frame)
-    return _counted(
-        run, node, frame, node.child_by_field_name("condition"), node.child_by_field_name("update")
-    )
+    return _counted(run, node, frame, field_of(node, "condition"), field_of(node, "update"))
 
 
 def _iterator(node: Node) -> tuple[str, Node] | None:
     """Variable and container of ``for (auto it = c.begin(); it != c.end(); ++it)``."""
-    condition = unwrapped(node.child_by_field_name("condition"))
+    condition = unwrapped(field_of(node, "condition"))
     if condition is None or condition.type != "binary_expression":
         return None
-    right = condition.child_by_field_name("right")
-    callee = (
-        right.child_by_field_name("function")
-        if right is not None and right.type == "call_expression"
-        else None
-    )
-    if (
-        callee is None
-        or callee.type != "field_expression"
-        or text(callee.child_by_field_name("field")) not in _ENDINGS
-    ):
+    right = field_of(condition, "right")
+    callee = field_of(right, "function") if right is not None and right.type == "call_expression" else None
+    if callee is None or callee.type != "field_expression" or text(field_of(callee, "field")) not in _ENDINGS:
         return None
-    container = callee.child_by_field_name("argument")
-    left = condition.child_by_field_name("left")
+    container = field_of(callee, "argument")
+    left = field_of(condition, "left")
     return (
         (text(left), container)
         if container is not None and left is not None and left.type == "identifier"
@@ -155,8 +145,8 @@ _ENDINGS = frozenset({"end", "cend", "rend", "crend"})
 def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: Frame) -> int:
     """The iterator stands for the element that it points to."""
     items, exact = iterated(run, run.evaluate(container, frame), node, frame)
-    exact = exact and node.child_by_field_name("update") is not None
-    body = node.child_by_field_name("body")
+    exact = exact and field_of(node, "update") is not None
+    body = field_of(node, "body")
     return _over(run, body, [partial(run.local, frame, name, item) for item in items], exact, frame)
 
 
@@ -164,12 +154,12 @@ def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: 
 @in_a_block
 def while_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Turn by turn while its condition is decided; else, as for ``while (true)``, to a fixpoint."""
-    return _counted(run, node, frame, node.child_by_field_name("condition"), None)
+    return _counted(run, node, frame, field_of(node, "condition"), None)
 
 
 def _counted(run: Machine, node: Node, frame: Frame, condition: Node | None, update: Node | None) -> int:
     """As often as the condition is certainly true; after that any number of times."""
-    body = node.child_by_field_name("body")
+    body = field_of(node, "body")
     if body is None:
         return NEXT
     start = run.store.mark()
@@ -239,13 +229,13 @@ def _repeated(
 @statement("do_statement")
 def do_statement(run: Machine, node: Node, frame: Frame) -> int:
     """The body once, then any number of times unless it left or the condition is certainly false."""
-    body = node.child_by_field_name("body")
+    body = field_of(node, "body")
     start = run.store.mark()
     breaks: list[Changes] = []
     if body is None:
         return NEXT
     outcome = _iteration(run, body, frame, start, breaks)
-    condition = node.child_by_field_name("condition")
+    condition = field_of(node, "condition")
     if outcome & NEXT and condition_value(run, unwrapped(condition), frame) is not False:
         outcome |= _repeated(run, body, None, unwrapped(condition), frame, start, breaks)
     run.settle(start, breaks, bool(outcome & NEXT))

@@ -34,7 +34,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type, member
-from nodl.infer.cpp.syntax import Node, text, unwrapped
+from nodl.infer.cpp.syntax import Node, field_of, text, unwrapped
 
 
 def is_library_method(this_object: Obj, name: str) -> bool:
@@ -49,13 +49,13 @@ def is_library_method(this_object: Obj, name: str) -> bool:
 
 def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame: Frame) -> Value:
     """``x.f(...)`` for each thing that ``x`` may be, results joined; ``BOTTOM`` where ``x`` holds nothing."""
-    receiver_node = callee.child_by_field_name("argument")
-    field = unwrapped(callee.child_by_field_name("field"))
+    receiver_node = field_of(callee, "argument")
+    field = unwrapped(field_of(callee, "field"))
     name = callee_name(field) if field is not None else ""
     if field is not None and field.type == "qualified_identifier":
         name = name.rpartition("::")[2]
     receiver = run.evaluate(receiver_node, frame)
-    if text(callee.child_by_field_name("operator")) == "->":
+    if text(field_of(callee, "operator")) == "->":
         receiver = pointed_to(run, receiver, "operator->", callee, frame)
     if (
         name in ("get", "lock", "value", "release")
@@ -161,12 +161,8 @@ def on_object(
     """A method of one object: its source, else a closure in a member, else the tables, else unknown code."""
     types = types_of(run, callee, frame)
     if atom.cls is not None:
-        argument = callee.child_by_field_name("argument")
-        own = (
-            argument is not None
-            and argument.type == "this"
-            and "::" not in text(callee.child_by_field_name("field"))
-        )
+        argument = field_of(callee, "argument")
+        own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
         seen = None if own else class_of_member(run, atom, name, callee, frame)
         methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name, frame)
         if methods:

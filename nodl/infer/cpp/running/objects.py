@@ -28,7 +28,7 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, children, text
+from nodl.infer.cpp.syntax import Node, children, field_of, text
 
 SEQUENCES = frozenset({
     "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
@@ -94,7 +94,7 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
 
 def _gives_iterator(value: Node) -> bool:
     """``x.find(...)``, ``std::find_if(...)``: the element itself, seen through an iterator."""
-    callee = text(value.child_by_field_name("function")) if value.type == "call_expression" else ""
+    callee = text(field_of(value, "function")) if value.type == "call_expression" else ""
     return _ITERATORS.search(callee) is not None
 
 
@@ -267,8 +267,8 @@ def _aggregate(
     for position, item in enumerate(given):
         name, value = names[position] if position < len(names) else "", item
         if item.type == "initializer_pair":
-            designator = item.child_by_field_name("designator")
-            name, value = text(designator).lstrip("."), item.child_by_field_name("value") or item
+            designator = field_of(item, "designator")
+            name, value = text(designator).lstrip("."), field_of(item, "value") or item
         if name:
             member = cls.fields.get(name)
             inner = run.names.resolve(member.type, cls.scope, cls.file, bindings) if member else NO_TYPE

@@ -34,16 +34,16 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import current_object, member
-from nodl.infer.cpp.syntax import Node, children, text
+from nodl.infer.cpp.syntax import Node, children, field_of, text
 
 
 @expression("field_expression")
 def field(run: Machine, node: Node, frame: Frame) -> Value:
     """``x.f`` or ``x->f``: a member of an object, ``first`` or ``second`` of a pair; unknown for all else."""
-    owners = run.evaluate(node.child_by_field_name("argument"), frame)
-    if text(node.child_by_field_name("operator")) == "->":
+    owners = run.evaluate(field_of(node, "argument"), frame)
+    if text(field_of(node, "operator")) == "->":
         owners = pointed_to(run, owners, "operator->", node, frame)
-    name = text(node.child_by_field_name("field")).rpartition("::")[2]
+    name = text(field_of(node, "field")).rpartition("::")[2]
     found: list[Value] = []
     for atom in owners:
         if isinstance(atom, Obj):
@@ -62,8 +62,8 @@ def field(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("binary_expression")
 def binary(run: Machine, node: Node, frame: Frame) -> Value:
     """``a && b`` with ``b`` run only where it may be, arithmetic, comparisons, joined texts, streams."""
-    operator = text(node.child_by_field_name("operator"))
-    left_node, right_node = node.child_by_field_name("left"), node.child_by_field_name("right")
+    operator = text(field_of(node, "operator"))
+    left_node, right_node = field_of(node, "left"), field_of(node, "right")
     left = run.evaluate(left_node, frame)
     if operator in ("&&", "||", "and", "or") and not _is_own(run, operator, left):
         return _logical(run, operator in ("||", "or"), left, right_node, frame)
@@ -171,7 +171,7 @@ def _streamed(
         found = concatenated(left, pieces) if right else left
     inner = target
     while inner is not None and inner.type == "binary_expression":
-        inner = inner.child_by_field_name("left")
+        inner = field_of(inner, "left")
     if inner is not None and inner.type in ("identifier", "field_expression", "field_identifier"):
         assign(run, inner, found, frame)
     return found
@@ -194,8 +194,8 @@ def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | Non
 @expression("unary_expression")
 def unary(run: Machine, node: Node, frame: Frame) -> Value:
     """``!x``, ``-x`` and ``+x``; unknown for other operators and for what cannot be computed."""
-    operator = text(node.child_by_field_name("operator"))
-    value = run.evaluate(node.child_by_field_name("argument"), frame)
+    operator = text(field_of(node, "operator"))
+    value = run.evaluate(field_of(node, "argument"), frame)
     own = by_operator(run, operator, value, [], node, frame)
     if own is not None:
         return own
@@ -210,7 +210,7 @@ def unary(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("pointer_expression")
 def pointer(run: Machine, node: Node, frame: Frame) -> Value:
     """``&x`` and ``*x`` are ``x``; ``&Foo::f`` is the method, ``&text[i]`` is unknown."""
-    argument = node.child_by_field_name("argument")
+    argument = field_of(node, "argument")
     if text(node).startswith("&") and argument is not None and argument.type == "qualified_identifier":
         found = method_pointer(run, argument, frame)
         if found is not None:
@@ -235,8 +235,8 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
 @expression("conditional_expression")
 def conditional(run: Machine, node: Node, frame: Frame) -> Value:
     """``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
-    known = truth(run.evaluate(node.child_by_field_name("condition"), frame))
-    sides = {True: node.child_by_field_name("consequence"), False: node.child_by_field_name("alternative")}
+    known = truth(run.evaluate(field_of(node, "condition"), frame))
+    sides = {True: field_of(node, "consequence"), False: field_of(node, "alternative")}
     if known is not None:
         other = sides[not known]
         if other is not None:
@@ -255,7 +255,7 @@ def conditional(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("update_expression")
 def update(run: Machine, node: Node, frame: Frame) -> Value:
     """``++x`` or ``x--``; an ``x`` that was not one known integer becomes unknown."""
-    argument = node.child_by_field_name("argument")
+    argument = field_of(node, "argument")
     before = run.evaluate(argument, frame)
     own = by_operator(run, "++" if "++" in text(node) else "--", before, [], node, frame)
     if own is not None:
@@ -270,9 +270,9 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("subscript_expression")
 def subscript(run: Machine, node: Node, frame: Frame) -> Value:
     """``container[key]`` for all that the container may be; unknown where nothing is found."""
-    container = node.child_by_field_name("argument")
+    container = field_of(node, "argument")
     held = run.evaluate(container, frame)
-    keys = [run.evaluate(child, frame) for child in children(node.child_by_field_name("indices"))]
+    keys = [run.evaluate(child, frame) for child in children(field_of(node, "indices"))]
     own = by_operator(run, "[]", held, keys, node, frame)
     if own is not None:
         return own

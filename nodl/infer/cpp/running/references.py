@@ -13,7 +13,7 @@ from nodl.infer.cpp.running.hiding import cell_of, lexical_class
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Param, Seq, Text, Value
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
 
 
 def is_plain(value: Value) -> bool:
@@ -33,7 +33,7 @@ def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, fra
     if kind.endswith("*"):
         if target.type != "pointer_expression":
             return
-        target = unwrapped(target.child_by_field_name("argument"))
+        target = unwrapped(field_of(target, "argument"))
     if target is not None and _is_fixed(target):
         frame.aliases[name] = target
     elif (
@@ -46,13 +46,13 @@ def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, fra
 def _is_fixed(target: Node) -> bool:
     """An expression that means the same variable wherever it stands."""
     if target.type == "subscript_expression":
-        listed = children(target.child_by_field_name("indices"))
-        inner = target.child_by_field_name("argument")
+        listed = children(field_of(target, "indices"))
+        inner = field_of(target, "argument")
         return (
             all(each.type.endswith("_literal") for each in listed) and inner is not None and _is_fixed(inner)
         )
     if target.type == "field_expression":
-        inner = target.child_by_field_name("argument")
+        inner = field_of(target, "argument")
         return inner is not None and (inner.type == "this" or _is_fixed(inner))
     return target.type in ("identifier", "qualified_identifier")
 
@@ -81,7 +81,7 @@ def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Fra
     for each in given if held else ():
         target = unwrapped(each)
         if target is not None and target.type == "pointer_expression":
-            target = unwrapped(target.child_by_field_name("argument"))
+            target = unwrapped(field_of(target, "argument"))
         cell = (
             cell_of_name(run, text(target), frame)
             if target is not None and target.type == "identifier"

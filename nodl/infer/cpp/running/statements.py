@@ -21,7 +21,7 @@ from nodl.infer.cpp.running.machine import (
 from nodl.infer.cpp.running.objects import declared_value
 from nodl.infer.cpp.running.references import bind_reference
 from nodl.infer.cpp.running.values import BOTTOM, Group, Value, join, truth, unknown
-from nodl.infer.cpp.syntax import Node, children, parse_expression, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
 
 
 def in_a_block(handler: StatementHandler) -> StatementHandler:
@@ -96,7 +96,7 @@ def expression_statement(run: Machine, node: Node, frame: Frame) -> int:
     for child in children(node):
         run.left = None
         run.evaluate(child, frame)
-        ends = child.type == "call_expression" and text(child.child_by_field_name("function")) in _ENDS
+        ends = child.type == "call_expression" and text(field_of(child, "function")) in _ENDS
         if ends or run.left == child.id:
             return RETURN
     return NEXT
@@ -150,13 +150,13 @@ class _Switch(Loop):
 @in_a_block
 def if_statement(run: Machine, node: Node, frame: Frame) -> int:
     """The side that the condition chooses, the other one dead; both, joined, if that is not decided."""
-    condition = node.child_by_field_name("condition")
+    condition = field_of(node, "condition")
     for child in children(condition):
         if child.type in ("init_statement", "declaration"):
             for inner in children(child) if child.type == "init_statement" else [child]:
                 run.execute(inner, frame)
     value = condition_value(run, condition, frame)
-    then, other = node.child_by_field_name("consequence"), node.child_by_field_name("alternative")
+    then, other = field_of(node, "consequence"), field_of(node, "alternative")
     if value is True and other is not None:
         run.kill(other, frame, f"the condition {text(condition)[:60]} is always true")
     if value is False and then is not None:
@@ -171,10 +171,10 @@ def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool 
     """Runs a condition: certainly true or false, else ``None``, as for a condition that declares."""
     inner = condition
     if condition is not None and condition.type == "condition_clause":
-        inner = condition.child_by_field_name("value")
+        inner = field_of(condition, "value")
     if inner is not None and inner.type == "declaration":
         if run.names.has_conversions:
-            run.evaluate(inner.child_by_field_name("value"), frame)
+            run.evaluate(field_of(inner, "value"), frame)
         return None
     if inner is None:
         return None
@@ -188,8 +188,8 @@ def _running(run: Machine, node: Node | None, frame: Frame) -> Callable[[], int]
 @statement("preproc_if", "preproc_ifdef", "preproc_elif")
 def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
     """A conditional that only the build decides: either side, or neither."""
-    alternative = node.child_by_field_name("alternative")
-    head = (node.child_by_field_name("condition"), node.child_by_field_name("name"), alternative)
+    alternative = field_of(node, "alternative")
+    head = (field_of(node, "condition"), field_of(node, "name"), alternative)
     own = [child for child in children(node) if child not in head]
     sides: list[Callable[[], int]] = [lambda: sequence(run, own, frame)]
     sides.append(_running(run, alternative, frame))
@@ -200,8 +200,8 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     """The chosen case and those it falls through to; any of the cases where that is not decided."""
-    subject = condition_atoms(run, node.child_by_field_name("condition"), frame)
-    cases = [c for c in children(node.child_by_field_name("body")) if c.type == "case_statement"]
+    subject = condition_atoms(run, field_of(node, "condition"), frame)
+    cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
     chosen, certain = _chosen_cases(run, cases, subject, frame)
     if certain and _has_inner_labels(node):
         chosen, certain = list(range(len(cases))), False
@@ -225,7 +225,7 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 def _has_inner_labels(switch: Node) -> bool:
     """Whether a case of this switch stands inside of another statement of it."""
-    body = switch.child_by_field_name("body")
+    body = field_of(switch, "body")
     waiting = [inner for case in children(body) for inner in children(case) if case.type == "case_statement"]
     while waiting:
         each = waiting.pop()
@@ -237,7 +237,7 @@ def _has_inner_labels(switch: Node) -> bool:
 
 def condition_atoms(run: Machine, condition: Node | None, frame: Frame) -> Value:
     """Everything that the condition of a switch may be."""
-    inner = condition.child_by_field_name("value") if condition is not None else None
+    inner = field_of(condition, "value")
     return run.evaluate(inner if inner is not None else unwrapped(condition), frame)
 
 
@@ -245,10 +245,10 @@ def _chosen_cases(run: Machine, cases: list[Node], subject: Value, frame: Frame)
     from nodl.infer.cpp.running.values import Const
 
     known = len(subject) == 1 and isinstance(subject[0], Const | int)
-    default = [index for index, case in enumerate(cases) if case.child_by_field_name("value") is None]
+    default = [index for index, case in enumerate(cases) if field_of(case, "value") is None]
     if not known:
         return list(range(len(cases))), bool(default)
-    labels = [run.evaluate(case.child_by_field_name("value"), frame) for case in cases]
+    labels = [run.evaluate(field_of(case, "value"), frame) for case in cases]
     if any(
         len(label) != 1 or not isinstance(label[0], Const | int)
         for i, label in enumerate(labels)
@@ -263,7 +263,7 @@ def _falling(run: Machine, cases: list[Node], frame: Frame) -> Callable[[], int]
     def go() -> int:
         outcome = NEXT
         for case in cases:
-            value = case.child_by_field_name("value")
+            value = field_of(case, "value")
             result = sequence(run, [child for child in children(case) if child != value], frame)
             outcome = (outcome & ~NEXT) | result
             if not result & NEXT:
@@ -276,17 +276,17 @@ def _falling(run: Machine, cases: list[Node], frame: Frame) -> Callable[[], int]
 @statement("try_statement")
 def try_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Runs the body, and after it none or any one of the catch clauses."""
-    body = node.child_by_field_name("body")
+    body = field_of(node, "body")
     outcome = run.execute(body, frame) if body is not None else NEXT
     catches = [child for child in children(node) if child.type == "catch_clause"]
 
     def caught(clause: Node) -> Callable[[], int]:
         def go() -> int:
             for name in (n for n in walk(clause) if n.type == "parameter_declaration"):
-                declared = name.child_by_field_name("declarator")
+                declared = field_of(name, "declarator")
                 if declared is not None:
                     run.local(frame, text(declared).lstrip("&* "), unknown("an exception"))
-            inner = clause.child_by_field_name("body")
+            inner = field_of(clause, "body")
             return run.execute(inner, frame) if inner is not None else NEXT
 
         return go
@@ -330,15 +330,11 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
 def _structured(node: Node) -> tuple[Node, Node | None] | None:
     """The names of ``auto & [a, b] = value`` and the value."""
     for declarator in node.children_by_field_name("declarator"):
-        inner = (
-            declarator.child_by_field_name("declarator")
-            if declarator.type == "init_declarator"
-            else declarator
-        )
+        inner = field_of(declarator, "declarator") if declarator.type == "init_declarator" else declarator
         while inner is not None and inner.type == "reference_declarator":
             inner = children(inner)[-1]
         if inner is not None and inner.type == "structured_binding_declarator":
-            return inner, declarator.child_by_field_name("value")
+            return inner, field_of(declarator, "value")
     return None
 
 
@@ -367,12 +363,12 @@ def _static_local(
 
 def _vexing(run: Machine, node: Node, declarator: Node, written: str, frame: Frame) -> None:
     """``Listener l(buffer, this);`` reads as the declaration of a function."""
-    name = text(declarator.child_by_field_name("declarator"))
-    listed = text(declarator.child_by_field_name("parameters"))
+    name = text(field_of(declarator, "declarator"))
+    listed = text(field_of(declarator, "parameters"))
     arguments = parse_expression(f"f{listed}")
     if arguments is None or arguments.type != "call_expression":
         return
-    given = arguments.child_by_field_name("arguments")
+    given = field_of(arguments, "arguments")
     if not children(given):
         return
     found = declared_value(run, node, written, given, False, frame)
@@ -397,7 +393,7 @@ def _local_alias(run: Machine, node: Node, frame: Frame) -> None:
             return
         bound = {target.rpartition("::")[2]: run.type_of(target, frame)}
     elif node.type == "type_definition":
-        bound = {text(inner[-1]): run.type_of(text(node.child_by_field_name("type")), frame)}
+        bound = {text(inner[-1]): run.type_of(text(field_of(node, "type")), frame)}
     else:
         bound = {text(inner[0]): run.type_of(text(inner[-1]), frame)} if len(inner) > 1 else {}
     frame.bindings = {**frame.bindings, **bound}

@@ -29,7 +29,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type
-from nodl.infer.cpp.syntax import Node, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, field_of, text, unwrapped, walk
 
 
 def without_source(
@@ -96,7 +96,7 @@ def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame
     for each in given:
         target = unwrapped(each)
         if target is not None and target.type == "pointer_expression" and text(target).startswith("&"):
-            target = target.child_by_field_name("argument")
+            target = field_of(target, "argument")
         if target is None or target.type not in ("identifier", "field_expression"):
             continue
         declared = declared_type(run, target, frame)
@@ -147,7 +147,7 @@ def _variables(given: Node) -> list[Node]:
     if given.type == "lambda_expression":
         return []
     if given.type == "field_expression":  # the method of a call: its object
-        argument = given.child_by_field_name("argument")
+        argument = field_of(given, "argument")
         return _variables(argument) if argument is not None else []
     return [found for child in given.named_children for found in _variables(child)]
 
@@ -175,8 +175,8 @@ def _is_iterator(run: Machine, target: Node, frame: Frame) -> bool:
     declared = walk(owner.function.node) if owner.function is not None else ()
     return any(
         each.type == "init_declarator"
-        and text(each.child_by_field_name("declarator")) == name
-        and _RANGE.search(text(each.child_by_field_name("value"))) is not None
+        and text(field_of(each, "declarator")) == name
+        and _RANGE.search(text(field_of(each, "value"))) is not None
         for each in declared
     )
 

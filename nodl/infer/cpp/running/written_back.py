@@ -9,7 +9,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import is_written_back
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Value
-from nodl.infer.cpp.syntax import Node, children, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 _WRITTEN_BACK = (
     "identifier",
@@ -22,8 +22,8 @@ _WRITTEN_BACK = (
 
 def _is_element(call: Node) -> bool:
     """``x.at(i)``: an element that a call gives by reference, and whose evaluation changes nothing."""
-    callee = call.child_by_field_name("function")
-    name = text(callee.child_by_field_name("field")) if callee is not None else ""
+    callee = field_of(call, "function")
+    name = text(field_of(callee, "field"))
     return name in ("at", "front", "back", "begin", "rbegin", "data", "value")
 
 
@@ -35,13 +35,13 @@ def write_back(
     frame: Frame,
 ) -> None:
     """What a function does to its reference parameters shows in the caller's variables."""
-    given = children(node.child_by_field_name("arguments"))
+    given = children(field_of(node, "arguments"))
     for parameter, argument in zip(parameters, given, strict=False):
         if not is_written_back(parameter):
             continue
         target = unwrapped(argument)
         if target is not None and target.type == "pointer_expression":
-            inner = unwrapped(target.child_by_field_name("argument"))
+            inner = unwrapped(field_of(target, "argument"))
             target = target if inner is not None and inner.type == "call_expression" else inner
         if target is None or target.type not in _WRITTEN_BACK:
             continue
