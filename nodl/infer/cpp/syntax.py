@@ -100,3 +100,24 @@ def unwrapped(node: Node | None) -> Node | None:
         inner = children(node)
         node = inner[-1] if inner else None
     return node
+
+
+def callee_name(callee: Node) -> str:
+    """The name of a callee without its template arguments."""
+    whole = "".join(text(callee).split())
+    if not whole.endswith(">"):
+        return whole.lstrip(":")
+    depth = 0
+    for position in range(len(whole) - 1, -1, -1):
+        depth += (whole[position] == ">") - (whole[position] == "<")
+        if depth == 0:
+            return whole[:position].lstrip(":")
+    return whole
+
+
+def template_arguments(node: Node | None) -> list[Node]:
+    """The template arguments that a callee writes out: those of ``f<A, B>`` and ``x.f<A>`` and ``a::f<A>``."""
+    while node is not None and node.type in ("field_expression", "qualified_identifier", "dependent_name"):
+        node = field_of(node, "field") or field_of(node, "name") or next(iter(node.named_children), None)
+    listed = field_of(node, "arguments") if node is not None and node.type.startswith("template_") else None
+    return [child for child in listed.named_children if child.type != "comment"] if listed is not None else []

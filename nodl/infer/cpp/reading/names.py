@@ -239,18 +239,16 @@ class Names:
         return cls if cls is None else self.specialisations.meant(cls, kind)
 
     @_once
-    def ancestry(self, cls: Class) -> list[Class]:
-        """The class and its bases, nearest first."""
-        order = [cls]
-        for _, base in self.bases(cls):
-            if base is not None and base is not cls:
-                order += (
-                    [each for each in self.ancestry(base) if each not in order] if len(order) < 40 else []
-                )
+    def ancestry(self, cls: Class | None) -> list[Class]:
+        """The class and its bases, nearest first; nothing for no class."""
+        order = [cls] if cls is not None else []
+        for _, base in self.bases(cls) if cls is not None else ():
+            if base is not None and base is not cls and len(order) < 40:
+                order += [each for each in self.ancestry(base) if each not in order]
         return order
 
     @_once
-    def find_methods(self, cls: Class, name: str) -> list[Function]:
+    def find_methods(self, cls: Class | None, name: str) -> list[Function]:
         for each in self.ancestry(cls):
             found = self.methods.get(each, {}).get(name)
             if found:
@@ -258,7 +256,7 @@ class Names:
         return []
 
     @_once
-    def declarations(self, cls: Class, name: str) -> list[Function]:
+    def declarations(self, cls: Class | None, name: str) -> list[Function]:
         return [d for each in self.ancestry(cls) for d in each.declared.get(name, ())]
 
     def foreign_header(self, name: str, file: FileIndex) -> str:

@@ -118,7 +118,7 @@ def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, fr
     from nodl.infer.cpp.running.invocation import call_methods
 
     for target in targets:
-        own = run.names.find_methods(target.cls, "operator=") if target.cls is not None else []
+        own = run.names.find_methods(target.cls, "operator=")
         if own:
             call_methods(run, own, target, [value], node, frame, ())
         elif all(isinstance(atom, Obj) and atom.cls is not None for atom in value):
@@ -136,7 +136,7 @@ def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
         return seen_class(run, inner, frame)
     if inner is not None and inner.type in ("subscript_expression", "field_expression"):
         kind = seen_type(run, inner, frame)
-        return None if kind.pointer else run.names.class_of(kind, frame.scope, frame.file)
+        return run.held_class(kind, frame)
     found = declared_type(run, inner, frame) if inner is not None else None
     if (
         inner is None
@@ -145,7 +145,7 @@ def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
         or (found[1] and not _is_reference(run, inner, frame))
     ):
         return None
-    return run.names.class_of(found[0], frame.scope, frame.file)
+    return run.class_of(found[0], frame)
 
 
 def _combined(operator: str, before: Value, value: Value) -> Value:
@@ -262,7 +262,7 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
     this_object = current_object(frame)
     if this_object is not None and "::" not in name:
         lexical = lexical_class(run, this_object, frame)
-        for each in run.names.ancestry(lexical) if lexical is not None else ():
+        for each in run.names.ancestry(lexical):
             if name in each.fields:
                 cell = cell_of(run, this_object, name, each)
                 if not each.fields[name].static:

@@ -40,7 +40,7 @@ def construct(
     members: Mapping[str, Value] | None = None,
 ) -> Value:
     """An object of ``kind``: by its source, by the table of libraries, or one of which nothing is known."""
-    cls = run.names.class_of(kind, frame.scope, frame.file)
+    cls = run.class_of(kind, frame)
     if cls is None and kind.name in SEQUENCES | MAPS and not arguments:
         run.handle(node, frame)
         return (Seq(()),) if kind.name in SEQUENCES else (Map(()),)
@@ -64,7 +64,7 @@ def construct(
     if kind.name in ("std::thread", "std::jthread") and arguments:
         from nodl.infer.cpp.running.standard import STANDARD
 
-        STANDARD[kind.name](run, arguments, node, frame, ())
+        STANDARD[kind.name](run, arguments, node, frame)
     model = LIBRARY_CLASSES.get(kind.name)
     if model is not None:
         call = Call(node, frame, list(arguments), kind.arguments, receiver=made_object)
@@ -228,7 +228,7 @@ def _bases(
             values = [run.evaluate(each, inner) for each in children(where)]
         else:
             values = list(arguments) if cls.inherits_constructors else []
-        base = run.names.class_of(kind, cls.scope, cls.file)
+        base = run.class_of(kind, cls)
         if base is not None and base is not cls:
             construct_class(run, this, base, kind, values, where or node, inner)
         else:
@@ -339,7 +339,7 @@ def _given(run: Machine, this: Obj, cls: Class, member: Field, value: Value, inn
     kind = run.names.resolve(member.type, cls.scope, cls.file, this.bindings.get(cls))
     if member.pointer or kind.pointer:
         return value
-    return copied(run, value, member.node, inner, run.names.class_of(kind, cls.scope, cls.file))
+    return copied(run, value, member.node, inner, run.class_of(kind, cls))
 
 
 def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node: Node, inner: Frame) -> Value:
@@ -360,4 +360,4 @@ def _class_of_parameter(
     ):
         return None  # may be a pointer
     kind = run.type_of(parameter.type, inner)
-    return None if kind.pointer else run.names.class_of(kind, inner.scope, inner.file)
+    return run.held_class(kind, inner)

@@ -9,8 +9,9 @@ from nodl.infer.cpp.running.algorithms import called_now
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
+from nodl.infer.cpp.running.invocation import CallSite
 from nodl.infer.cpp.running.launch_values import settled_text
-from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.numbers import added
 from nodl.infer.cpp.running.objects import ORDERED, SETS, as_set, made
 from nodl.infer.cpp.running.operators import element
@@ -31,7 +32,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type
-from nodl.infer.cpp.syntax import Node, children, text
+from nodl.infer.cpp.syntax import children, text
 
 
 def is_standard(name: str) -> bool:
@@ -58,40 +59,31 @@ CONTAINER_METHODS = frozenset({
 })  # fmt: skip
 
 
-def container_call(
-    run: Machine, atom: object, name: str, node: Node, receiver: Node | None, given: list[Node], frame: Frame
-) -> Value:
+def container_call(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     """A method of a text or container."""
-    if name in (
-        "emplace_back",
-        "push_back",
-        "push_front",
-        "emplace_front",
-        "insert",
-        "push",
-        "emplace",
-    ) and isinstance(atom, Seq | Unknown):
-        return _added(run, atom, name, node, receiver, given, frame)
-    values = [run.evaluate(each, frame) for each in given]
-    called_now(run, values, node, frame)
-    run.handle(node, frame)
+    if name in _ADDING and isinstance(atom, Seq | Unknown):
+        return _added(run, atom, name, site)
+    values = site.values
+    called_now(run, values, site.node, site.frame)
+    run.handle(site.node, site.frame)
     if isinstance(atom, Map):
-        return _map_call(run, atom, name, receiver, values, node, given, frame)
+        return _map_call(run, atom, name, site)
     if isinstance(atom, Param) and name in _PARAMETER_VIEWS:
         return (atom,)
     is_list = isinstance(atom, Param) and any(isinstance(each, Seq) for each in atom.default)
-    if isinstance(atom, Param) and is_list and name in ("size", "empty", "at", "front", "back"):
+    if is_list and name in ("size", "empty", "at", "front", "back"):
         items, exact = items_of(run, atom)
         if len(items) != 1 or not isinstance(items[0][0], Unknown):
-            return _sequence_call(run, Seq(tuple(items), not exact), name, None, values, given, frame)
-    if isinstance(atom, Text | Param) and not isinstance(atom, Seq):
-        return _text_call(run, atom, name, receiver, values, node, frame)
+            return _sequence_call(run, Seq(tuple(items), not exact), name, site)
+    if isinstance(atom, Text | Param):
+        return _text_call(run, atom, name, site)
     if isinstance(atom, Seq | Group):
-        return _sequence_call(run, atom, name, receiver, values, given, frame)
-    run.later(values, frame)
+        return _sequence_call(run, atom, name, site)
+    run.later(values, site.frame)
     return unknown(f"the result of {name}()")
 
 
+_ADDING = frozenset({"emplace_back", "push_back", "push_front", "emplace_front", "insert", "push", "emplace"})
 _PARAMETER_VIEWS = frozenset({
     "as_string", "as_int", "as_bool", "as_double", "as_string_array", "get_value", "get", "value_to_string",
     "get_parameter_value",
@@ -100,136 +92,104 @@ _PARAMETER_VIEWS = frozenset({
 })  # fmt: skip
 
 
-def _added(
-    run: Machine, atom: object, name: str, node: Node, receiver: Node | None, given: list[Node], frame: Frame
-) -> Value:
-
-    written = declared_type(run, receiver, frame) if receiver is not None else None
+def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
+    given, frame, receiver = site.given, site.frame, site.receiver
+    written = declared_type(run, receiver, frame)
     kind = written[0].name if written is not None else ""
     inner = written[0].arguments[0] if written is not None and written[0].arguments else None
-    if (
-        name.startswith("emplace")
-        and inner is not None
-        and not inner.pointer
-        and run.names.class_of(inner, frame.scope, frame.file)
-    ):
-        value = construct(run, inner, [run.evaluate(each, frame) for each in given], node, frame)
+    cls = run.held_class(inner, frame)
+    if name.startswith("emplace") and inner is not None and cls is not None:
+        value = construct(run, inner, site.values, site.node, frame)
     elif given and given[-1].type == "initializer_list" and inner is not None and inner.name:
         value = made(run, given[-1], inner, children(given[-1]), frame)
     else:
-        cls = (
-            run.names.class_of(inner, frame.scope, frame.file)
-            if inner is not None and not inner.pointer
-            else None
-        )
         listed = [copied(run, run.evaluate(each, frame), each, frame, cls) for each in given]
         if name == "insert" and len(listed) == 3:
-            return _inserted(run, atom, listed, given, receiver, frame)
+            return _inserted(run, atom, listed[1], site)
         value = listed[-1] if listed else BOTTOM
         if name.startswith("emplace") and (inner is None or not inner.pointer):
-            handed_over(run, f"an element that {name}() makes", listed, node, frame)
-    run.handle(node, frame)
-    if receiver is not None and isinstance(atom, Seq):
-        ordered = kind in ORDERED or not (
-            name in ("push_back", "emplace_back", "push") or _is_begin(given, receiver)
-        )
-        longer = (
-            (value, *atom.items)
-            if name.endswith("_front") or _is_begin(given, receiver)
-            else (*atom.items, value)
-        )
-        open_now = atom.open or (ordered and not name.endswith("_front"))
-        if kind in SETS and not atom.open:
-            assign(run, receiver, (as_set(longer),), frame)
-        else:
-            assign(run, receiver, (open_sequence(longer) if open_now else Seq(longer),), frame)
-    elif receiver is not None:
+            handed_over(run, f"an element that {name}() makes", listed, site.node, frame)
+    run.handle(site.node, frame)
+    if not isinstance(atom, Seq):
         assign(run, receiver, (open_sequence((value, (atom,))),), frame)
+        return value
+    in_front = name.endswith("_front") or _is_begin(site)
+    ordered = kind in ORDERED or (name in ("insert", "emplace") and not in_front)
+    longer = (value, *atom.items) if in_front else (*atom.items, value)
+    if kind in SETS and not atom.open:
+        assign(run, receiver, (as_set(longer),), frame)
+    else:
+        is_open = atom.open or (ordered and not name.endswith("_front"))
+        assign(run, receiver, (open_sequence(longer) if is_open else Seq(longer),), frame)
     return value
 
 
-def _is_begin(given: list[Node], receiver: Node | None) -> bool:
+def _is_begin(site: CallSite) -> bool:
     """``x.insert(x.begin(), ...)``."""
-    start = re.sub(r"\s", "", text(given[0])) if given else ""
-    return receiver is not None and start in (f"{text(receiver)}.begin()", f"{text(receiver)}.cbegin()")
+    start = re.sub(r"\s", "", text(site.given[0])) if site.given else ""
+    return start in (f"{text(site.receiver)}.begin()", f"{text(site.receiver)}.cbegin()")
 
 
-def _inserted(
-    run: Machine, atom: object, listed: list[Value], given: list[Node], receiver: Node | None, frame: Frame
-) -> Value:
+def _inserted(run: Machine, atom: object, source: Value, site: CallSite) -> Value:
     """``a.insert(a.end(), b.begin(), b.end())``."""
-    source = listed[1]
     items = [item for each in source for item in items_of(run, each)[0]]
-    before = atom.items if isinstance(atom, Seq) else ((atom,),)
     exact = isinstance(atom, Seq) and all(items_of(run, each)[1] for each in source)
-    if receiver is not None:
-        longer = (*before, *items)
-        assign(run, receiver, (Seq(longer) if exact else open_sequence(longer),), frame)
+    longer = (*(atom.items if isinstance(atom, Seq) else ((atom,),)), *items)
+    assign(run, site.receiver, (Seq(longer) if exact else open_sequence(longer),), site.frame)
     return BOTTOM
 
 
-def _map_call(
-    run: Machine,
-    atom: Map,
-    name: str,
-    receiver: Node | None,
-    values: list[Value],
-    node: Node,
-    given: list[Node],
-    frame: Frame,
-) -> Value:
-    if name in ("emplace", "insert_or_assign", "try_emplace") and len(values) >= 2 and receiver is not None:
-        key, value = _new_entry(run, name, values, node, receiver, frame)
-        assign(run, receiver, (_entered(atom, key, value, name == "insert_or_assign"),), frame)
-    elif name == "insert" and values and receiver is not None:
-        pairs = [each for each in values[0] if isinstance(each, Group | Seq) and len(each.items) == 2]
-        pairs += [Group(entry) for each in values[0] if isinstance(each, Map) for entry in each.entries]
+def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
+    values = site.values
+
+    def becomes(after: Map) -> Value:
+        assign(run, site.receiver, (after,), site.frame)
+        return unknown(f"the result of {name}()")
+
+    first = values[0] if values else BOTTOM
+    if name in ("emplace", "insert_or_assign", "try_emplace") and len(values) >= 2:
+        key, value = _new_entry(run, site)
+        return becomes(_entered(atom, key, value, name == "insert_or_assign"))
+    if name == "insert" and values:
+        pairs = [each for each in first if isinstance(each, Group | Seq) and len(each.items) == 2]
+        pairs += [Group(entry) for each in first if isinstance(each, Map) for entry in each.entries]
         for pair in pairs:
             atom = _entered(atom, pair.items[0], pair.items[1], False)
-        assign(run, receiver, (atom if pairs else atom._replace(open=True),), frame)
-    elif name == "erase" and receiver is not None:
-        assign(run, receiver, (_without(atom, values[0] if values else BOTTOM),), frame)
-    elif name in ("count", "contains") and values and _is_definite(atom, values[0]):
-        return (not _is_missing(atom, values[0]),)
-    elif name == "empty" and not atom.open:
+        return becomes(atom if pairs else atom._replace(open=True))
+    if name == "erase":
+        return becomes(_without(atom, first))
+    if name == "clear":
+        return becomes(Map(()))
+    if name in ("count", "contains") and values and _is_definite(atom, first):
+        return (not _is_missing(atom, first),)
+    if name == "empty" and not atom.open:
         return (not atom.entries,)
-    elif name == "clear" and receiver is not None:
-        assign(run, receiver, (Map(()),), frame)
-    elif name == "at" and values:
-        return element(run, atom, values[0])
-    elif name == "find" and values:
-        missing = not atom.open and _is_missing(atom, values[0])
-        return (END,) if missing else (Group((values[0], element(run, atom, values[0]))),)
-    elif name in ("end", "cend"):
+    if name == "at" and values:
+        return element(run, atom, first)
+    if name == "find" and values:
+        return (END,) if _is_missing(atom, first) else (Group((first, element(run, atom, first))),)
+    if name in ("end", "cend"):
         return (END,)
-    elif name in ("begin", "cbegin"):
+    if name in ("begin", "cbegin"):
         return (atom,)
-    elif name == "size" and not atom.open:
+    if name == "size" and not atom.open:
         return (len(atom.entries),)
     return unknown(f"the result of {name}()")
 
 
-def _new_entry(
-    run: Machine, name: str, values: list[Value], node: Node, receiver: Node, frame: Frame
-) -> tuple[Value, Value]:
+def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
     """Key and value of ``emplace(key, arguments of the value ...)``."""
-    key, rest = values[0], values[1:]
-    if len(rest) == 2 and all(
-        isinstance(a, Group) for value in rest for a in value
-    ):  # std::piecewise_construct
+    key, *rest = site.values
+    if len(rest) == 2 and all(isinstance(a, Group) for v in rest for a in v):  # std::piecewise_construct
         key = rest[0][0].items[0] if rest[0] and rest[0][0].items else BOTTOM
         rest = list(rest[1][0].items) if rest[1] else []
-    written = declared_type(run, receiver, frame)
+    written = declared_type(run, site.receiver, site.frame)
     inner = written[0].arguments[1] if written is not None and len(written[0].arguments) > 1 else None
-    cls = (
-        run.names.class_of(inner, frame.scope, frame.file)
-        if inner is not None and not inner.pointer
-        else None
-    )
+    cls = run.held_class(inner, site.frame)
     whole = len(rest) == 1 and any(isinstance(a, Obj) and a.cls is cls for a in rest[0])
     if inner is None or cls is None or whole:
         return key, rest[0] if rest else BOTTOM
-    return key, construct(run, inner, rest, node, frame)
+    return key, construct(run, inner, rest, site.node, site.frame)
 
 
 def _entered(atom: Map, key: Value, value: Value, replace: bool) -> Map:
@@ -268,110 +228,80 @@ _REARRANGES = frozenset({
 })  # fmt: skip
 
 
-def _sequence_call(
-    run: Machine,
-    atom: Seq | Group,
-    name: str,
-    receiver: Node | None,
-    values: list[Value],
-    given: list[Node],
-    frame: Frame,
-) -> Value:
-    exact = isinstance(atom, Group) or not atom.open
+def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -> Value:
+    exact, items, values = isinstance(atom, Group) or not atom.open, atom.items, site.values
+    first = values[0] if values else BOTTOM
     if name in ("at", "front", "back"):
-        if exact and atom.items and name != "at":
-            return atom.items[0 if name == "front" else -1]
-        return element(run, atom, values[0] if values else BOTTOM)
+        if exact and items and name != "at":
+            return items[0 if name == "front" else -1]
+        return element(run, atom, first)
     if name in ("end", "cend", "rend"):
         return (END,)
     if name in ("begin", "cbegin", "rbegin", "data"):
         return (atom,)
     if name == "value_or":  # an optional that holds nothing reads as an empty list
-        return (values[0] if values else BOTTOM) if exact and not atom.items else (atom,)
+        return first if exact and not items else (atom,)
     if name == "size":
-        return (len(atom.items),) if exact else unknown("a size")
+        return (len(items),) if exact else unknown("a size")
     if name == "empty":
-        return (not atom.items,) if exact else unknown("a condition")
-    if name == "clear" and receiver is not None:
-        assign(run, receiver, (Seq(()),), frame)
-    elif name == "fill" and receiver is not None and values and isinstance(atom, Seq):
-        filled_with = Seq(tuple(values[0] for _ in atom.items)) if exact else open_sequence((values[0],))
-        assign(run, receiver, (filled_with,), frame)
-    elif (
-        name == "resize"
-        and exact
-        and receiver is not None
-        and values
-        and len(values[0]) == 1
-        and isinstance(values[0][0], int)
-    ):
-        count = min(values[0][0], 256)
-        filled = [*atom.items[:count], *([unknown("an element that is not set")] * (count - len(atom.items)))]
-        assign(run, receiver, (Seq(tuple(filled)),), frame)
-    elif name in ("pop_back", "pop_front") and exact and receiver is not None and isinstance(atom, Seq):
-        assign(run, receiver, (Seq(atom.items[:-1] if name == "pop_back" else atom.items[1:]),), frame)
-    elif (
-        name == "erase"
-        and exact
-        and receiver is not None
-        and isinstance(atom, Seq)
-        and _is_begin(given, receiver)
-    ):
-        assign(run, receiver, (Seq(atom.items[1:]) if len(given) == 1 else open_sequence(atom.items),), frame)
-    elif name == "assign" and receiver is not None and len(values) == 1:
-        assign(run, receiver, values[0], frame)
-    elif name == "swap" and receiver is not None and len(given) == 1 and isinstance(atom, Seq):
-        before = run.evaluate(given[0], frame)
-        assign(run, given[0], (atom,), frame)
-        assign(run, receiver, before, frame)
-    elif name == "count" and exact and values and len(values[0]) == 1 and plain(values[0][0]) is not None:
-        listed = [plain(item[0]) if len(item) == 1 else None for item in atom.items]
-        return unknown("a count") if None in listed else (listed.count(plain(values[0][0])),)
-    elif name in _REARRANGES and receiver is not None and isinstance(atom, Seq):
-        more = (
-            (unknown("an element of a list"),)
-            if name in ("resize", "assign", "swap", "splice", "merge")
-            else ()
-        )
-        assign(run, receiver, (open_sequence((*atom.items, *more)),), frame)
+        return (not items,) if exact else unknown("a condition")
+    if name == "count" and exact and len(first) == 1 and plain(first[0]) is not None:
+        listed = [plain(item[0]) if len(item) == 1 else None for item in items]
+        return unknown("a count") if None in listed else (listed.count(plain(first[0])),)
+    if name == "swap" and len(values) == 1 and isinstance(atom, Seq):
+        before = run.evaluate(site.given[0], site.frame)
+        assign(run, site.given[0], (atom,), site.frame)
+        assign(run, site.receiver, before, site.frame)
+    elif name == "assign" and len(values) == 1:
+        assign(run, site.receiver, first, site.frame)
+    elif (after := _rearranged(atom, name, site)) is not None:
+        assign(run, site.receiver, (after,), site.frame)
     return unknown(f"the result of {name}()")
 
 
-def _text_call(
-    run: Machine,
-    atom: Text | Param,
-    name: str,
-    receiver: Node | None,
-    values: list[Value],
-    node: Node,
-    frame: Frame,
-) -> Value:
-    if name in (
-        "c_str",
-        "str",
-        "string",
-        "data",
-        "value",
-        "get",
-        "as_string",
-        "view",
-        "get_value",
-        "value_or",
-        "generic_string",
-        "begin",
-        "end",
-    ):
-        if name == "str" and values and receiver is not None:
-            assign(run, receiver, values[0], frame)
+def _rearranged(atom: Seq | Group, name: str, site: CallSite) -> Seq | None:
+    """What a method that changes a list leaves of it; ``None`` for one that does not."""
+    exact, items, values = isinstance(atom, Group) or not atom.open, atom.items, site.values
+    first = values[0] if values else BOTTOM
+    if name == "clear":
+        return Seq(())
+    if name == "resize" and exact and len(first) == 1 and isinstance(first[0], int):
+        count = min(first[0], 256)
+        unset = [unknown("an element that is not set")] * (count - len(items))
+        return Seq((*items[:count], *unset))
+    if isinstance(atom, Group):
+        return None
+    if name == "fill" and values:
+        return Seq((first,) * len(items)) if exact else open_sequence((first,))
+    if name in ("pop_back", "pop_front") and exact:
+        return Seq(items[:-1] if name == "pop_back" else items[1:])
+    if name == "erase" and exact and _is_begin(site):
+        return Seq(items[1:]) if len(values) == 1 else open_sequence(items)
+    more = (unknown("an element of a list"),) if name in _ADDS_OTHERS else ()
+    return open_sequence((*items, *more)) if name in _REARRANGES else None
+
+
+_ADDS_OTHERS = frozenset({"resize", "assign", "swap", "splice", "merge"})
+_SAME_TEXT = frozenset({
+    "c_str", "str", "string", "data", "value", "get", "as_string", "view", "get_value", "value_or", "generic_string",
+    "begin", "end",
+})  # fmt: skip
+
+
+def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> Value:
+    values = site.values
+    if name in _SAME_TEXT:
+        if name == "str" and values:
+            assign(run, site.receiver, values[0], site.frame)
         return (atom,)
     known = settled_text(run, atom)
-    if name in texts.CHANGES and receiver is not None:
+    if name in texts.CHANGES:
         after = texts.changed(known, name, values) if known is not None else None
         if after is None and name in ("append", "push_back") and len(values) == 1:
             found = added((atom,), values[0])
         else:
             found = literal(after) if after is not None else unknown(f"what {name}() makes of a text")
-        assign(run, receiver, found, frame)
+        assign(run, site.receiver, found, site.frame)
         return found
     found_value = texts.asked(known, name, values) if known is not None else None
     return unknown(f"the result of {name}()") if found_value is None else found_value

@@ -123,7 +123,7 @@ def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
     """``object = other``: the object has the members of the other one then; or may have, of several objects."""
     others = [atom for atom in value if isinstance(atom, Obj) and atom.cls is not None]
     for target in targets:
-        for each in run.names.ancestry(target.cls) if target.cls is not None else ():
+        for each in run.names.ancestry(target.cls):
             for name in each.fields:
                 cell = (target, cell_of(run, target, name, each))
                 read = [run.store.get((o, cell_of(run, o, name, each))) or BOTTOM for o in others]

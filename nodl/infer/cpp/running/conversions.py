@@ -100,7 +100,7 @@ def _stays(run: Machine, cls: Class, place: Node, inner: Node, frame: Frame) -> 
     if place.type == "init_declarator":
         written = text(field_of(place.parent, "type")) if place.parent is not None else ""
         kind = run.type_of(written, frame)
-        return "auto" in written.split() or run.names.class_of(kind, frame.scope, frame.file) is cls
+        return "auto" in written.split() or run.class_of(kind, frame) is cls
     if place.type == "binary_expression":
         name = f"operator{text(place.child_by_field_name('operator'))}"
         return bool(

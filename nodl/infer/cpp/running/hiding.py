@@ -12,10 +12,18 @@ from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import Class, type_text
 from nodl.infer.cpp.reading.inheritance import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
-from nodl.infer.cpp.running.callees import callee_name, types_of
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
+from nodl.infer.cpp.syntax import (
+    Node,
+    callee_name,
+    children,
+    field_of,
+    template_arguments,
+    text,
+    unwrapped,
+    walk,
+)
 
 
 def cell_of(run: Machine, owner: Obj, name: str, seen: Class | None) -> str:
@@ -37,10 +45,16 @@ def lexical_class(run: Machine, this: Obj, frame: Frame) -> Class | None:
     return next((c for c in run.names.ancestry(this.cls) if c.scope == frame.scope), this.cls)
 
 
+def class_around(run: Machine, frame: Frame) -> Class | None:
+    """The class whose method the code is, by what it says; ``None`` for any other code."""
+    owner = frame.function.owner if frame.function is not None else ""
+    return run.names.find_class(owner, frame.scope, frame.file) if owner else None
+
+
 def seen_class(run: Machine, node: Node | None, frame: Frame) -> Class | None:
     """The class that an expression has, or points to, at compile time; ``None`` where that is not known."""
     kind = seen_type(run, node, frame)
-    return run.names.class_of(kind, frame.scope, frame.file) if kind.name else None
+    return run.class_of(kind, frame) if kind.name else None
 
 
 def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Frame) -> Class | None:
@@ -52,7 +66,7 @@ def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Fra
         return None
     head = text(field_of(access, "field")).rpartition("::")[0]
     if head:
-        named = run.names.class_of(run.type_of(head, frame), frame.scope, frame.file)
+        named = run.class_of(run.type_of(head, frame), frame)
         return next((c for c in run.names.ancestry(atom.cls) if c is named or c.name == head), atom.cls)
     if name not in hidden(run.names, atom.cls):
         return atom.cls
@@ -100,7 +114,7 @@ def _of_this(run: Machine, frame: Frame) -> Type:
 def _of_member(run: Machine, node: Node, frame: Frame) -> Type:
     owner = seen_class(run, field_of(node, "argument"), frame)
     name = text(field_of(node, "field"))
-    for each in run.names.ancestry(owner) if owner is not None else ():
+    for each in run.names.ancestry(owner):
         if name in each.fields:
             kind = run.names.resolve(each.fields[name].type, each.scope, each.file)
             return kind._replace(pointer=kind.pointer or each.fields[name].pointer)
@@ -110,7 +124,7 @@ def _of_member(run: Machine, node: Node, frame: Frame) -> Type:
 _KEEPS = frozenset(
     {"std::move", "std::ref", "std::cref", "std::as_const", "std::forward", "std::addressof", "move"}
 )
-_GIVES_INNER = frozenset({"get", "lock", "value", "release"})
+GIVES_INNER = frozenset({"get", "lock", "value", "release"})
 _GIVES_ELEMENT = frozenset({"at", "front", "back", "top"})
 
 
@@ -121,16 +135,16 @@ def _of_call(run: Machine, node: Node, frame: Frame) -> Type:
     if callee.type == "field_expression":
         inner = seen_type(run, field_of(callee, "argument"), frame)
         name = callee_name(field_of(callee, "field") or callee)
-        if name in _GIVES_INNER | _GIVES_ELEMENT:
-            return inner if name in _GIVES_INNER else element_type(inner)
+        if name in GIVES_INNER | _GIVES_ELEMENT:
+            return inner if name in GIVES_INNER else element_type(inner)
         return _returned(run, inner, name, frame)
     name, given = callee_name(callee), children(field_of(node, "arguments"))
     if name in _KEEPS and given:
         return seen_type(run, given[0], frame)
     if re.search(r"_cast$|(?:^|::)make_(?:shared|unique)$", name):
-        return next(iter(types_of(run, callee, frame)), NO_TYPE)
+        return next((run.type_of(text(each), frame) for each in template_arguments(callee)), NO_TYPE)
     made = run.type_of(text(callee), frame)
-    if run.names.class_of(made, frame.scope, frame.file) is not None:
+    if run.class_of(made, frame) is not None:
         return made
     found = run.names.find_functions(name, frame.scope, frame.file)
     if len(found) == 1:
@@ -139,8 +153,8 @@ def _of_call(run: Machine, node: Node, frame: Frame) -> Type:
 
 
 def _returned(run: Machine, kind: Type, name: str, frame: Frame) -> Type:
-    cls = run.names.class_of(kind, frame.scope, frame.file) if kind.name else None
-    methods = run.names.find_methods(cls, name) if cls is not None else []
+    cls = run.class_of(kind, frame) if kind.name else None
+    methods = run.names.find_methods(cls, name)
     if len(methods) != 1:
         return NO_TYPE
     return run.names.resolve(type_text(methods[0].node), methods[0].scope, methods[0].file)

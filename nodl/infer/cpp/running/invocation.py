@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from functools import partial
+from dataclasses import dataclass
+from functools import cached_property, partial
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
 from nodl.infer.cpp.reading.declarations import Function, type_text
@@ -19,7 +20,53 @@ from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.running.written_back import write_back
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped
+
+
+@dataclass(eq=False)
+class CallSite:
+    """A call as it is written. Its arguments run once, when somebody asks for their values."""
+
+    run: Machine
+    node: Node
+    callee: Node
+    frame: Frame
+
+    @property
+    def receiver(self) -> Node:
+        """What stands before the name of a method."""
+        return field_of(self.callee, "argument") or self.callee
+
+    @cached_property
+    def given(self) -> list[Node]:
+        return children(field_of(self.node, "arguments"))
+
+    @cached_property
+    def values(self) -> list[Value]:
+        return [self.run.evaluate(each, self.frame) for each in self.given]
+
+    @cached_property
+    def types(self) -> list[Type]:
+        """The template arguments that are written out."""
+        return [self.run.type_of(text(each), self.frame) for each in template_arguments(self.callee)]
+
+    def call(self, receiver: Obj | None = None) -> Call:
+        return Call(self.node, self.frame, self.values, self.types, self.given, receiver)
+
+    def call_value(self, callee: Value) -> Value:
+        return call_values(self.run, callee, self.values, self.node, self.frame)
+
+    def call_methods(
+        self,
+        methods: Sequence[Function],
+        this: Obj | None,
+        *,
+        exactly: bool = False,
+        bindings: dict[str, Type] | None = None,
+    ) -> Value:
+        return call_methods(
+            self.run, methods, this, self.values, self.node, self.frame, self.types, exactly=exactly, bindings=bindings
+        )  # fmt: skip
 
 
 def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame) -> Value:
@@ -289,7 +336,7 @@ def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
     if not any(isinstance(atom, Obj) and atom.cls is not None and atom.cls.bases for atom in inner.returned):
         return inner.returned
     kind = run.type_of(type_text(function.node), inner)
-    cls = None if kind.pointer else run.names.class_of(kind, inner.scope, inner.file)
+    cls = run.held_class(kind, inner)
     return copied(run, inner.returned, function.node, inner, cls) if cls is not None else inner.returned
 
 

@@ -40,7 +40,7 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
         elif names:
             by_value = not set("&*") & set(text(declarator)) and not _points(run, right, frame)
             kind = run.type_of(written, frame)
-            cls = None if kind.pointer else run.names.class_of(kind, frame.scope, frame.file)
+            cls = run.held_class(kind, frame)
             own = copied(run, item, node, frame, cls) if by_value else item
             run.local(frame, text(names[0]), own, written)
 

@@ -219,11 +219,17 @@ class Machine:
     def type_of(self, written: str, frame: Frame) -> Type:
         return self.names.resolve(written, frame.scope, frame.file, frame.bindings)
 
+    def class_of(self, kind: Type, where: Frame | Class) -> Class | None:
+        """The class that a type means in code or in a class; ``None`` where its source is not in reach."""
+        return self.names.class_of(kind, where.scope, where.file)
+
+    def held_class(self, kind: Type | None, where: Frame | Class) -> Class | None:
+        """The class of the object that a variable of this type is; ``None`` where it is a pointer, or none in reach."""
+        return None if kind is None or kind.pointer else self.class_of(kind, where)
+
     def methods_of(self, atom: object, name: str) -> Sequence[Function]:
         """The methods of that name of an object of a class in reach; none for anything else."""
-        return (
-            self.names.find_methods(atom.cls, name) if isinstance(atom, Obj) and atom.cls is not None else ()
-        )
+        return self.names.find_methods(atom.cls, name) if isinstance(atom, Obj) else ()
 
     def obj(self, key: object, kind: Type, **values: object) -> Obj:
         found = self.objects.get(key)

@@ -2,86 +2,53 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from nodl.infer.cpp.ledger import CREATES
-from nodl.infer.cpp.libraries import LIBRARY_METHODS, NODE_METHODS, Call
-from nodl.infer.cpp.reading.declarations import Function
-from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.libraries import LIBRARY_METHODS, NODE_METHODS, FunctionModel
+from nodl.infer.cpp.reading.declarations import Class, Function
+from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.callees import callee_name, is_only_declared, types_of
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
-from nodl.infer.cpp.running.hiding import class_of_member, lexical_class
-from nodl.infer.cpp.running.invocation import call_methods, call_values
+from nodl.infer.cpp.running.hiding import GIVES_INNER, class_around, class_of_member, lexical_class
+from nodl.infer.cpp.running.invocation import CallSite, call_values
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.own_operators import pointed_to
 from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
-from nodl.infer.cpp.running.values import (
-    BOTTOM,
-    Bound,
-    Const,
-    Group,
-    Lambda,
-    Map,
-    Obj,
-    Param,
-    Seq,
-    Text,
-    Unknown,
-    Value,
-    join,
-    unknown,
-)
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import declared_type, member
-from nodl.infer.cpp.syntax import Node, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
 
 
-def is_library_method(this_object: Obj, name: str) -> bool:
-    """Whether the tables have this method for the object: as a node, by its class or its library base."""
-    if this_object.is_node and name in NODE_METHODS:
-        return True
-    return (this_object.foreign_base, name) in LIBRARY_METHODS or (
-        this_object.type.name,
-        name,
-    ) in LIBRARY_METHODS
-
-
-def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame: Frame) -> Value:
+def method_call(run: Machine, site: CallSite) -> Value:
     """``x.f(...)`` for each thing that ``x`` may be, results joined; ``BOTTOM`` where ``x`` holds nothing."""
-    receiver_node = field_of(callee, "argument")
+    callee, frame, subject = site.callee, site.frame, site.receiver
     field = unwrapped(field_of(callee, "field"))
     name = callee_name(field) if field is not None else ""
     if field is not None and field.type == "qualified_identifier":
         name = name.rpartition("::")[2]
-    receiver = run.evaluate(receiver_node, frame)
+    receiver = run.evaluate(subject, frame)
     if text(field_of(callee, "operator")) == "->":
         receiver = pointed_to(run, receiver, "operator->", callee, frame)
-    if (
-        name in ("get", "lock", "value", "release")
-        and not given
-        and any(isinstance(a, Obj) for a in receiver)
-    ):
-        kept = tuple(a for a in receiver if not run.methods_of(a, name))
-        if kept == receiver:
-            return receiver
-    if name == "reset" and _is_pointer(run, receiver_node, frame, receiver):
-        return _reset(run, receiver_node, node, given, frame)
+    is_inner = name in GIVES_INNER and not site.given and any(isinstance(atom, Obj) for atom in receiver)
+    if is_inner and not any(run.methods_of(atom, name) for atom in receiver):
+        return receiver
+    if name == "reset" and _declared_pointer(run, subject, frame):
+        value = run.evaluate(site.given[0], frame) if site.given else BOTTOM
+        assign(run, subject, value, frame)  # pointer.reset(new Foo(...))
+        return BOTTOM
     if not receiver:
-        values = [run.evaluate(each, frame) for each in given]
-        run.later(values, frame)
-        if receiver_node is not None and _could_make(run, receiver_node, name, frame):
-            run.unset[(frame.file.file, node.start_byte)] = (
-                run.place(node, frame),
-                text(receiver_node)[:40],
-                name,
-            )
+        run.later(site.values, frame)
+        if _could_make(run, subject, name, frame):
+            found_at = (frame.file.file, site.node.start_byte)
+            run.unset[found_at] = (run.place(site.node, frame), text(subject)[:40], name)
         return BOTTOM
     found: list[Value] = []
     before = run.store.mark()
     alternatives = []
     for atom in receiver:
-        found.append(_on_atom(run, atom, name, node, callee, receiver_node, given, frame))
+        found.append(
+            _on_atom(run, atom, name, CallSite(run, site.node, callee, frame))
+        )  # runs its arguments anew
         if len(receiver) > 1:
             alternatives.append(run.store.changes(before))
             run.store.undo(before)
@@ -94,7 +61,7 @@ def method_call(run: Machine, node: Node, callee: Node, given: list[Node], frame
 def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
     """Whether the method, of an object that was not seen to be made, would make interfaces."""
     written = declared_type(run, receiver, frame)
-    cls = run.names.class_of(written[0], frame.scope, frame.file) if written is not None else None
+    cls = run.class_of(written[0], frame) if written is not None else None
     if cls is not None:
         return any(map(run.makes_interfaces, run.names.find_methods(cls, name)))
     if CREATES.fullmatch(name):
@@ -104,18 +71,6 @@ def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
     return any(run.makes_interfaces(f) for table in run.names.methods.values() for f in table.get(name, ()))
 
 
-def _is_pointer(run: Machine, receiver_node: Node | None, frame: Frame, receiver: Value) -> bool:
-    if receiver_node is None or any(
-        isinstance(a, Obj)
-        and a.cls
-        and run.names.find_methods(a.cls, "reset")
-        and not _declared_pointer(run, receiver_node, frame)
-        for a in receiver
-    ):
-        return False
-    return _declared_pointer(run, receiver_node, frame)
-
-
 def _declared_pointer(run: Machine, node: Node, frame: Frame) -> bool:
     if node.parent is not None and "->" in text(node.parent)[len(text(node)) : len(text(node)) + 3]:
         return False
@@ -123,131 +78,97 @@ def _declared_pointer(run: Machine, node: Node, frame: Frame) -> bool:
     return found is not None and found[1]
 
 
-def _reset(run: Machine, receiver_node: Node | None, node: Node, given: list[Node], frame: Frame) -> Value:
-    """``pointer.reset(new Foo(...))``."""
-    value = run.evaluate(given[0], frame) if given else BOTTOM
-    if receiver_node is not None:
-        assign(run, receiver_node, value, frame)
-    return BOTTOM
-
-
-def _on_atom(
-    run: Machine,
-    atom: object,
-    name: str,
-    node: Node,
-    callee: Node,
-    receiver_node: Node | None,
-    given: list[Node],
-    frame: Frame,
-) -> Value:
+def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     if isinstance(atom, Obj):
-        return on_object(run, atom, name, node, callee, given, frame)
+        return on_object(run, atom, name, site)
     if isinstance(atom, Lambda | Bound):
-        values = [run.evaluate(each, frame) for each in given]
-        return call_values(run, (atom,), values, node, frame) if name == "operator()" else BOTTOM
-    if isinstance(atom, Text | Seq | Map | Group | Param | bool | int | float | Const) or (
-        isinstance(atom, Unknown) and name in CONTAINER_METHODS
-    ):
-        return container_call(run, atom, name, node, receiver_node, given, frame)
-    values = [run.evaluate(each, frame) for each in given]
-    why = atom.why if isinstance(atom, Unknown) else "not known"
-    return _on_unknown(run, name, values, node, receiver_node, given, frame, why)
+        values = site.values
+        return call_values(run, (atom,), values, site.node, site.frame) if name == "operator()" else BOTTOM
+    if not isinstance(atom, Unknown) or name in CONTAINER_METHODS:
+        return container_call(run, atom, name, site)
+    return _on_unknown(run, atom, name, site)
 
 
-def on_object(
-    run: Machine, atom: Obj, name: str, node: Node, callee: Node, given: list[Node], frame: Frame
-) -> Value:
+def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
     """A method of one object: its source, else a closure in a member, else the tables, else unknown code."""
-    types = types_of(run, callee, frame)
+    callee, frame = site.callee, site.frame
     if atom.cls is not None:
         argument = field_of(callee, "argument")
         own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
         seen = None if own else class_of_member(run, atom, name, callee, frame)
         methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name, frame)
         if methods:
-            values = [run.evaluate(each, frame) for each in given]
-            return call_methods(run, methods, atom, values, node, frame, types)
+            return site.call_methods(methods, atom)
         field = member(run, atom, name, seen or lexical_class(run, atom, frame))
         if field is not None and name not in NODE_METHODS:
-            values = [run.evaluate(each, frame) for each in given]
-            return call_values(run, field, values, node, frame)
-    values = [run.evaluate(each, frame) for each in given]
-    call = Call(node, frame, values, types, given, atom)
-    found = by_model(run, atom, name, call)
+            return site.call_value(field)
+    found = by_model(run, atom, name, site)
+    if found is None:
+        found = only_declared(run, atom.cls, name, site, atom)
     if found is not None:
         return found
-    if atom.cls is not None and is_only_declared(run, atom.cls, name):
-        return without_source(run, f"{atom.cls.name}::{name}", values, node, frame, atom)
     if atom.node is not None and not atom.is_node and not name.startswith("create"):
-        run.later(values, frame)
+        run.later(site.values, frame)
         return unknown(f"the result of {name}()")
-    return unknown_call(run, f"{atom.type.name}::{name}", values, node, given, frame, receiver=atom)
+    whole = f"{atom.type.name}::{name}"
+    return unknown_call(run, whole, site.values, site.node, site.given, frame, receiver=atom)
+
+
+def only_declared(
+    run: Machine, cls: Class | None, name: str, site: CallSite, receiver: Obj | None
+) -> Value | None:
+    """A method that the class or a base declares without a body in reach; ``None`` if none does."""
+    if cls is None or not run.names.declarations(cls, name):
+        return None
+    return without_source(run, f"{cls.name}::{name}", site.values, site.node, site.frame, receiver)
 
 
 def of_this(run: Machine, this: Obj, name: str, frame: Frame) -> list[Function]:
     """What ``name()`` calls inside of a class: its own while it is made as a base, or if it is not virtual."""
-    assert this.cls is not None
     methods = run.names.find_methods(this.cls, name)
-    owner = frame.function.owner if frame.function is not None else ""
-    cls = run.names.find_class(owner, frame.scope, frame.file) if owner else None
-    ancestry = run.names.ancestry(this.cls)
+    cls, ancestry = class_around(run, frame), run.names.ancestry(this.cls)
     if this.building is not None and this.building is not this.cls:
         return run.names.find_methods(this.building, name) or methods
     if cls is None or cls is this.cls or cls not in ancestry or not methods:
         return methods
-    lexical = run.names.find_methods(cls, name)
     every = [m for each in ancestry for m in run.names.methods.get(each, {}).get(name, ())]
     if any(each.virtual for each in (*every, *run.names.declarations(this.cls, name))):
         return methods
-    return lexical or methods
+    return run.names.find_methods(cls, name) or methods
 
 
-def by_model(run: Machine, atom: Obj, name: str, call: Call) -> Value | None:
+def model_of(this: Obj, name: str) -> FunctionModel | None:
+    """What the tables have of a method: by the object's class, its library base, or for it as a node."""
+    found = LIBRARY_METHODS.get((this.type.name, name)) or LIBRARY_METHODS.get((this.foreign_base, name))
+    return found or (NODE_METHODS.get(name) if this.is_node else None)
+
+
+def by_model(run: Machine, atom: Obj, name: str, site: CallSite) -> Value | None:
     """What the tables know of a method; ``None`` if they do not know it."""
-    model = LIBRARY_METHODS.get((atom.type.name, name)) or LIBRARY_METHODS.get((atom.foreign_base, name))
-    if model is None and atom.is_node:
-        model = NODE_METHODS.get(name)
+    model = model_of(atom, name)
     if model is None:
         return None
-    run.handle(call.node, call.frame)
+    call = site.call(atom)
+    run.handle(site.node, site.frame)
     return model(run, call)
 
 
-def _on_unknown(
-    run: Machine, name: str, values: Sequence[Value], node: Node, receiver_node: Node | None, given: list[Node],
-    frame: Frame, why: str,
-) -> Value:  # fmt: skip
+def _on_unknown(run: Machine, atom: Unknown, name: str, site: CallSite) -> Value:
+    values, node, frame, subject = site.values, site.node, site.frame, site.receiver
     if CREATES.fullmatch(name):
         run.handle(node, frame)
-        run.gap(
-            node,
-            frame,
-            f"the node that {text(receiver_node)[:60]}->{name}() makes an interface on is not known: {why}",
-        )
+        what = f"{text(subject)[:60]}->{name}()"
+        run.gap(node, frame, f"the node that {what} makes an interface on is not known: {atom.why}")
         return unknown(f"the result of {name}()")
-    written = declared_type(run, receiver_node, frame) if receiver_node is not None else None
-    known_type = (
-        written is not None and written[0].name not in ("", "auto") and not is_own_class(run, written[0])
-    )
-    if not known_type:
-        possible = [
-            f
-            for c, table in run.names.methods.items()
-            for f in table.get(name, ())
-            if run.makes_interfaces(f)
-        ]
+    written = declared_type(run, subject, frame)
+    kind = written[0] if written is not None else NO_TYPE
+    is_own = kind.last in run.names.classes  # in whatever namespace
+    if (kind.name in ("", "auto") or is_own) and not is_standard(name):
+        every = (f for table in run.names.methods.values() for f in table.get(name, ()))
+        possible = [f for f in every if run.makes_interfaces(f)]
         possible = [f for f in possible if len(values) <= len(f.parameters) + (9 if f.variadic else 0)]
-        if possible and not is_standard(name):
-            run.gap(
-                node,
-                frame,
-                f"which {name}() is called here is not known ({why}); {possible[0]} makes interfaces",
-            )
-    handed_over(run, f"{text(receiver_node)[:40]}->{name}()", values, node, frame)
+        if possible:
+            which = f"which {name}() is called here is not known ({atom.why})"
+            run.gap(node, frame, f"{which}; {possible[0]} makes interfaces")
+    handed_over(run, f"{text(subject)[:40]}->{name}()", values, node, frame)
     return unknown(f"the result of {name}()")
-
-
-def is_own_class(run: Machine, kind: Type) -> bool:
-    """Whether the program's files have a class of this name, in whatever namespace."""
-    return kind.last in run.names.classes

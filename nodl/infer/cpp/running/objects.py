@@ -70,7 +70,7 @@ def declared_value(
         by_reference = pointer or (kind.pointer and "optional" not in written)
         found = initial_value(run, value, frame, by_reference or (_is_auto(written) and "&" in written))
         if "optional" in written and not pointer:
-            found = copied(run, found, node, frame, run.names.class_of(kind, frame.scope, frame.file))
+            found = copied(run, found, node, frame, run.class_of(kind, frame))
         return found if pointer or kind.pointer else as_type(kind.name, found)
     if value.type not in ("argument_list", "initializer_list"):
         return converted(run, kind, run.evaluate(value, frame), node, frame)
@@ -107,7 +107,7 @@ def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) 
     """``Foo x = y``: a copy of an object, as a Foo, or a Foo made of y."""
     from nodl.infer.cpp.running.constructors import construct
 
-    cls = run.names.class_of(kind, frame.scope, frame.file)
+    cls = run.class_of(kind, frame)
     if cls is None or any(isinstance(atom, Obj) for atom in value):
         return copied(run, value, node, frame, cls)
     if any(isinstance(atom, Seq | Group) for atom in value) or not run.names.find_methods(cls, cls.name):
@@ -119,7 +119,7 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
     """An object of ``kind`` from arguments in parentheses or braces."""
     from nodl.infer.cpp.running.constructors import construct
 
-    cls = run.names.class_of(kind, frame.scope, frame.file)
+    cls = run.class_of(kind, frame)
     if cls is None and kind.name in SEQUENCES:
         return _sequence(run, node, kind, given, frame)
     if cls is None and kind.name in MAPS:
@@ -149,7 +149,7 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
 def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
     """In braces its elements; in parentheses a copy, a part of another one, or so many equal elements."""
     inner = kind.arguments[0] if kind.arguments else NO_TYPE
-    cls = None if inner.pointer else run.names.class_of(inner, frame.scope, frame.file)
+    cls = run.held_class(inner, frame)
     items = [
         made(run, each, inner, children(each), frame)
         if cls is not None and each.type == "initializer_list"

@@ -225,10 +225,10 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
     """``&Foo::on_message``."""
     head, _, last = re.sub(r"\s+", "", text(node)).rpartition("::")
     kind = run.type_of(re.sub(r"<.*>$", "", head), frame)
-    cls = run.names.class_of(kind, frame.scope, frame.file)
+    cls = run.class_of(kind, frame)
     if cls is None and (this_object := current_object(frame)) is not None and this_object.cls is not None:
         cls = next((c for c in run.names.ancestry(this_object.cls) if c.name == kind.last), None)
-    methods = run.names.find_methods(cls, last) if cls is not None else []
+    methods = run.names.find_methods(cls, last)
     return tuple(Bound(each, None) for each in methods) or None
 
 

@@ -97,7 +97,7 @@ def _held(run: Machine, obj: Obj) -> list[Cell]:
     """Members that are references or pointers to plain values, but for letters."""
     return [
         (obj, cell_of(run, obj, name, cls))
-        for cls in (run.names.ancestry(obj.cls) if obj.cls is not None else ())
+        for cls in run.names.ancestry(obj.cls)
         for name, each in cls.fields.items()
         if each.pointer and not each.static and "char" not in each.type
     ]

@@ -8,7 +8,7 @@ from functools import partial
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.contents import items_of
-from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -29,7 +29,7 @@ from nodl.infer.cpp.running.values import (
 )
 from nodl.infer.cpp.syntax import Node, text
 
-Standard = Callable[[Machine, Sequence[Value], "Node", Frame, Sequence[Type]], Value]
+Standard = Callable[[Machine, Sequence[Value], Node, Frame], Value]
 STANDARD: dict[str, Standard] = {}
 CASTS = frozenset({
     "static_cast", "dynamic_cast", "const_cast", "reinterpret_cast", "std::static_pointer_cast",
@@ -59,24 +59,18 @@ def may_write(name: str) -> bool:
 
 
 def _standard(*names: str) -> Callable[[Standard], Standard]:
-    def register(handler: Standard) -> Standard:
-        STANDARD.update(dict.fromkeys(names, handler))
-        return handler
-
-    return register
+    return registered(STANDARD, names)
 
 
 @_standard("std::string", "std::string_view", "string", "std::filesystem::path", "std::quoted")
-def _text(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
+def _text(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     from nodl.infer.cpp.running.objects import text_of
 
     return text_of(run, values) if values else literal("")
 
 
 @_standard("std::to_string")
-def _to_string(
-    run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]
-) -> Value:
+def _to_string(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     from nodl.infer.cpp.running.operators import number_of
 
     if any(isinstance(atom, Text) and plain(atom) is not None for value in values for atom in value):
@@ -88,12 +82,12 @@ def _to_string(
 @_standard(
     "std::make_pair", "std::pair", "std::make_tuple", "std::tuple", "std::tie", "std::forward_as_tuple"
 )
-def _pair(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
+def _pair(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     return (Group(tuple(values)),)
 
 
 @_standard("std::get")
-def _get(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
+def _get(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     position = re.search(r"get<\s*(\d+)\s*>", text(node))
     found = [atom.items[int(position[1])] for value in values for atom in value
              if position and isinstance(atom, Group | Seq) and int(position[1]) < len(atom.items)]  # fmt: skip
@@ -101,7 +95,7 @@ def _get(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types:
 
 
 @_standard("std::bind", "boost::bind", "std::bind_front")
-def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
+def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     """A method with its object, or a function with its first arguments."""
     if not values:
         return BOTTOM
@@ -145,9 +139,7 @@ def _placeholder(value: Value) -> int:
     "std::generate",
     "std::invoke",
 )
-def _calls_back(
-    run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]
-) -> Value:
+def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     from nodl.infer.cpp.running.invocation import call_values
 
     elements = tuple(join(*items_of(run, atom)[0]) for atom in values[0]) if values else ()
@@ -158,7 +150,7 @@ def _calls_back(
     callee = next(
         (at for at, value in enumerate(values) if any(isinstance(a, Lambda | Bound) for a in value)), 0
     )
-    for atom in _bind(run, list(values[callee:]), node, frame, types):
+    for atom in _bind(run, list(values[callee:]), node, frame):
         if isinstance(atom, Obj) and atom.data.get("partial"):
             call_values(run, (atom,), [], node, frame)  # with its arguments
         else:
@@ -175,7 +167,7 @@ def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, fra
 
 
 @_standard("std::find_if", "std::find")
-def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
+def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     """The element of a list that is exactly known, or its end."""
     from nodl.infer.cpp.running.invocation import call_values
 
@@ -199,12 +191,10 @@ def same(left: Value, right: Value) -> bool | None:
 
 @_standard("std::function", "std::optional", "std::make_optional", "std::shared_ptr", "std::unique_ptr", "std::begin",
            "std::weak_ptr", "std::mem_fn", "std::remove_reference", "std::launder", "std::exchange")  # fmt: skip
-def _itself(run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]) -> Value:
+def _itself(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     return values[0] if values else BOTTOM
 
 
 @_standard("getenv", "std::getenv", "rcpputils::get_env_var")
-def _environment(
-    run: Machine, values: Sequence[Value], node: Node, frame: Frame, types: Sequence[Type]
-) -> Value:
+def _environment(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     return unknown("an environment variable")

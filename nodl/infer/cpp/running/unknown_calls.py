@@ -49,7 +49,7 @@ def without_source(
 
 
 def _holds_node(run: Machine, holder: Obj) -> bool:
-    for each in run.names.ancestry(holder.cls) if holder.cls is not None else ():
+    for each in run.names.ancestry(holder.cls):
         for name in each.fields:
             if nodes_in(run.store.get((holder, name)) or BOTTOM):
                 return True

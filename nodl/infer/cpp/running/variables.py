@@ -143,10 +143,10 @@ def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] |
     """The class that ``Foo::x`` is a static member of; of ``x`` alone, where a class has one outside of its methods."""
     head, separator, last = name.rpartition("::")
     if separator:
-        cls = run.names.class_of(run.type_of(head, frame), frame.scope, frame.file)
+        cls = run.class_of(run.type_of(head, frame), frame)
     else:
         cls = run.names.find_class("::".join(frame.scope), (), frame.file) if frame.scope else None
-    for each in run.names.ancestry(cls) if cls is not None else ():
+    for each in run.names.ancestry(cls):
         if last in each.fields and each.fields[last].static:
             return each, last
     return None
