@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from enclave_launch.admission.middleware import halves, middleware_of, why_not
 from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics.admission import middleware_refused
+from enclave_launch.diagnostics.enclaves import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.evaluation.evaluate import evaluate

@@ -9,14 +9,15 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from enclave_launch.admission.middleware import failing
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics.admission import domains_shared, handshake_fails
 from enclave_launch.diagnostics.enclaves import (
     container_elsewhere,
+    domains_shared,
     enclave_attribute_unused,
     enclave_shared_with_launcher,
     enclave_too_deep,
     enclave_ungranted,
     executable_without_enclave,
+    handshake_fails,
     machine_elsewhere,
 )
 from enclave_launch.diagnostics.evaluation import parameters_unknown

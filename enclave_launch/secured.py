@@ -15,8 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH, failing, middleware_of
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics.admission import handshake_fails
-from enclave_launch.diagnostics.enclaves import enclave_of_several_launches
+from enclave_launch.diagnostics.enclaves import enclave_of_several_launches, handshake_fails
 from enclave_launch.errors import ProvisionError, RuntimeFailure, keystore_errors
 from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, on_zenoh
 from enclave_launch.process import ResolvedProcess

@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from enclave_launch.admission.domains import domain_of
 from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics.admission import domain_not_served
+from enclave_launch.diagnostics.enclaves import domain_not_served
 from enclave_launch.errors import ManifestError
 from enclave_launch.plan import LaunchPlan, enclave_domains
 from keystore.formats.domains import Domains

@@ -10,7 +10,7 @@ from enclave_launch.admission.variables import overridden, own_security, preload
 from enclave_launch.admission.wrappers import obstacles
 from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics import admission as diagnostics
+from enclave_launch.diagnostics import enclaves as diagnostics
 from enclave_launch.errors import UsageError
 from enclave_launch.process import ResolvedProcess
 

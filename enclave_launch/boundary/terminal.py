@@ -9,8 +9,10 @@ Machine formats use escapes of their own: ``json_text`` here, quoted scalars in 
 
 from __future__ import annotations
 
+import os
 import re
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from os import PathLike
@@ -117,3 +119,62 @@ def _escaped_in_json(match: re.Match[str]) -> str:
         return character
     units = character.encode("utf-16-be", "surrogatepass")
     return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2))
+
+
+_REST = r"/([^\s:,;'\"()<>]+)"
+
+
+def short_paths(text: str, folder: str) -> str:
+    """``text`` without ``folder`` before the paths of files that are there.
+
+    Only of files: a ROS name can begin like a folder (``/robot/cmd_vel`` seen from ``/robot``) and must stay whole.
+    """
+    root = folder.rstrip("/")
+    if not root or root not in text:
+        return text
+    pattern = re.compile(rf"(?<![\w./-]){re.escape(root)}{_REST}")
+    return pattern.sub(lambda found: found[1] if os.path.isfile(found[0]) else found[0], text)
+
+
+_PATIENCE = 1.0  # seconds
+_BAR_WIDTH = 30
+_CLEAR = "\r\033[K"
+
+
+def wanted(quiet: bool) -> bool:
+    """Whether a person may be looking at stderr."""
+    return sys.stderr.isatty() and not quiet
+
+
+class ProgressBar:
+    """Called with how many of how many are done; on stderr."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self._started = time.monotonic()
+
+    def __call__(self, done: int, total: int) -> None:
+        if time.monotonic() - self._started < _PATIENCE:
+            return
+        filled = _BAR_WIDTH * done // max(total, 1)
+        bar = f"\r[{'#' * filled}{'.' * (_BAR_WIDTH - filled)}] {done}/{total} {self.what}"
+        print(bar + (_CLEAR if done == total else ""), end="", file=raw(sys.stderr), flush=True)
+
+
+class ProgressLine:
+    """Called with what is done next; on stderr. ``clear`` at the end."""
+
+    def __init__(self, doing: str, _started: float | None = None) -> None:
+        self.doing = doing
+        self._started = time.monotonic() if _started is None else _started
+        self._shown = False
+
+    def __call__(self, subject: str) -> None:
+        if time.monotonic() - self._started >= _PATIENCE:
+            print(f"{_CLEAR}{self.doing} {printable(subject)} ...", end="", file=raw(sys.stderr), flush=True)
+            self._shown = True
+
+    def clear(self) -> None:
+        """Take the line away, if there is one."""
+        if self._shown:
+            print(_CLEAR, end="", file=raw(sys.stderr), flush=True)

@@ -1,4 +1,4 @@
-"""The base of everything that can stand in a launch description."""
+"""The bases: of everything that can stand in a launch description, and of all actions."""
 
 from __future__ import annotations
 
@@ -8,7 +8,15 @@ from collections.abc import Iterable
 from types import FrameType
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description.events.event import ExecutionComplete
+from enclave_launch.host.user_code import executed_once, is_users
 from enclave_launch.source_location import SourceLocation
+
+if TYPE_CHECKING:
+    from enclave_launch.description.conditions import Condition
+    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.markup.entity import Entity
+    from enclave_launch.description.markup.parser import Parser
 
 if TYPE_CHECKING:
     pass
@@ -83,3 +91,84 @@ def normalize_to_list_of_entities(entities: Iterable[SomeEntitiesType]) -> list[
         else:
             flat.extend(entity)
     return flat
+
+
+class Action(LaunchDescriptionEntity):
+    """An intention, carried out by ``execute`` when its condition holds at that moment.
+
+    With a false condition nothing happens at all: no substitution is performed.
+    """
+
+    def __init_subclass__(cls, **kwargs: Any) -> None:
+        """Classes of the user's: ``execute`` is not called again by the start that follows a plan."""
+        super().__init_subclass__(**kwargs)
+        execute = vars(cls).get("execute")
+        if execute is not None and is_users(execute):
+            cls.execute = executed_once(execute)  # type: ignore[method-assign]
+
+    def __init__(self, *, condition: Condition | None = None) -> None:
+        self.__condition = condition
+        self.source_location = creation_location(type(self).__name__)
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
+        """The constructor arguments that every element has: ``if`` and ``unless``."""
+        given = entity.given
+        if "if" not in given and "unless" not in given:
+            return Action, {}
+        if_text = entity.get_attr("if", optional=True)
+        unless_text = entity.get_attr("unless", optional=True)
+        if if_text is None and unless_text is None:
+            return Action, {}
+        if if_text is not None and unless_text is not None:
+            raise RuntimeError("if and unless conditions can't be used simultaneously")
+        from enclave_launch.description.conditions import IfCondition, UnlessCondition
+
+        if if_text is not None:
+            return Action, {"condition": IfCondition(parser.parse_substitution(if_text))}
+        return Action, {"condition": UnlessCondition(parser.parse_substitution(unless_text or ""))}
+
+    @property
+    def condition(self) -> Condition | None:
+        return self.__condition
+
+    def describe(self) -> str:
+        return repr(self)
+
+    def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        """The entities that ``execute`` will give, as far as known without a context."""
+        return []
+
+    def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:
+        return self.get_sub_entities() if self.condition is None else []
+
+    def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
+        if self.condition is None:
+            return []
+        return [(f"Conditionally included by {self.describe()}", self.get_sub_entities())]
+
+    def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        if self.__condition is not None and not self.__condition.evaluate(context):
+            return None
+        try:
+            return self.execute(context)
+        finally:
+            if context.awaits_completion():
+                _tell_completion(self, context)
+
+    def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
+        """Carry it out, and give the entities to visit next. The base does nothing."""
+        return None
+
+
+def _tell_completion(action: Action, context: LaunchContext) -> None:
+    """Emit ``ExecutionComplete``, at once or when the action's future is done; only if a handler registered
+    by now would take it."""
+    event = ExecutionComplete(action=action)
+    if not context.would_handle_event(event):
+        return
+    future = action.get_asyncio_future()
+    if future is None:
+        context.emit_event_sync(event)
+    else:
+        future.add_done_callback(lambda _: context.emit_event_sync(event))

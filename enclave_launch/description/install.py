@@ -11,11 +11,12 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-from enclave_launch.boundary.light import Any, cast
-from enclave_launch.description.public_modules import exists, hidden_modules, public_module
+from enclave_launch.boundary.light import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from importlib.machinery import ModuleSpec
 
 PUBLIC_NAMES = ("launch", "launch_ros", "launch_xml", "launch_yaml", "ament_index_python")
 FALLBACK_NAMES = ("lifecycle_msgs",)
@@ -65,21 +66,11 @@ class _Finder:
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None
     ) -> ModuleSpec | None:
-        if fullname.partition(".")[0] not in self._names or not exists(fullname):
+        if fullname.partition(".")[0] not in self._names:
             return None
-        return ModuleSpec(fullname, cast(Any, _Loader()))
+        from enclave_launch.description.public_modules import spec_of  # XML and YAML files need none
 
-
-class _Loader:
-    """Gives the module that the table describes, the same object each time."""
-
-    def create_module(self, spec: ModuleSpec) -> ModuleType:
-        return public_module(spec.name)
-
-    def exec_module(self, module: ModuleType) -> None:
-        """Modules that a name of their package hides are there from the start, so that importing one binds nothing."""
-        for name in hidden_modules(module.__name__):
-            sys.modules.setdefault(name, public_module(name))
+        return spec_of(fullname)
 
 
 _FINDER = _Finder(PUBLIC_NAMES)
@@ -111,6 +102,8 @@ def _withdraw(before: set[str]) -> None:
 
 
 def _is_ours(module: ModuleType) -> bool:
+    from enclave_launch.description.public_modules import exists, public_module
+
     return exists(module.__name__) and module is public_module(module.__name__)
 
 

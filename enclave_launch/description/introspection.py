@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.log import LogInfo
 from enclave_launch.description.actions.processes import ExecuteProcess
-from enclave_launch.description.entity import LaunchDescriptionEntity
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions
 
 if TYPE_CHECKING:

@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, MutableMapping
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from enclave_launch.description.events.dispatch import Buckets, EventQueue, HandlerTable, QueuedEvent
-from enclave_launch.description.watched_configurations import WatchedConfigurations
 from enclave_launch.host.current import current_host
 from enclave_launch.host.environment import Environment
 from enclave_launch.host.protocol import Host
@@ -65,14 +64,17 @@ class LaunchContext:
     ``includes`` the "file:line" of each include that we are in; ``open_files`` the files themselves.
     """
 
+    noninteractive: bool = False
+    is_shutdown: bool = False
+
     def __init__(
         self, *, argv: Iterable[str] | None = None, noninteractive: bool = False, host: Host | None = None
     ) -> None:
         self.__argv = argv if argv is not None else []
-        self.__noninteractive = noninteractive
+        self.noninteractive = noninteractive
         self.__host = host
         self.__loop: Any = None
-        self.__is_shutdown = False
+        self.is_shutdown = False
         self.__globals: dict[str, Any] = {}
         self.__locals: dict[str, Any] = {}
         self.__locals_stack: list[dict[str, Any]] = []
@@ -101,10 +103,6 @@ class LaunchContext:
     def argv(self) -> Iterable[str]:
         return self.__argv
 
-    @property
-    def noninteractive(self) -> bool:
-        return self.__noninteractive
-
     def count_unfolded(self, entities: int) -> None:
         """Note that the walk in progress visits or copies so many more. Raises ``RuntimeError`` beyond all measure."""
         self.unfolded += entities
@@ -116,12 +114,8 @@ class LaunchContext:
 
     # Shutdown and the loop
 
-    @property
-    def is_shutdown(self) -> bool:
-        return self.__is_shutdown
-
     def _set_is_shutdown(self, state: bool) -> None:
-        self.__is_shutdown = state
+        self.is_shutdown = state
 
     @property
     def asyncio_loop(self) -> Any:
@@ -240,7 +234,7 @@ class LaunchContext:
             environment=self.process_environment.snapshot(),
             handlers=self._event_handlers.save(),
             queue=self._event_queue.save(),
-            is_shutdown=self.__is_shutdown,
+            is_shutdown=self.is_shutdown,
             on_event=self.on_event,
         )
 
@@ -254,5 +248,43 @@ class LaunchContext:
         self.process_environment.assign(saved.environment)
         self._event_handlers.restore(saved.handlers)
         self._event_queue.restore(saved.queue)
-        self.__is_shutdown = saved.is_shutdown
+        self.is_shutdown = saved.is_shutdown
         self.on_event = saved.on_event
+
+
+class WatchedConfigurations(dict[str, Any]):
+    """``looked_at`` gets each name that is read or asked for, found or not; who goes through all has seen all."""
+
+    def __init__(self, looked_at: set[str]) -> None:
+        super().__init__()
+        self._looked_at = looked_at
+
+    def __contains__(self, name: object) -> bool:
+        if isinstance(name, str):
+            self._looked_at.add(name)
+        return super().__contains__(name)
+
+    def __getitem__(self, name: str) -> Any:
+        self._looked_at.add(name)
+        return super().__getitem__(name)
+
+    def get(self, name: str, default: Any = None) -> Any:
+        self._looked_at.add(name)
+        return super().get(name, default)
+
+    def keys(self) -> Any:
+        self._looked_at.update(dict(self))
+        return super().keys()
+
+    def values(self) -> Any:
+        self._looked_at.update(dict(self))
+        return super().values()
+
+    def items(self) -> Any:
+        self._looked_at.update(dict(self))
+        return super().items()
+
+    def copy(self) -> WatchedConfigurations:
+        same = WatchedConfigurations(self._looked_at)
+        same.update(self)
+        return same

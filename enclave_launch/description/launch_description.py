@@ -10,10 +10,10 @@ from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.diagnostics.evaluation import launch_file_deprecated
 
 if TYPE_CHECKING:
-    from enclave_launch.description.action import Action
     from enclave_launch.description.actions.arguments import DeclareLaunchArgument
     from enclave_launch.description.actions.includes import IncludeLaunchDescription
     from enclave_launch.description.argument_scan import DeclaredArguments
+    from enclave_launch.description.entity import Action
     from enclave_launch.description.launch_context import LaunchContext
 
 
@@ -21,6 +21,7 @@ class LaunchDescription(LaunchDescriptionEntity):
     """Visited, it gives its entities. ``deprecated_reason`` is warned about at each visit."""
 
     argument_summary: DeclaredArguments | None = None  # of a file whose arguments were collected before
+    deprecated_reason: str | None = None
 
     def __init__(
         self,
@@ -29,7 +30,7 @@ class LaunchDescription(LaunchDescriptionEntity):
         deprecated_reason: str | None = None,
     ) -> None:
         self.__entities = list(initial_entities) if initial_entities is not None else []
-        self.__deprecated_reason = deprecated_reason
+        self.deprecated_reason = deprecated_reason
 
     @property
     def entities(self) -> list[LaunchDescriptionEntity]:
@@ -37,11 +38,7 @@ class LaunchDescription(LaunchDescriptionEntity):
 
     @property
     def deprecated(self) -> bool:
-        return self.__deprecated_reason is not None
-
-    @property
-    def deprecated_reason(self) -> str | None:
-        return self.__deprecated_reason
+        return self.deprecated_reason is not None
 
     def add_entity(self, entity: LaunchDescriptionEntity) -> None:
         self.__entities.append(entity)
@@ -50,9 +47,9 @@ class LaunchDescription(LaunchDescriptionEntity):
         self.add_entity(action)
 
     def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        if self.__deprecated_reason is not None:
+        if self.deprecated_reason is not None:
             file = context.get_locals_as_dict().get("current_launch_file_path")
-            context.host.warn(launch_file_deprecated(file, self.__deprecated_reason))
+            context.host.warn(launch_file_deprecated(file, self.deprecated_reason))
         return self.__entities
 
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:

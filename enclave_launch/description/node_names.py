@@ -1,15 +1,24 @@
-"""Names of nodes: which are valid, how often each is used, how a handler matches them."""
+"""Names of nodes: which are valid, how often each is used, how a handler matches them; rules that remap names."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from enclave_launch.boundary.light import Any
+from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
+    Substitution,
+    normalize_to_list_of_substitutions,
+    perform_substitutions,
+)
 from enclave_launch.diagnostics.evaluation import node_name_repeated
+from enclave_launch.process import RemapRule as ResolvedRule
 from enclave_launch.ros_rules.namespaces import make_namespace_absolute as make_namespace_absolute
 from enclave_launch.ros_rules.namespaces import prefix_namespace as prefix_namespace
+from enclave_launch.source_location import SourceLocation
 from nodl import names
 
 
@@ -94,3 +103,58 @@ def matches_node_name(node_name: str) -> Callable[[Any], bool]:
     """Match node actions by their fully qualified name; without a leading slash it is in the root namespace."""
     full_name = node_name if node_name.startswith("/") else f"/{node_name}"
     return lambda action: bool(action.node_name == full_name)
+
+
+SomeRemapRule = tuple[SomeSubstitutionsType, SomeSubstitutionsType]
+SomeRemapRules = Iterable[SomeRemapRule]
+RemapRule = tuple[tuple[Substitution, ...], tuple[Substitution, ...]]
+RemapRules = Iterable[RemapRule]
+
+
+# ``(from, to)`` pairs as launch files give them, made pairs of substitutions.
+
+
+def normalize_remap_rule(remap_rule: SomeRemapRule) -> RemapRule:
+    """Only a tuple of two will do; a list of two is a ``TypeError``."""
+    ensure_argument_type(remap_rule, tuple, "remap_rule")
+    if len(remap_rule) != 2:
+        raise TypeError(f"remap_rule must be a tuple of length 2, got length {len(remap_rule)}")
+    return PlacedRule.at(
+        getattr(remap_rule, "location", None),
+        tuple(normalize_to_list_of_substitutions(remap_rule[0])),
+        tuple(normalize_to_list_of_substitutions(remap_rule[1])),
+    )
+
+
+def normalize_remap_rules(remap_rules: SomeRemapRules) -> Iterator[RemapRule]:
+    """Lazily: whoever keeps the iterator can read the rules once (upstream's composable nodes do)."""
+    return map(normalize_remap_rule, remap_rules)
+
+
+class PlacedRule(tuple[Any, Any]):
+    """A ``(from, to)`` pair as upstream has it, with its place. Equal to the plain pair."""
+
+    location: SourceLocation | None = None
+
+    @classmethod
+    def at(cls, location: SourceLocation | None, source: Any, target: Any) -> PlacedRule:
+        rule = cls((source, target))
+        rule.location = location
+        return rule
+
+
+def performed_remaps(rules: Iterable[Sequence[Any]], context: LaunchContext) -> list[PlacedRule]:
+    """Normalized rules as pairs of text."""
+    return [
+        PlacedRule.at(
+            getattr(rule, "location", None),
+            perform_substitutions(context, list(rule[0])),
+            perform_substitutions(context, list(rule[1])),
+        )
+        for rule in rules
+    ]
+
+
+def placed(rule: Sequence[str], default: SourceLocation, word: int | None = None) -> ResolvedRule:
+    """The value that policies are derived from; ``default`` is where a plain pair counts as written."""
+    return ResolvedRule(rule[0], rule[1], getattr(rule, "location", None) or default, word)

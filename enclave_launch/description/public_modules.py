@@ -5,12 +5,14 @@ Each name is looked up in our module when it is first asked for, so that a launc
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
+from importlib.machinery import ModuleSpec
 from types import ModuleType
 
-from enclave_launch.boundary.light import Any, NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple, cast
 from enclave_launch.description.upstream_paths import GATES, PATHS
 from enclave_launch.host.current import current_release
 
@@ -66,6 +68,23 @@ def public_module(name: str) -> ModuleType:
     if name in PATHS:
         module.__path__ = []
     return module
+
+
+class _Loader:
+    """Gives the module that the table describes, the same object each time."""
+
+    def create_module(self, spec: ModuleSpec) -> ModuleType:
+        return public_module(spec.name)
+
+    def exec_module(self, module: ModuleType) -> None:
+        """Modules that a name of their package hides are there from the start, so that importing one binds nothing."""
+        for name in hidden_modules(module.__name__):
+            sys.modules.setdefault(name, public_module(name))
+
+
+def spec_of(name: str) -> ModuleSpec | None:
+    """What the import system asks for; ``None`` for a module that the table has not."""
+    return ModuleSpec(name, cast(Any, _Loader())) if exists(name) else None
 
 
 def hidden_modules(name: str) -> Iterable[str]:

@@ -16,57 +16,49 @@ from enclave_launch.description.launch_context import LaunchContext
 class ROSAdapter:
     """Holds an rclpy context and a node ``launch_ros_<pid>``, spun by a thread of its own."""
 
+    ros_context: Any = None
+    ros_node: Any = None
+    ros_executor: Any = None
+
     def __init__(self, *, argv: list[str] | None = None, autostart: bool = True):
         self.__argv = argv or []  # never None: rclpy would take sys.argv
-        self.__context: Any = None
-        self.__node: Any = None
-        self.__executor: Any = None
+        self.ros_context: Any = None
+        self.ros_node: Any = None
+        self.ros_executor: Any = None
         self.__thread: Any = None
         if autostart:
             self.start()
 
     def start(self) -> None:
         """Raises ``RuntimeError`` when already started, ``ImportError`` without rclpy."""
-        if self.__node is not None:
+        if self.ros_node is not None:
             raise RuntimeError("Cannot start a ROS adapter that is already running")
         import threading
 
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
-        self.__context = rclpy.Context()
-        rclpy.init(args=self.__argv, context=self.__context)
-        self.__node = rclpy.create_node(f"launch_ros_{os.getpid()}", context=self.__context)
-        self.__executor = SingleThreadedExecutor(context=self.__context)
-        self.__executor.add_node(self.__node)
-        self.__thread = threading.Thread(target=self.__executor.spin, daemon=True)
+        self.ros_context = rclpy.Context()
+        rclpy.init(args=self.__argv, context=self.ros_context)
+        self.ros_node = rclpy.create_node(f"launch_ros_{os.getpid()}", context=self.ros_context)
+        self.ros_executor = SingleThreadedExecutor(context=self.ros_context)
+        self.ros_executor.add_node(self.ros_node)
+        self.__thread = threading.Thread(target=self.ros_executor.spin, daemon=True)
         self.__thread.start()
 
     def shutdown(self) -> None:
         """Raises ``RuntimeError`` when not started."""
-        if self.__node is None:
+        if self.ros_node is None:
             raise RuntimeError("Cannot shutdown a ROS adapter that is not running")
-        self.__executor.shutdown()
+        self.ros_executor.shutdown()
         self.__thread.join()
-        self.__node.destroy_node()
-        self.__context.try_shutdown()
-        self.__node = None
+        self.ros_node.destroy_node()
+        self.ros_context.try_shutdown()
+        self.ros_node = None
 
     @property
     def argv(self) -> list[str]:
         return self.__argv
-
-    @property
-    def ros_context(self) -> Any:
-        return self.__context
-
-    @property
-    def ros_node(self) -> Any:
-        return self.__node
-
-    @property
-    def ros_executor(self) -> Any:
-        return self.__executor
 
 
 def get_ros_adapter(context: LaunchContext) -> ROSAdapter:

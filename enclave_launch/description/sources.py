@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 class LaunchDescriptionSource:
     """Loads its description once, when first asked with a context. Subclasses say how."""
 
+    method: str = ""
+
     def __init__(
         self,
         launch_description: LaunchDescription | None = None,
@@ -36,7 +38,7 @@ class LaunchDescriptionSource:
         self.__launch_description = launch_description
         self.__location = normalize_to_list_of_substitutions(location)
         self.__expanded_location: str | None = None
-        self.__method = method
+        self.method = method
 
     def try_get_launch_description_without_context(self) -> LaunchDescription | None:
         """Load it for looking only, if its path can be performed in an empty context; ``None`` if anything fails.
@@ -90,10 +92,6 @@ class LaunchDescriptionSource:
         if self.__expanded_location is None:
             return " + ".join(str(sub) for sub in self.__location)
         return self.__expanded_location
-
-    @property
-    def method(self) -> str:
-        return self.__method
 
 
 class InvalidPythonLaunchFileError(Exception):

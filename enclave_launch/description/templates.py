@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, ClassVar, NamedTuple
-from enclave_launch.description.action import Action
+from enclave_launch.description.entity import Action
 from enclave_launch.description.substitution import Substitution, normalize_to_list_of_substitutions
 
 if TYPE_CHECKING:

@@ -15,9 +15,9 @@ from enclave_launch.boundary.light import cast
 from enclave_launch.boundary.words import did_you_mean
 from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.description.conditions import InvalidConditionExpressionError
+from enclave_launch.description.launch_context import WatchedConfigurations
 from enclave_launch.description.markup.expose import action_parse_methods, substitution_parse_methods
 from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
-from enclave_launch.description.watched_configurations import WatchedConfigurations
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.frontend.error_location import frames
 from enclave_launch.host.protocol import MISSING_PREFIX

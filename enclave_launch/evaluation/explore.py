@@ -11,9 +11,13 @@ from __future__ import annotations
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import EmitEvent
 from enclave_launch.description.events.dispatch import chain, run_handler
-from enclave_launch.description.events.event import Shutdown, TimerEvent
+from enclave_launch.description.events.event import (
+    ProcessStarted,
+    Shutdown,
+    TimerEvent,
+    process_event_arguments,
+)
 from enclave_launch.description.events.handlers import EventHandler
-from enclave_launch.description.events.process import ProcessStarted, process_event_arguments
 from enclave_launch.description.location import location_of, place_of
 from enclave_launch.host.user_code import only_acts
 from enclave_launch.process import Reaction, Unforeseeable

@@ -1,13 +1,13 @@
-"""The dry run's world."""
+"""The dry run's world, and its event loop without time."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import heapq
+from collections.abc import Callable, Coroutine, Sequence
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NoReturn
 from enclave_launch.host.base_host import BaseHost
 from enclave_launch.host.protocol import HostOptions
-from enclave_launch.host.virtual_loop import VirtualLoop
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.lifecycle import LifecycleNode
@@ -74,3 +74,135 @@ class PlanHost(BaseHost):
 
     def unforeseeable(self, item: Unforeseeable) -> None:
         self.unforeseen.append(item)
+
+
+class VirtualFuture:
+    """The part of ``asyncio.Future`` that launch code uses, without a loop behind it."""
+
+    def __init__(self) -> None:
+        self._done = False
+        self._cancelled = False
+        self._result: Any = None
+        self._callbacks: list[Callable[[Any], object]] = []
+
+    def done(self) -> bool:
+        return self._done
+
+    def cancelled(self) -> bool:
+        return self._cancelled
+
+    def result(self) -> Any:
+        return self._result
+
+    def exception(self) -> None:
+        return None
+
+    def set_result(self, result: Any) -> None:
+        self._result = result
+        self._finish()
+
+    def cancel(self, msg: object = None) -> bool:
+        if self._done:
+            return False
+        self._cancelled = True
+        self._finish()
+        return True
+
+    def add_done_callback(self, callback: Callable[[Any], object], *, context: object = None) -> None:
+        if self._done:
+            callback(self)
+        else:
+            self._callbacks.append(callback)
+
+    def _finish(self) -> None:
+        self._done = True
+        callbacks, self._callbacks = self._callbacks, []
+        for callback in callbacks:
+            callback(self)
+
+
+class VirtualTimer:
+    """A scheduled call; ``cancel()`` as asyncio's handle."""
+
+    __slots__ = ("args", "callback", "cancelled_", "when")
+
+    def __init__(self, when: float, callback: Callable[..., object], args: tuple[Any, ...]) -> None:
+        self.when = when
+        self.callback = callback
+        self.args = args
+        self.cancelled_ = False
+
+    def cancel(self) -> None:
+        self.cancelled_ = True
+
+    def cancelled(self) -> bool:
+        return self.cancelled_
+
+
+class VirtualLoop:
+    """A clock that jumps from timer to timer."""
+
+    def __init__(self) -> None:
+        self._now = 0.0
+        self._timers: list[tuple[float, int, VirtualTimer]] = []
+        self._count = 0
+        self.used = 0  # how often anything was asked of it: what a live loop would have done
+
+    def time(self) -> float:
+        return self._now
+
+    def create_future(self) -> VirtualFuture:
+        self.used += 1
+        return VirtualFuture()
+
+    def create_task(self, coroutine: Coroutine[Any, Any, Any], **_: Any) -> VirtualFuture:
+        self.used += 1
+        coroutine.close()
+        return VirtualFuture()
+
+    def call_soon(self, callback: Callable[..., object], *args: Any, **_: Any) -> VirtualTimer:
+        return self.call_later(0, callback, *args)
+
+    call_soon_threadsafe = call_soon
+
+    def call_later(self, delay: float, callback: Callable[..., object], *args: Any, **_: Any) -> VirtualTimer:
+        self.used += 1
+        timer = VirtualTimer(self._now + max(delay, 0.0), callback, args)
+        self._count += 1
+        heapq.heappush(self._timers, (timer.when, self._count, timer))
+        return timer
+
+    def run_in_executor(self, executor: object, function: Callable[..., object], *args: Any) -> VirtualFuture:
+        self.used += 1
+        return VirtualFuture()
+
+    def run_until_complete(self, future: object) -> NoReturn:
+        raise RuntimeError("a dry run cannot wait for a coroutine")
+
+    def is_running(self) -> bool:
+        return True
+
+    def fire_next(self) -> bool:
+        """Call the next timer that is due; ``False`` when there is none."""
+        while self._timers:
+            when, _, timer = heapq.heappop(self._timers)
+            if timer.cancelled_:
+                continue
+            self._now = max(self._now, when)
+            timer.callback(*timer.args)
+            return True
+        return False
+
+    def fire_due(self) -> bool:
+        """Call the next timer if it is due by now, without moving the clock."""
+        while self._timers and self._timers[0][2].cancelled_:
+            heapq.heappop(self._timers)
+        if self._timers and self._timers[0][0] <= self._now:
+            return self.fire_next()
+        return False
+
+    def save(self) -> tuple[float, list[tuple[float, int, VirtualTimer]]]:
+        return self._now, list(self._timers)
+
+    def restore(self, saved: tuple[float, list[tuple[float, int, VirtualTimer]]]) -> None:
+        self._now, self._timers = saved[0], list(saved[1])

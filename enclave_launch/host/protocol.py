@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.actions.processes import ExecuteLocal
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.diagnostics import Diagnostic
-    from enclave_launch.host.loading import LoadCache
+    from enclave_launch.host.base_host import LoadCache
     from enclave_launch.host.outcomes import Outcomes
     from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
     from enclave_launch.ros_rules.distro import Release

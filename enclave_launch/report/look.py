@@ -10,8 +10,7 @@ import os
 from collections.abc import Iterable, Mapping, Sequence
 
 from enclave_launch.boundary.light import NamedTuple, TextIO, late_pattern
-from enclave_launch.boundary.short_paths import short_paths
-from enclave_launch.boundary.terminal import message, printable
+from enclave_launch.boundary.terminal import message, printable, short_paths
 from enclave_launch.diagnostics import Diagnostic
 
 _NARROWEST = 40

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH, middleware_of
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics.admission import (
+from enclave_launch.diagnostics.enclaves import (
     enclave_on_both,
     launcher_apart,
     names_apart,

@@ -11,18 +11,18 @@ from signal import Signals
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.conditions import evaluate_condition_expression
-from enclave_launch.description.events.event import Shutdown
-from enclave_launch.description.events.handlers import EventHandler, OnShutdown
-from enclave_launch.description.events.process import (
+from enclave_launch.description.events.event import (
     ProcessExited,
     ProcessStarted,
     ProcessStderr,
     ProcessStdin,
     ProcessStdout,
     ProcessTargetedEvent,
+    Shutdown,
     ShutdownProcess,
     SignalProcess,
 )
+from enclave_launch.description.events.handlers import EventHandler, OnShutdown
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime import run_events

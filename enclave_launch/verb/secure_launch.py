@@ -11,10 +11,10 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from enclave_launch.boundary.command_line import complete, guarded
 from enclave_launch.boundary.light import TYPE_CHECKING
-from enclave_launch.boundary.short_paths import short_paths
 from enclave_launch.boundary.terminal import (
     printable,
     safe_output,
+    short_paths,
     stdout_is_for_the_plan,
     warn,
     write_coloured,
@@ -149,7 +149,7 @@ def _keystore(options: argparse.Namespace) -> str | None:
 
 
 def _resolve(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
-    from enclave_launch.boundary.progress import ProgressLine, wanted
+    from enclave_launch.boundary.terminal import ProgressLine, wanted
     from enclave_launch.flow import resolve
 
     chosen = resolve_options(options)

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Iterator
 from datetime import timedelta
 
-from enclave_launch.boundary.progress import ProgressBar, wanted
+from enclave_launch.boundary.terminal import ProgressBar, wanted
 from enclave_launch.boundary.words import counted, some_of
 from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.options import SecurityOptions

@@ -11,8 +11,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.progress import ProgressBar, wanted
-from enclave_launch.boundary.terminal import json_text
+from enclave_launch.boundary.terminal import ProgressBar, json_text, wanted
 from enclave_launch.boundary.words import counted
 from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.errors import InvalidInputError

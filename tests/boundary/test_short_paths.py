@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.boundary.short_paths import short_paths
+from enclave_launch.boundary.terminal import short_paths
 
 
 @pytest.fixture

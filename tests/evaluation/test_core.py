@@ -13,7 +13,7 @@ from enclave_launch.description.events.dispatch import HandlerTable, chain
 from enclave_launch.description.events.event import Event
 from enclave_launch.description.events.handlers import EventHandler
 from enclave_launch.host.environment import Environment, environment_untouched
-from enclave_launch.host.virtual_loop import VirtualLoop
+from enclave_launch.host.plan_host import VirtualLoop
 from enclave_launch.ros_rules.distro import Distro, Feature, Since, choose_release, release_of
 
 NAMES = st.text("ABC", min_size=1, max_size=2).map(lambda name: f"ENCLAVE_LAUNCH_TEST_{name}")

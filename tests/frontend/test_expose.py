@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.description.action import Action
+from enclave_launch.description.entity import Action
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import action_parse_methods, expose_action, instantiate_action
 from enclave_launch.description.markup.parser import Parser

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
+from enclave_launch.description.entity import Action
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import (
@@ -26,6 +26,11 @@ class DeclareLaunchArgument(Action):
     Raises ``RuntimeError`` for empty choices, and for a default of plain text that is not among them.
     """
 
+    name: str = ""
+    default_value: list[Substitution] | None = None
+    description: str = ""
+    choices: list[str] | None = None
+
     def __init__(
         self,
         name: str,
@@ -36,15 +41,15 @@ class DeclareLaunchArgument(Action):
         **kwargs: Any,
     ) -> None:
         super().__init__(**kwargs)
-        self.__name = name
-        self.__default_value = (
+        self.name = name
+        self.default_value = (
             None if default_value is None else normalize_to_list_of_substitutions(default_value)
         )
-        self.__choices = choices
+        self.choices = choices
         self._conditionally_included = False  # set by the argument scan
         if choices is not None:
             _check_default(default_value, choices)
-        self.__description = _describe(description, choices)
+        self.description = _describe(description, choices)
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
@@ -61,32 +66,16 @@ class DeclareLaunchArgument(Action):
             kwargs["choices"] = [parser.escape_characters(choice.get_attr("value")) for choice in choices]
         return cls, kwargs
 
-    @property
-    def name(self) -> str:
-        return self.__name
-
-    @property
-    def default_value(self) -> list[Substitution] | None:
-        return self.__default_value
-
-    @property
-    def description(self) -> str:
-        return self.__description
-
-    @property
-    def choices(self) -> list[str] | None:
-        return self.__choices
-
     def execute(self, context: LaunchContext) -> None:
         configurations = context.launch_configurations
-        if self.__name not in configurations:
-            if self.__default_value is None:
-                raise RuntimeError(f'Required launch argument "{self.__name}" was not provided.')
-            configurations[self.__name] = perform_substitutions(context, self.__default_value)
-        if self.__choices is not None and configurations[self.__name] not in self.__choices:
+        if self.name not in configurations:
+            if self.default_value is None:
+                raise RuntimeError(f'Required launch argument "{self.name}" was not provided.')
+            configurations[self.name] = perform_substitutions(context, self.default_value)
+        if self.choices is not None and configurations[self.name] not in self.choices:
             raise RuntimeError(
-                f'Argument "{self.__name}" provided value "{configurations[self.__name]}" is not valid. '
-                f"Valid options are: {self.__choices}"
+                f'Argument "{self.name}" provided value "{configurations[self.name]}" is not valid. '
+                f"Valid options are: {self.choices}"
             )
 
 

@@ -7,8 +7,8 @@ from enclave_launch.description.actions.nodes import Node, parse_remaps
 from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.node_names import RemapRules, SomeRemapRules, normalize_remap_rules
 from enclave_launch.description.parameters.normalize import normalize_parameters
-from enclave_launch.description.remap_rules import RemapRules, SomeRemapRules, normalize_remap_rules
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
     Substitution,
@@ -29,6 +29,11 @@ class ComposableNode:
     """
 
     source_location: SourceLocation | None = None
+    node_name: list[Substitution] | None = None
+    node_namespace: list[Substitution] | None = None
+    parameters: Parameters | None = None
+    remappings: RemapRules | None = None
+    extra_arguments: Parameters | None = None
 
     def __init__(
         self,
@@ -44,11 +49,11 @@ class ComposableNode:
     ):
         self.__package = normalize_to_list_of_substitutions(package)
         self.__plugin = normalize_to_list_of_substitutions(plugin)
-        self.__name = None if name is None else normalize_to_list_of_substitutions(name)
-        self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
-        self.__parameters = None if parameters is None else normalize_parameters(parameters)
-        self.__remappings = normalize_remap_rules(remappings) if remappings else None
-        self.__extra_arguments = normalize_parameters(extra_arguments) if extra_arguments else None
+        self.node_name = None if name is None else normalize_to_list_of_substitutions(name)
+        self.node_namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
+        self.parameters = None if parameters is None else normalize_parameters(parameters)
+        self.remappings = normalize_remap_rules(remappings) if remappings else None
+        self.extra_arguments = normalize_parameters(extra_arguments) if extra_arguments else None
         self.__condition = condition
 
     @classmethod
@@ -93,26 +98,6 @@ class ComposableNode:
     def node_plugin(self) -> list[Substitution]:
         return self.__plugin
 
-    @property
-    def node_name(self) -> list[Substitution] | None:
-        return self.__name
-
-    @property
-    def node_namespace(self) -> list[Substitution] | None:
-        return self.__namespace
-
-    @property
-    def parameters(self) -> Parameters | None:
-        return self.__parameters
-
-    @property
-    def remappings(self) -> RemapRules | None:
-        return self.__remappings
-
-    @property
-    def extra_arguments(self) -> Parameters | None:
-        return self.__extra_arguments
-
     def condition(self) -> Condition | None:
         return self.__condition
 
@@ -142,9 +127,11 @@ def _parse_extra_argument(entity: Entity, parser: Parser) -> dict[tuple[Substitu
 class ComposableLifecycleNode(ComposableNode):
     """With ``autostart`` launch configures and activates it once it is loaded."""
 
+    node_autostart: bool = False
+
     def __init__(self, *, autostart: bool = False, **kwargs: Any):
         super().__init__(**kwargs)
-        self.__autostart = autostart
+        self.node_autostart = autostart
 
     @classmethod
     def parse(cls, parser: Parser, entity: Entity) -> tuple[type[ComposableLifecycleNode], dict[str, Any]]:
@@ -153,10 +140,6 @@ class ComposableLifecycleNode(ComposableNode):
         if autostart is not None:
             kwargs["autostart"] = autostart
         return cls, kwargs
-
-    @property
-    def node_autostart(self) -> bool:
-        return self.__autostart
 
 
 def parse_lifecycle_components(entity: Entity, parser: Parser) -> list[ComposableNode]:

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 
 from enclave_launch.boundary.files import as_path
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
 from enclave_launch.description.actions.components import (
     ComposableLifecycleNode,
     ComposableNode,
@@ -14,18 +13,17 @@ from enclave_launch.description.actions.components import (
 )
 from enclave_launch.description.actions.nodes import Node
 from enclave_launch.description.argument_types import ensure_argument_type
-from enclave_launch.description.entity import LaunchDescriptionEntity
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.location import location_of
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.markup.parser import Parser
-from enclave_launch.description.node_names import warn_about_repeats
+from enclave_launch.description.node_names import performed_remaps, placed, warn_about_repeats
 from enclave_launch.description.parameters.descriptions import ParameterFile
 from enclave_launch.description.parameters.evaluate import evaluate_parameters
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
 from enclave_launch.description.parameters.of_component import to_parameters_list
-from enclave_launch.description.remap_rules import performed_remaps, placed
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
     SomeSubstitutionsType_types_tuple,

@@ -7,7 +7,7 @@ from __future__ import annotations
 import os
 
 from enclave_launch.boundary.light import Any
-from enclave_launch.description.action import Action
+from enclave_launch.description.entity import Action
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action

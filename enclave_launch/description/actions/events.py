@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
-from enclave_launch.description.entity import normalize_to_list_of_entities
+from enclave_launch.description.entity import Action, normalize_to_list_of_entities
+from enclave_launch.description.events.event import ProcessExited
 from enclave_launch.description.events.event import Shutdown as ShutdownEvent
-from enclave_launch.description.events.process import ProcessExited
 from enclave_launch.description.markup.expose import expose_action
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from enclave_launch.description.substitution import normalize_to_list_of_substit
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
 
 if TYPE_CHECKING:
-    from enclave_launch.description.action import Action
+    from enclave_launch.description.entity import Action
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
 

@@ -7,7 +7,6 @@ from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
 from enclave_launch.description.actions.configurations import (
     PopLaunchConfigurations,
     PushLaunchConfigurations,
@@ -17,6 +16,7 @@ from enclave_launch.description.actions.configurations import (
 )
 from enclave_launch.description.actions.environment import PopEnvironment, PushEnvironment, ResetEnvironment
 from enclave_launch.description.argument_types import ensure_argument_type
+from enclave_launch.description.entity import Action
 from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
@@ -221,13 +221,15 @@ class ForLoop(Action):
     Raises ``ValueError`` when ``length`` does not perform to an integer.
     """
 
+    name: str | None = None
+
     def __init__(
         self, length: SomeSubstitutionsType, *, function: Body, name: str | None = None, **kwargs: Any
     ) -> None:
         super().__init__(**kwargs)
         self._length = normalize_to_list_of_substitutions(length)
         self._function = function
-        self._name = name
+        self.name = name
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
@@ -245,10 +247,6 @@ class ForLoop(Action):
     @property
     def function(self) -> Body:
         return self._function
-
-    @property
-    def name(self) -> str | None:
-        return self._name
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         entities: list[LaunchDescriptionEntity] = []

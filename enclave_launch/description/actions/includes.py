@@ -8,16 +8,16 @@ import os
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
 from enclave_launch.description.actions.configurations import SetLaunchConfiguration
+from enclave_launch.description.entity import Action
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.sources import AnyLaunchDescriptionSource, LaunchDescriptionSource
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.diagnostics.evaluation import include_left_out
+from enclave_launch.host.base_host import CyclicIncludeError
 from enclave_launch.host.current import current_release
-from enclave_launch.host.loading import CyclicIncludeError
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:

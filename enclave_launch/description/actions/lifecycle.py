@@ -6,11 +6,10 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from enclave_launch.boundary.light import Any, ClassVar
-from enclave_launch.description.action import Action
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.actions.nodes import Node
-from enclave_launch.description.entity import LaunchDescriptionEntity, SomeEntitiesType
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
 from enclave_launch.description.events.event import Event
 from enclave_launch.description.events.handlers import EventHandler
 from enclave_launch.description.events.lifecycle import ChangeState, StateTransition
@@ -38,6 +37,7 @@ class LifecycleNode(Node):
     """Answers ``ChangeState`` events; ``autostart`` (newer distributions) configures and activates."""
 
     process_kind: ProcessKind = "lifecycle_node"
+    node_autostart: bool = False
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class LifecycleNode(Node):
         if autostart is not None and not current_release().has(Feature.LIFECYCLE_AUTOSTART):
             kwargs["autostart"] = autostart  # the base class refuses it, as upstream does
         super().__init__(name=name, namespace=namespace, **kwargs)
-        self.__autostart = bool(autostart)
+        self.node_autostart = bool(autostart)
 
     @classmethod
     def parse(
@@ -62,10 +62,6 @@ class LifecycleNode(Node):
             kwargs["autostart"] = autostart
         return cls, kwargs
 
-    @property
-    def node_autostart(self) -> bool:
-        return self.__autostart
-
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
         """Raises ``RuntimeError`` without a node name, and as ``Node.execute``."""
         self._perform_substitutions(context)
@@ -76,7 +72,7 @@ class LifecycleNode(Node):
         )
         context.register_event_handler(_ChangeStateHandler(self))
         actions = super().execute(context)
-        if not self.__autostart:
+        if not self.node_autostart:
             return actions
 
         return [*(actions or ()), autostart_transition(self.node_name)]
@@ -133,6 +129,8 @@ class OnStateTransition(EventHandler):
     Raises ``RuntimeError`` for a target that is not a lifecycle node.
     """
 
+    target_lifecycle_node: LifecycleNode | None = None
+
     def __init__(
         self,
         *,
@@ -146,12 +144,12 @@ class OnStateTransition(EventHandler):
     ):
         if not isinstance(target_lifecycle_node, (LifecycleNode, type(None))):
             raise RuntimeError("OnStateTransition requires a 'LifecycleNode' action as the target")
-        self.__target = target_lifecycle_node
+        self.target_lifecycle_node = target_lifecycle_node
         self.__asked = (transition, start_state, goal_state)
         super().__init__(matcher=matcher or self.__given_values_match, entities=entities, **kwargs)
 
     def __given_values_match(self, event: Event) -> bool:
-        if not isinstance(event, StateTransition) or self.__target not in (None, event.action):
+        if not isinstance(event, StateTransition) or self.target_lifecycle_node not in (None, event.action):
             return False
         told = (event.transition, event.start_state, event.goal_state)
         return all(asked in (None, value) for asked, value in zip(self.__asked, told, strict=True))
@@ -159,13 +157,9 @@ class OnStateTransition(EventHandler):
     def foresee(self, started: Sequence[Any]) -> Event | None:
         """The first transition of a started lifecycle node that this handler would answer."""
         nodes = [action for action in started if isinstance(action, LifecycleNode)]
-        if self.__target is not None:
-            nodes = [self.__target] if self.__target in nodes else []
+        if self.target_lifecycle_node is not None:
+            nodes = [self.target_lifecycle_node] if self.target_lifecycle_node in nodes else []
         return next(filter(self.matches, _possible_events(nodes)), None)
-
-    @property
-    def target_lifecycle_node(self) -> LifecycleNode | None:
-        return self.__target
 
     @property
     def handler_description(self) -> str:
@@ -173,9 +167,9 @@ class OnStateTransition(EventHandler):
 
     @property
     def matcher_description(self) -> str:
-        if self.__target is None:
+        if self.target_lifecycle_node is None:
             return "event == StateTransition"
-        return f"event == StateTransition and event.action == LifecycleNode({hex(id(self.__target))})"
+        return f"event == StateTransition and event.action == LifecycleNode({hex(id(self.target_lifecycle_node))})"
 
 
 def _possible_events(nodes: Sequence[LifecycleNode]) -> Iterator[StateTransition]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
+from enclave_launch.description.entity import Action
 from enclave_launch.description.logging import get_logger
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions

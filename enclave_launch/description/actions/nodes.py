@@ -11,26 +11,33 @@ from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.entity import Entity, get_data_type_from_identifier
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.markup.parser import Parser
-from enclave_launch.description.node_names import validate_namespace, validate_node_name, warn_about_repeats
+from enclave_launch.description.node_names import (
+    PlacedRule,
+    normalize_remap_rules,
+    performed_remaps,
+    placed,
+    validate_namespace,
+    validate_node_name,
+    warn_about_repeats,
+)
 from enclave_launch.description.parameters.descriptions import ParameterFile, ParameterValue
 from enclave_launch.description.parameters.normalize import normalize_parameters
 from enclave_launch.description.parameters.of_node import NodeParameters
-from enclave_launch.description.remap_rules import PlacedRule, normalize_remap_rules, performed_remaps, placed
 from enclave_launch.description.substitution import (
     Substitution,
     TextSubstitution,
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.description.substitutions.packages import ExecutableInPackage
+from enclave_launch.description.substitutions.paths import ExecutableInPackage
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, ProcessKind
 from enclave_launch.ros_rules.namespaces import NAMESPACE, make_namespace_absolute, prefix_namespace
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import LaunchDescriptionEntity
     from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.node_names import SomeRemapRules
     from enclave_launch.description.parameters.types import SomeParameters
-    from enclave_launch.description.remap_rules import SomeRemapRules
     from enclave_launch.description.substitution import SomeSubstitutionsType
     from enclave_launch.process import RemapRule, ResolvedProcess
 

@@ -11,9 +11,9 @@ from collections.abc import Callable, Iterable, Mapping
 
 from enclave_launch.boundary import shell_words
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
 from enclave_launch.description.actions.executable import Executable
 from enclave_launch.description.actions.process_attributes import attributes_of
+from enclave_launch.description.entity import Action
 from enclave_launch.description.location import location_of
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
@@ -33,7 +33,7 @@ from enclave_launch.ros_rules.ros_arguments import RosArguments, parse_ros_argum
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import LaunchDescriptionEntity, SomeEntitiesType
-    from enclave_launch.description.events.process import ProcessExited
+    from enclave_launch.description.events.event import ProcessExited
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution

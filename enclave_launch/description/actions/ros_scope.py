@@ -5,15 +5,15 @@
 from __future__ import annotations
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
+from enclave_launch.description.entity import Action
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.location import location_of
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.node_names import PlacedRule
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
-from enclave_launch.description.remap_rules import PlacedRule
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
     SubstitutionFailure,
@@ -142,9 +142,11 @@ class SetParametersFromFile(TemplateAction):
 class SetUseSimTime(Action):
     """The clock of launch's own node (for ``ros_timer``). Launched nodes get ``use_sim_time`` by ``SetParameter``."""
 
+    value: bool | SomeSubstitutionsType | None = None
+
     def __init__(self, value: bool | SomeSubstitutionsType, **kwargs: Any):
         super().__init__(**kwargs)
-        self.__value = value
+        self.value = value
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetUseSimTime], dict[str, Any]]:
@@ -152,16 +154,12 @@ class SetUseSimTime(Action):
         kwargs["value"] = parser.parse_substitution(entity.get_attr("value"))
         return cls, kwargs
 
-    @property
-    def value(self) -> bool | SomeSubstitutionsType:
-        return self.__value
-
     def execute(self, context: LaunchContext) -> None:
         """Older releases pass the text of the front ends on unevaluated, and refuse to switch it off.
 
         Raises ``ValueError`` for what is not a bool, ``RuntimeError`` for ``False``.
         """
-        value = self.__value
+        value = self.value
         if context.host.release.has(Feature.SIM_TIME_IN_FRONTENDS):
             perform_typed_substitution(context, normalize_typed_substitution(value, bool), bool)
             return

@@ -6,10 +6,9 @@ import collections.abc
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.action import Action
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.argument_types import ensure_argument_type
-from enclave_launch.description.entity import LaunchDescriptionEntity
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.description.events.event import Shutdown, TimerEvent
 from enclave_launch.description.events.handlers import BaseEventHandler
 from enclave_launch.description.markup.expose import expose_action
@@ -36,6 +35,9 @@ class TimerAction(Action):
     period is performed after the visit in progress.
     """
 
+    period: Any = None
+    actions: Iterable[LaunchDescriptionEntity] = ()
+
     def __init__(
         self,
         *,
@@ -49,8 +51,8 @@ class TimerAction(Action):
         ensure_argument_type(actions, collections.abc.Iterable, "actions", "TimerAction")
         if isinstance(period, str):
             period = float(period)
-        self.__period: Any = normalize_typed_substitution(period, float)
-        self.__actions = actions
+        self.period: Any = normalize_typed_substitution(period, float)
+        self.actions = actions
         self.__cancel_on_shutdown: Any = normalize_typed_substitution(cancel_on_shutdown, bool)
         self.__locals: dict[str, Any] = {}
         self.__configurations: dict[str, Any] | None = None
@@ -71,19 +73,11 @@ class TimerAction(Action):
             kwargs["cancel_on_shutdown"] = parser.parse_if_substitutions(cancel)
         return cls, kwargs
 
-    @property
-    def period(self) -> Any:
-        return self.__period
-
-    @property
-    def actions(self) -> Iterable[LaunchDescriptionEntity]:
-        return self.__actions
-
     def describe(self) -> str:
-        return f"TimerAction(period={self.__period}, actions=<actions>)"
+        return f"TimerAction(period={self.period}, actions=<actions>)"
 
     def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
-        return [(f"{self.__period} seconds pass without being canceled", self.__actions)]
+        return [(f"{self.period} seconds pass without being canceled", self.actions)]
 
     def get_asyncio_future(self) -> Any:
         return self._completed_future
@@ -111,7 +105,7 @@ class TimerAction(Action):
         return None
 
     def _start_waiting(self, context: LaunchContext, mark: str | None) -> None:
-        self.performed_period = float(perform_typed_substitution(context, self.__period, float))
+        self.performed_period = float(perform_typed_substitution(context, self.period, float))
         self._schedule(context, self.performed_period, mark)
 
     def _schedule(self, context: LaunchContext, seconds: float, mark: str | None) -> None:
@@ -128,7 +122,7 @@ class TimerAction(Action):
         """What the timer event gives; called while it is handled."""
         context.extend_locals(self.__locals)
         if self.__configurations is None and self.__environment is None:
-            return self.__actions
+            return self.actions
         return self.__in_kept_state()
 
     def __keep_state(self, context: LaunchContext) -> None:
@@ -153,7 +147,7 @@ class TimerAction(Action):
             context._pop_environment()
             context._pop_launch_configurations()
 
-        return [OpaqueFunction(function=begin), *self.__actions, OpaqueFunction(function=end)]
+        return [OpaqueFunction(function=begin), *self.actions, OpaqueFunction(function=end)]
 
 
 class _OnTimerEvent(BaseEventHandler):

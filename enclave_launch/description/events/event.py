@@ -1,14 +1,18 @@
-"""Events: something happened, or is asked for."""
+"""Events: something happened, or is asked for; those of processes, their matchers and what a dry run supposes."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description.argument_types import ensure_argument_type
 
 if TYPE_CHECKING:
-    from enclave_launch.description.action import Action
+    import signal as signals
+
+    from enclave_launch.description.actions.processes import ExecuteLocal
     from enclave_launch.description.actions.timers import TimerAction
+    from enclave_launch.description.entity import Action
     from enclave_launch.description.launch_description import LaunchDescription
 
 
@@ -56,18 +60,12 @@ class Shutdown(Event):
     """``reason`` for the log; ``due_to_sigint``: the children got the signal as well."""
 
     name = "launch.events.Shutdown"
+    reason: Any = "reason not given"
+    due_to_sigint: bool = False
 
     def __init__(self, *, reason: Any = "reason not given", due_to_sigint: bool = False) -> None:
-        self.__reason = reason
-        self.__due_to_sigint = due_to_sigint
-
-    @property
-    def reason(self) -> Any:
-        return self.__reason
-
-    @property
-    def due_to_sigint(self) -> bool:
-        return self.__due_to_sigint
+        self.reason = reason
+        self.due_to_sigint = due_to_sigint
 
 
 class TimerEvent(Event):
@@ -94,3 +92,209 @@ def matches_action(target_action: Action) -> Callable[[Action], bool]:
 def event_named(name: str) -> Callable[[Event], bool]:
     """A matcher of the events with this name."""
     return lambda event: event.name == name
+
+
+class RunningProcessEvent(Event):
+    """``process_name`` is NAME-N; ``cmd``, ``cwd``, ``env`` are final."""
+
+    name = "launch.events.process.RunningProcessEvent"
+    process_name: str = ""
+    cwd: str | None = None
+    env: Mapping[str, str] | None = None
+    pid: int = 0
+
+    def __init__(
+        self,
+        *,
+        action: ExecuteLocal,
+        name: str,
+        cmd: list[str],
+        cwd: str | None,
+        env: Mapping[str, str] | None,
+        pid: int,
+    ) -> None:
+        self.__action = action
+        self.process_name = name
+        self.__cmd = cmd
+        self.cwd = cwd
+        self.env = env
+        self.pid = pid
+
+    @property
+    def action(self) -> ExecuteLocal:
+        return self.__action
+
+    @property
+    def execute_process_action(self) -> ExecuteLocal:
+        return self.__action
+
+    @property
+    def cmd(self) -> list[str]:
+        return self.__cmd
+
+    def subject(self) -> str:
+        return self.process_name
+
+
+class ProcessStarted(RunningProcessEvent):
+    """The process runs."""
+
+    name = "launch.events.process.ProcessStarted"
+
+
+class ProcessExited(RunningProcessEvent):
+    """The process has ended with ``returncode``; negative is the number of a signal."""
+
+    name = "launch.events.process.ProcessExited"
+    returncode: int = 0
+
+    def __init__(self, *, returncode: int, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.returncode = returncode
+
+
+class ProcessIO(RunningProcessEvent):
+    """``text`` (bytes) came from, or goes to, the stream with this file descriptor."""
+
+    name = "launch.events.process.ProcessIO"
+    text: bytes = b""
+
+    def __init__(self, *, text: bytes, fd: int, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.text = text
+        self.__fd = fd
+
+    @property
+    def from_stdin(self) -> bool:
+        return self.__fd == 0
+
+    @property
+    def from_stdout(self) -> bool:
+        return self.__fd == 1
+
+    @property
+    def from_stderr(self) -> bool:
+        return self.__fd == 2
+
+
+class ProcessStdin(ProcessIO):
+    """``text`` goes to the standard input of the process."""
+
+    name = "launch.events.process.ProcessStdin"
+
+    def __init__(self, *, text: bytes, **kwargs: Any) -> None:
+        super().__init__(text=text, fd=0, **kwargs)
+
+
+class ProcessStdout(ProcessIO):
+    """``text`` came from the standard output of the process."""
+
+    name = "launch.events.process.ProcessStdout"
+
+    def __init__(self, *, text: bytes, **kwargs: Any) -> None:
+        super().__init__(text=text, fd=1, **kwargs)
+
+
+class ProcessStderr(ProcessIO):
+    """``text`` came from the standard error output of the process."""
+
+    name = "launch.events.process.ProcessStderr"
+
+    def __init__(self, *, text: bytes, **kwargs: Any) -> None:
+        super().__init__(text=text, fd=2, **kwargs)
+
+
+class ProcessTargetedEvent(Event):
+    """For the processes that ``process_matcher`` accepts."""
+
+    name = "launch.events.process.ProcessTargetedEvent"
+
+    def __init__(self, *, process_matcher: Callable[[ExecuteLocal], bool]) -> None:
+        self.__process_matcher = process_matcher
+
+    @property
+    def process_matcher(self) -> Callable[[ExecuteLocal], bool]:
+        return self.__process_matcher
+
+
+# Matchers for ``ProcessTargetedEvent``; a process that was not prepared matches none.
+
+Matcher = Callable[["ExecuteLocal"], bool]
+
+
+def _matches(test: Callable[[dict[str, Any]], bool]) -> Matcher:
+    def matcher(action: ExecuteLocal) -> bool:
+        details = action.process_details
+        return details is not None and test(details)
+
+    return matcher
+
+
+def matches_pid(pid: int) -> Matcher:
+    """The process with this id."""
+    return _matches(lambda details: bool(details["pid"] == pid))
+
+
+def matches_name(name: str) -> Matcher:
+    """By NAME-N."""
+    return _matches(lambda details: bool(details["name"] == name))
+
+
+def matches_executable(executable: str) -> Matcher:
+    """By the end of the first word of the command."""
+    return _matches(lambda details: bool(details["cmd"][0].endswith(executable)))
+
+
+class ShutdownProcess(ProcessTargetedEvent):
+    """Ends with SIGINT, then SIGTERM, then SIGKILL."""
+
+    name = "launch.events.process.ShutdownProcess"
+
+
+class SignalProcess(ProcessTargetedEvent):
+    """``signal_number``: one of ``signal.Signals``, or the text ``SIGKILL``."""
+
+    name = "launch.events.process.SignalProcess"
+
+    def __init__(
+        self, *, signal_number: str | signals.Signals, process_matcher: Callable[[ExecuteLocal], bool]
+    ) -> None:
+        super().__init__(process_matcher=process_matcher)
+        import signal as signals  # has a thousand names to convert, which few launches need
+
+        ensure_argument_type(signal_number, (str, signals.Signals), "signal_number", "SignalProcess")
+        self.__signal = signal_number
+
+    @property
+    def signal(self) -> str | signals.Signals:
+        return self.__signal
+
+    @property
+    def signal_name(self) -> str:
+        return self.__signal if isinstance(self.__signal, str) else self.__signal.name
+
+
+def process_event_arguments(action: Any) -> dict[str, Any]:
+    """The constructor arguments of an event about a process that was prepared."""
+    return {"pid": 0, **(action.process_details or {})}
+
+
+def suppose_process_event(matches: Callable[[Event], bool], started: Sequence[Any]) -> Event | None:
+    """The first of exit and output, of the started processes in order, that ``matches``; ``None``: none does.
+
+    ``matches`` is foreign code that may expect another kind of event; what it raises means no.
+    """
+
+    for action in started:
+        arguments = process_event_arguments(action)
+        for event in (
+            ProcessExited(returncode=0, **arguments),
+            ProcessStdout(text=b"", **arguments),
+            ProcessStderr(text=b"", **arguments),
+        ):
+            try:
+                if matches(event):
+                    return event
+            except Exception:  # foreign matcher, see above
+                continue
+    return None

@@ -6,15 +6,14 @@ import collections.abc
 from collections.abc import Callable, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeAlias
-from enclave_launch.description.action import Action
-from enclave_launch.description.entity import LaunchDescriptionEntity
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.description.events.event import (
     Event,
     ExecutionComplete,
     IncludeLaunchDescription,
     Shutdown,
+    suppose_process_event,
 )
-from enclave_launch.description.events.process import suppose_process_event
 from enclave_launch.host.user_code import called_for_entities
 
 if TYPE_CHECKING:
@@ -34,14 +33,11 @@ class BaseEventHandler:
     target: object | None = None
     internal = False  # launch's own: part of how it works, not of what the launch file says
     source_location: SourceLocation | None = None  # of the action that registered it
+    handle_once: bool = False
 
     def __init__(self, *, matcher: Callable[[Event], bool], handle_once: bool = False) -> None:
         self.__matcher = matcher
-        self.__handle_once = handle_once
-
-    @property
-    def handle_once(self) -> bool:
-        return self.__handle_once
+        self.handle_once = handle_once
 
     @property
     def handler_description(self) -> str | None:
@@ -65,7 +61,7 @@ class BaseEventHandler:
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         """Subclasses call this first: it makes the event a local and honours ``handle_once``."""
         context.extend_locals({"event": event})
-        if self.__handle_once:
+        if self.handle_once:
             context.unregister_event_handler(self)
         return None
 
@@ -84,6 +80,8 @@ class BaseEventHandler:
 class EventHandler(BaseEventHandler):
     """Gives ``entities`` whenever ``matcher`` holds."""
 
+    entities: SomeEntitiesType | None = None
+
     def __init__(
         self,
         *,
@@ -92,21 +90,17 @@ class EventHandler(BaseEventHandler):
         handle_once: bool = False,
     ) -> None:
         super().__init__(matcher=matcher, handle_once=handle_once)
-        self.__entities = entities
-
-    @property
-    def entities(self) -> SomeEntitiesType | None:
-        return self.__entities
+        self.entities = entities
 
     def describe(self) -> tuple[str, list[Any]]:
         text, entities = super().describe()
-        if self.__entities:
-            entities.extend(self.__entities)  # type: ignore[arg-type]  # one entity is a TypeError, as upstream
+        if self.entities:
+            entities.extend(self.entities)  # type: ignore[arg-type]  # one entity is a TypeError, as upstream
         return text, entities
 
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         super().handle(event, context)
-        return self.__entities
+        return self.entities
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
         """The exit, or the first output, of a started process that the matcher takes."""

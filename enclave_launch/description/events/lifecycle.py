@@ -32,6 +32,7 @@ class ChangeState(Event):
         **_constants(State, "PRIMARY_STATE_"),
         **_constants(State, "TRANSITION_STATE_"),
     }
+    transition_id: int = 0
 
     def __init__(self, *, lifecycle_node_matcher: Callable[[Any], bool], transition_id: int):
         super().__init__()
@@ -39,26 +40,23 @@ class ChangeState(Event):
             known = ", ".join(f"{name}: {value}" for value, name in self.valid_transitions.items())
             raise ValueError(f"given transition_id of '{transition_id}', expected one of {{{known}}}")
         self.__lifecycle_node_matcher = lifecycle_node_matcher
-        self.__transition_id = transition_id
+        self.transition_id = transition_id
 
     @property
     def lifecycle_node_matcher(self) -> Callable[[Any], bool]:
         return self.__lifecycle_node_matcher
-
-    @property
-    def transition_id(self) -> int:
-        return self.__transition_id
 
 
 class StateTransition(Event):
     """``msg`` is a ``lifecycle_msgs/msg/TransitionEvent`` that ``action``'s node published."""
 
     name = "launch_ros.events.lifecycle.StateTransition"
+    msg: Any = None
 
     def __init__(self, *, action: LifecycleNode, msg: Any):
         super().__init__()
         self.__action = action
-        self.__msg = msg
+        self.msg = msg
 
     def subject(self) -> str:
         return self.__action.node_name
@@ -68,24 +66,20 @@ class StateTransition(Event):
         return self.__action
 
     @property
-    def msg(self) -> Any:
-        return self.__msg
-
-    @property
     def timestamp(self) -> int:
-        return int(self.__msg.timestamp)
+        return int(self.msg.timestamp)
 
     @property
     def transition(self) -> str:
-        return str(self.__msg.transition.label)
+        return str(self.msg.transition.label)
 
     @property
     def start_state(self) -> str:
-        return str(self.__msg.start_state.label)
+        return str(self.msg.start_state.label)
 
     @property
     def goal_state(self) -> str:
-        return str(self.__msg.goal_state.label)
+        return str(self.msg.goal_state.label)
 
 
 def matches_node_name(node_name: str) -> Callable[[Any], bool]:

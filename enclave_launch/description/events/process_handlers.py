@@ -6,13 +6,13 @@ from collections.abc import Callable, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.processes import ExecuteLocal, ExecuteProcess
-from enclave_launch.description.events.handlers import OnActionEventBase
-from enclave_launch.description.events.process import (
+from enclave_launch.description.events.event import (
     ProcessExited,
     ProcessIO,
     ProcessStarted,
     process_event_arguments,
 )
+from enclave_launch.description.events.handlers import OnActionEventBase
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import SomeEntitiesType

@@ -2,7 +2,7 @@
 
 ``parse`` methods are registered by decorator when their module is imported; ``instantiate_*`` calls them.
 A name that is not registered yet is looked for in our own modules, then in other installed packages
-(``extensions``).
+(``tags``).
 """
 
 from __future__ import annotations
@@ -12,13 +12,13 @@ from collections.abc import Callable, Iterable
 from types import FunctionType, MethodType
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeVar
-from enclave_launch.description.markup import extensions
+from enclave_launch.description.markup.tags import registrations_of
 from enclave_launch.frontend import error_location
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Since
 
 if TYPE_CHECKING:
-    from enclave_launch.description.action import Action
+    from enclave_launch.description.entity import Action
     from enclave_launch.description.markup.entity import Entity
     from enclave_launch.description.markup.parser import Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
@@ -102,7 +102,7 @@ def _lookup(kind: str, name: str) -> ParseMethod | None:
 
 
 def _import_and_lookup(kind: str, name: str) -> ParseMethod | None:
-    for register in extensions.registrations_of(kind, name):
+    for register in registrations_of(kind, name):
         register()
         if name in _METHODS[kind]:
             return _lookup(kind, name)

@@ -8,13 +8,13 @@ import warnings
 from collections.abc import Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, TextIO
-from enclave_launch.description.markup import expose, extensions, parse_substitution
+from enclave_launch.description.markup import expose, parse_substitution, tags
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.frontend import launch_file
 from enclave_launch.frontend.error_location import mark
 
 if TYPE_CHECKING:
-    from enclave_launch.description.action import Action
+    from enclave_launch.description.entity import Action
     from enclave_launch.description.launch_description import LaunchDescription
     from enclave_launch.description.substitution import Substitution
 
@@ -61,7 +61,7 @@ class Parser:
     @classmethod
     def load_launch_extensions(cls) -> None:
         """Import everything that registers actions and substitutions."""
-        extensions.load_all()
+        tags.load_all()
         cls.extensions_loaded = True
 
     @classmethod

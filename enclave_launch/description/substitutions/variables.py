@@ -74,25 +74,20 @@ class EnvironmentVariable(TemplateSubstitution):
 class LocalSubstitution(Substitution):
     """A Python expression on the locals of the context: ``event.process_name``."""
 
+    expression: str = ""
+    description: str | None = None
+
     def __init__(self, expression: str, description: str | None = None) -> None:
         ensure_argument_type(expression, str, "expression", "LocalSubstitution")
-        self.__expression = expression
-        self.__description = description
-
-    @property
-    def expression(self) -> str:
-        return self.__expression
-
-    @property
-    def description(self) -> str | None:
-        return self.__description
+        self.expression = expression
+        self.description = description
 
     def describe(self) -> str:
-        return f"LocalVar('{self.__expression if self.__description is None else self.__description}')"
+        return f"LocalVar('{self.expression if self.description is None else self.description}')"
 
     def perform(self, context: LaunchContext) -> str:
         # Only Python launch files, which are code themselves, can make one of these.
-        value: str = eval(f"context.locals.{self.__expression}", {"context": context})
+        value: str = eval(f"context.locals.{self.expression}", {"context": context})
         return value
 
 
