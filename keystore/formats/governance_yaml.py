@@ -30,8 +30,9 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
+from keystore.formats.given_file import read_given
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, parse_governance
-from keystore.formats.strict_yaml import Strict, parse_strict, read_given
+from keystore.formats.strict_yaml import Strict, parse_strict
 
 
 class _Topic(Strict):

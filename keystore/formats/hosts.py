@@ -29,7 +29,8 @@ from typing import NamedTuple, Optional
 from pydantic import Field, StrictBool, StrictInt, StrictStr
 
 from keystore.errors import InvalidInputError, printable
-from keystore.formats.strict_yaml import Strict, parse_strict, read_given
+from keystore.formats.given_file import read_given
+from keystore.formats.strict_yaml import Strict, parse_strict
 
 _HOST = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]{0,61}[A-Za-z0-9])?\Z")
 _MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")

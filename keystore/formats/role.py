@@ -10,3 +10,8 @@ class Role(str, Enum):
 
     IDENTITY = "identity_ca"
     PERMISSIONS = "permissions_ca"
+
+    @property
+    def label(self) -> str:
+        """For a person: ``identity CA``."""
+        return self.value.replace("_ca", " CA")

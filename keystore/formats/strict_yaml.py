@@ -5,16 +5,13 @@ What the governance and the hosts file have in common.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any, TypeVar
 
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from enclave_launch.boundary.files import read_bytes
-from keystore.errors import InvalidInputError, printable
-
-MAX_BYTES = 200_000
+from keystore.errors import InvalidInputError
+from keystore.formats.given_file import MAX_BYTES
 
 
 # Only what pydantic 1.8 and 2 have in common: no Python union operator, no ``model_*``, no constraint on a list.
@@ -23,14 +20,6 @@ class Strict(BaseModel, extra="forbid"):
 
 
 _Document = TypeVar("_Document", bound=Strict)
-
-
-def read_given(path: Path) -> bytes:
-    """The bytes of a file that somebody named. Raises InvalidInputError."""
-    try:
-        return read_bytes(path, MAX_BYTES)
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
 
 
 def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:

@@ -95,9 +95,14 @@ def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> Priva
     return key
 
 
+def is_token_uri(reference: bytes) -> bool:
+    """Whether a key file holds the ``pkcs11:`` URI of a key in a token instead of a key."""
+    return reference.lstrip().startswith(b"pkcs11:")
+
+
 def open_signer(reference: bytes, place: str, access: CaAccess) -> Signer:
     """The signer behind a key file of ``private/``: PEM, or the ``pkcs11:`` URI of a ``.p11`` file."""
-    if reference.lstrip().startswith(b"pkcs11:"):
+    if is_token_uri(reference):
         from keystore.signing.pkcs11_signer import Pkcs11Signer
 
         return Pkcs11Signer.open(

@@ -14,7 +14,6 @@ from datetime import timedelta
 from pathlib import Path
 
 from enclave_launch.boundary.dependencies import require
-from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, safe_files, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.settings import KeystoreSettings
@@ -23,6 +22,7 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, NotAKeystoreError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.domains import Domains
+from keystore.formats.given_file import read_given
 from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
@@ -30,9 +30,9 @@ from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
 from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, check_can_serve
-from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.ca_access import Secret
 from keystore.signing.public_key import key_kind
-from keystore.signing.signer import FileSigner, open_signer
+from keystore.signing.signer import Signer, open_signer
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import ChangeOptions, opened_for_change
@@ -100,14 +100,13 @@ def refuse_unusable(options: CreateOptions) -> None:
         Validity.starting(now, lifetime, backdate=options.backdate)
     for name in options.names.values():
         authority.refuse_ca_name(name)
-    passphrase = passphrase_for_new_keys(options.encrypt_ca_keys, options.access)
-    if passphrase is not None:
+    if (passphrase := _passphrase(options)) is not None:
         passphrase.value()
     for role, given in options.imported.items():
         if given.key is None:
             _external_ca(role, options)
         else:
-            _import_ca(role, options, [])
+            _import_ca(role, options, given.key)
 
 
 def _refuse_foreign(root: Path) -> None:
@@ -126,62 +125,67 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
     warnings: list[str] = []
     install_incoming(opened)
     if not view.is_complete:
-        _write_settings(opened, options, actions)
+        if _write_settings(opened, options):
+            actions.append("settings written")
         for directory in (layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES):
             opened.ensure_directory(directory)
     for role in Role:
-        _complete_ca(opened, role, options, actions, warnings)
-    _complete_governance(opened, options, actions)
+        if os.path.exists(opened.root / layout.ca_cert(role)):
+            _record_present_ca(opened, role, options)  # its key may be missing: the CA may be kept elsewhere
+            continue
+        verb, told = _add_ca(opened, role, options)
+        actions.append(f"{role.label} {verb}")
+        warnings += told
+    if _complete_governance(opened, options):
+        actions.append("governance signed")
     return CreateReport(opened.root, tuple(actions), tuple(warnings))
 
 
-def _write_settings(opened: Store, options: CreateOptions, actions: list[str]) -> None:
-    """Before anything else: it marks the directory as ours."""
+def _write_settings(opened: Store, options: CreateOptions) -> bool:
+    """Before anything else: it marks the directory as ours. Returns whether it was needed."""
     if os.path.lexists(opened.root / layout.SETTINGS) or os.path.lexists(opened.root / layout.PUBLIC):
-        return
+        return False
     with opened.batch() as batch:
         batch.file(layout.SETTINGS, options.settings.to_json())
-    actions.append("settings written")
+    return True
 
 
-def _complete_ca(
-    opened: Store, role: Role, options: CreateOptions, actions: list[str], warnings: list[str]
-) -> None:
-    has_cert = os.path.exists(opened.root / layout.ca_cert(role))
+def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, list[str]]:
+    """Import or make the CA for ``role``; what was done and what to know of it, in words."""
     view = KeystoreView(opened.root)
-    if has_cert:
-        if role in options.imported:
-            _refuse_other_ca(opened, role, options.imported[role])
-        _record_present_ca(opened, view, role)
-        return  # a key may be missing: the CA may be kept elsewhere
     _refuse_foreign_enclaves(view, role)
-    if role in options.imported and options.imported[role].key is None:
+    given = options.imported.get(role)
+    if given is not None and given.key is None:
         facts = _external_ca(role, options)
         with opened.batch() as batch:
             batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
             batch.file(layout.ca_cert(role), authority.pem_certificate(facts.der))
-        actions.append(
-            f"{role.value.replace('_ca', ' CA')} of somebody else imported; it signs what hosts request"
-        )
-        return
-    if role in options.imported:
-        made, key_name, key_bytes = _import_ca(role, options, warnings)
-        verb = "imported"
+        return "of somebody else imported; it signs what hosts request", []
+    if given is not None and given.key is not None:
+        made, key = _import_ca(role, options, given.key)
+        verb, warnings = "imported", _shared_ca_warnings(role, options)
     else:
-        made, key_name, key_bytes = _make_ca(opened, view, role, options)
-        verb = "created"
-    put_incoming(opened, role, made.pem(), key_name, key_bytes)
+        made, key = _present_key_ca(view, role, options) or new_ca(role, options)
+        verb, warnings = "created", []
+    put_incoming(opened, role, made.pem(), key)
     install_incoming(opened)
-    actions.append(f"{role.value.replace('_ca', ' CA')} {verb}")
-    if authority_kind(made) not in ("P-256", "RSA-2048"):
+    if (kind := key_kind(made.facts.public_key)) not in ("P-256", "RSA-2048"):
         warnings.append(
-            f"the {role.value.replace('_ca', ' CA')} key is {authority_kind(made)}: "
-            "Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
+            f"the {role.label} key is {kind}: Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
         )
+    return verb, warnings
 
 
-def _record_present_ca(opened: Store, view: KeystoreView, role: Role) -> None:
-    """Of a keystore that an earlier version, or SROS2, left incomplete: the register knows no CA of this role yet."""
+def _record_present_ca(opened: Store, role: Role, options: CreateOptions) -> None:
+    """The register knows no CA of this role yet where an earlier version, or SROS2, left the keystore incomplete."""
+    view = KeystoreView(opened.root)
+    if role in options.imported:
+        place = options.imported[role].certificate
+        if read_certificate(read_given(place), printable(place)).der != view.ca(role).der:
+            raise InvalidInputError(
+                f"the keystore has another {role.value} already; a CA is replaced with: "
+                "secure-keystore renew KEYSTORE --ca start"
+            )
     known = {its for (its, _), state in opened.register.authorities.items() if state is AuthorityState.IN_USE}
     if view.key_file(role) is not None and role not in known:
         with opened.batch() as batch:
@@ -192,69 +196,58 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
     """A bundle of stand-alone enclaves, or a lost CA: another CA would replace what these enclaves trust."""
     if view.key_file(role) is None and os.path.isdir(view.root / layout.ENCLAVES) and view.enclaves():
         raise DamagedKeystoreError(
-            f"{printable(view.root)} holds enclaves, but not the {role.value.replace('_ca', ' CA')} they belong to: "
+            f"{printable(view.root)} holds enclaves, but not the {role.label} they belong to: "
             "a deployed copy, or a keystore to restore from a backup"
         )
 
 
-def authority_kind(made: Authority) -> str:
-    """Algorithm and size of a CA's key, in words for a report."""
-    return key_kind(made.facts.public_key)
+def new_ca(role: Role, options: CreateOptions) -> tuple[Authority, bytes]:
+    """A fresh CA and its key file."""
+    signer = authority.new_key(options.curve)
+    return _self_signed(role, options, signer), authority.key_pem(signer, _passphrase(options))
 
 
-def _refuse_other_ca(opened: Store, role: Role, imported: ImportedCa) -> None:
-    given = read_certificate(_read_given(imported.certificate), printable(imported.certificate))
-    if given.der != KeystoreView(opened.root).ca(role).der:
-        raise InvalidInputError(
-            f"the keystore has another {role.value} already; a CA is replaced with: "
-            "secure-keystore renew KEYSTORE --ca start"
-        )
-
-
-def _make_ca(
-    opened: Store, view: KeystoreView, role: Role, options: CreateOptions
-) -> tuple[Authority, str, bytes]:
-    """A new key and certificate; a key that is there already (an interrupted SROS2 run) is kept."""
-    now = options.now or utc_now()
-    validity = Validity.starting(now, options.ca_lifetime, backdate=options.backdate)
-    name = options.names.get(role) or authority.default_ca_name(role)
+def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> tuple[Authority, bytes] | None:
+    """A key that is there already (an interrupted SROS2 run) is kept."""
     present = view.key_file(role)
-    if present is not None:
-        reference = safe_files.read_private(opened.root, present)
-        signer = open_signer(reference, printable(opened.root / present), options.access)
-        return authority.self_signed_ca(role, name, signer, validity), present.rpartition("/")[2], reference
-    fresh = authority.new_key(options.curve)
-    made = authority.self_signed_ca(role, name, fresh, validity)
-    return (
-        made,
-        layout.KEY,
-        authority.key_pem(fresh, passphrase_for_new_keys(options.encrypt_ca_keys, options.access)),
+    if present is None:
+        return None
+    reference = safe_files.read_private(view.root, present)
+    return _self_signed(
+        role, options, open_signer(reference, printable(view.root / present), options.access)
+    ), reference
+
+
+def _self_signed(role: Role, options: CreateOptions, signer: Signer) -> Authority:
+    validity = Validity.starting(options.now or utc_now(), options.ca_lifetime, backdate=options.backdate)
+    return authority.self_signed_ca(
+        role, options.names.get(role) or authority.default_ca_name(role), signer, validity
     )
 
 
-def passphrase_for_new_keys(encrypt: bool, access: CaAccess) -> Secret | None:
-    """What new CA keys are encrypted with; ``None``: they are not. Raises ``InvalidInputError`` without a
-    passphrase."""
-    if encrypt and access.passphrase is None:
+def _passphrase(options: CreateOptions) -> Secret | None:
+    """What new CA keys are encrypted with; None: they are not. Raises ``InvalidInputError`` without a passphrase."""
+    if options.encrypt_ca_keys and options.access.passphrase is None:
         raise InvalidInputError("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
-    return access.passphrase if encrypt else None
+    return options.access.passphrase if options.encrypt_ca_keys else None
 
 
-def _import_ca(role: Role, options: CreateOptions, warnings: list[str]) -> tuple[Authority, str, bytes]:
-    source = options.imported[role]
-    if source.key is None:
-        raise InvalidInputError("a CA that is to sign here needs its key, too")
-    reference = _read_given(source.key)
-    signer = open_signer(reference, printable(source.key), options.access)
-    bound = authority.authority_of(_read_given(source.certificate), signer, printable(source.certificate))
-    check_can_serve(bound.facts.der, role, options.now or utc_now(), printable(source.certificate))
-    other = options.imported.get(Role.PERMISSIONS if role is Role.IDENTITY else Role.IDENTITY)
-    if role is Role.PERMISSIONS and other is not None and other.key == source.key:
-        warnings.append(
-            "one CA for identities and permissions: enclaves certified by it elsewhere can sign permissions "
-            "that Cyclone DDS before 11.0 and Fast DDS before 2.6.5 accept (CVE-2023-24010, CVE-2023-24011)"
-        )
-    return bound, (layout.KEY if isinstance(signer, FileSigner) else layout.KEY_URI), reference
+def _import_ca(role: Role, options: CreateOptions, key: Path) -> tuple[Authority, bytes]:
+    place, reference = options.imported[role].certificate, read_given(key)
+    signer = open_signer(reference, printable(key), options.access)
+    bound = authority.authority_of(read_given(place), signer, printable(place))
+    check_can_serve(bound.facts.der, role, options.now or utc_now(), printable(place))
+    return bound, reference
+
+
+def _shared_ca_warnings(role: Role, options: CreateOptions) -> list[str]:
+    identity = options.imported.get(Role.IDENTITY)
+    if role is Role.IDENTITY or identity is None or identity.key != options.imported[role].key:
+        return []
+    return [
+        "one CA for identities and permissions: enclaves certified by it elsewhere can sign permissions "
+        "that Cyclone DDS before 11.0 and Fast DDS before 2.6.5 accept (CVE-2023-24010, CVE-2023-24011)"
+    ]
 
 
 def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
@@ -262,28 +255,21 @@ def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
     place = options.imported[role].certificate
     if role is not Role.IDENTITY:
         raise InvalidInputError("only the identity CA can be somebody else's: permissions are signed here")
-    facts = read_certificate(_read_given(place), printable(place))
+    facts = read_certificate(read_given(place), printable(place))
     check_can_serve(facts.der, role, options.now or utc_now(), printable(place))
     return facts
 
 
-def _read_given(path: Path) -> bytes:
-    try:
-        return read_bytes(path)
-    except OSError as error:
-        raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
-
-
-def _complete_governance(opened: Store, options: CreateOptions, actions: list[str]) -> None:
+def _complete_governance(opened: Store, options: CreateOptions) -> bool:
+    """Returns whether there was none."""
     if os.path.isfile(opened.root / layout.GOVERNANCE):
-        return
+        return False
     document = _unsigned_default(opened.root) or governance_document(
         options.governance or Governance.for_domains(options.domains)
     )
-    view = KeystoreView(opened.root)
-    signer = view.authority(Role.PERMISSIONS, options.access)
+    signer = KeystoreView(opened.root).authority(Role.PERMISSIONS, options.access)
     write_governance(opened, document, signer, options.now or utc_now())
-    actions.append("governance signed")
+    return True
 
 
 def _unsigned_default(root: Path) -> bytes | None:

@@ -64,15 +64,25 @@ class EnclaveState(NamedTuple):
     def is_good(self) -> bool:
         return self.reissue is Reissue.NOTHING and not (self.permissions or self.links)
 
-    @property
-    def exists(self) -> bool:
-        return self.reissue is not Reissue.KEY_PAIR or self.facts is not None
+
+class _Enclave(NamedTuple):
+    """The enclave that is looked at, and what it is held against."""
+
+    view: KeystoreView
+    register: Register | None
+    name: str
+    directory: str
+    now: datetime
+    due: datetime
+
+    def read(self, file: str) -> bytes | None:
+        return safe_files.read_if_there(self.view.root, f"{self.directory}/{file}")
 
 
 def inspect(
     view: KeystoreView,
     register: Register | None,
-    enclave: str,
+    name: str,
     wanted: PermissionsSource,
     now: datetime,
     due: datetime,
@@ -82,27 +92,24 @@ def inspect(
 
     Raises UnsafeKeystoreError for links, owners and modes that let others in.
     """
-    directory = layout.enclave_directory(enclave)
-    wanted_links = layout.enclave_links(enclave, crl=view.has_crl)
-    if not _is_there(view, directory):
-        return EnclaveState(enclave, Reissue.KEY_PAIR, None, True, tuple(wanted_links), (NEW,))
-    reasons: list[str] = []
-    found = _identity(view, register, enclave, directory, now, due)
-    reissue, facts = found.reissue, found.facts
-    if found.problem:
-        reasons.append(found.problem)
+    enclave = _Enclave(view, register, name, layout.enclave_directory(name), now, due)
+    wanted_links = layout.enclave_links(name, crl=view.has_crl)
+    if not _is_there(view, enclave.directory):
+        return EnclaveState(name, Reissue.KEY_PAIR, None, True, tuple(wanted_links), (NEW,))
+    reissue, facts, problem, incident = _identity(enclave)
+    reasons = [problem] if problem else []
     validity = None
     permissions = reissue is not Reissue.NOTHING or facts is None
     if reissue is Reissue.NOTHING and facts is not None and facts.common_name is not None:
         expected = wanted(subject_name(facts.common_name), facts.validity)
-        permissions = not _permissions_stand(view, directory, expected, reasons)
+        unlike = _permissions_problem(enclave, expected)
+        permissions = unlike is not None
+        reasons += [unlike] if unlike else []
         validity = facts.validity if expected is not None and not permissions else None
-    links = tuple(
-        name for name, target in wanted_links.items() if not _link_stands(view, f"{directory}/{name}", target)
-    )
+    links = tuple(link for link, target in wanted_links.items() if not _link_stands(enclave, link, target))
     if links and reasons != [NEW]:
         reasons.append(f"{', '.join(links)} missing or out of step")
-    return EnclaveState(enclave, reissue, facts, permissions, links, tuple(reasons), validity, found.incident)
+    return EnclaveState(name, reissue, facts, permissions, links, tuple(reasons), validity, incident)
 
 
 def _is_there(view: KeystoreView, directory: str) -> bool:
@@ -126,54 +133,36 @@ class _Found(NamedTuple):
 
     reissue: Reissue
     facts: CertificateFacts | None
-    problem: str = ""
+    problem: str | None = None
     incident: bool = False
 
 
-def _identity(
-    view: KeystoreView, register: Register | None, enclave: str, directory: str, now: datetime, due: datetime
-) -> _Found:
-    mode = _key_mode(view, directory)
-    key = safe_files.read_if_there(view.root, f"{directory}/{layout.KEY}")
-    cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
+def _identity(enclave: _Enclave) -> _Found:
+    mode = _key_mode(enclave)
+    key, cert = enclave.read(layout.KEY), enclave.read(layout.CERT)
     facts = _facts(cert)
-    if key is None and (request := safe_files.read_if_there(view.root, layout.request(enclave))) is not None:
-        return _made_on_host(view, register, enclave, request, facts, now, due)
+    request = (
+        safe_files.read_if_there(enclave.view.root, layout.request(enclave.name)) if key is None else None
+    )
+    if request is not None:
+        # The key is on its host; ``private/`` holds the request that somebody accepted, so it may be certified again.
+        problem = _certificate_problem(enclave, request, facts) if facts is not None else "no certificate"
+        return _Found(Reissue.CERTIFICATE if problem else Reissue.NOTHING, facts, problem)
     if key is None:
         return _Found(Reissue.KEY_PAIR, facts, "no private key" if cert is not None else NEW)
     if mode & 0o077:
         return _Found(Reissue.KEY_PAIR, facts, f"others could read its private key (mode {mode:04o})", True)
-    problem = (
-        _certificate_problem(view, register, enclave, key, facts, now, due)
-        if cert is not None
-        else "no certificate"
-    )
+    problem = _certificate_problem(enclave, key, facts) if cert is not None else "no certificate"
     if problem is None:
         return _Found(Reissue.NOTHING, facts)
-    if register is not None and not _key_is_ours(view, register, enclave, key):
+    if enclave.register is not None and not _key_is_ours(enclave, enclave.register, key):
         return _Found(Reissue.KEY_PAIR, facts, f"its private key was not issued here ({problem})", True)
     return _Found(Reissue.CERTIFICATE, facts, problem)
 
 
-def _made_on_host(
-    view: KeystoreView,
-    register: Register | None,
-    enclave: str,
-    request: bytes,
-    facts: CertificateFacts | None,
-    now: datetime,
-    due: datetime,
-) -> _Found:
-    """The key is on its host; ``private/`` holds the request that somebody accepted, so it may be certified again."""
-    if facts is None:
-        return _Found(Reissue.CERTIFICATE, None, "no certificate")
-    problem = _certificate_problem(view, register, enclave, request, facts, now, due)
-    return _Found(Reissue.CERTIFICATE if problem else Reissue.NOTHING, facts, problem or "")
-
-
-def _key_mode(view: KeystoreView, directory: str) -> int:
+def _key_mode(enclave: _Enclave) -> int:
     """The permission bits of the private key, 0 without one."""
-    path = f"{view.root}/{directory}/{layout.KEY}"
+    path = f"{enclave.view.root}/{enclave.directory}/{layout.KEY}"
     try:
         info = os.lstat(path)
     except (FileNotFoundError, NotADirectoryError):
@@ -192,28 +181,20 @@ def _facts(cert: bytes | None) -> CertificateFacts | None:
         return None
 
 
-def _certificate_problem(
-    view: KeystoreView,
-    register: Register | None,
-    enclave: str,
-    key: bytes,
-    facts: CertificateFacts | None,
-    now: datetime,
-    due: datetime,
-) -> str | None:
+def _certificate_problem(enclave: _Enclave, key: bytes, facts: CertificateFacts | None) -> str | None:
     if facts is None:
         return "the certificate cannot be read"
-    if not names_enclave(facts.common_name, enclave):
+    if not names_enclave(facts.common_name, enclave.name):
         return "the certificate names another subject"
-    if not facts.names_issuer(view.ca(Role.IDENTITY)):
+    if not facts.names_issuer(enclave.view.ca(Role.IDENTITY)):
         return "the certificate is by another CA"
-    if not facts.validity.covers(now):
+    if not facts.validity.covers(enclave.now):
         return "the certificate is expired or not yet valid"
-    if facts.validity.not_after < due:
+    if facts.validity.not_after < enclave.due:
         return "the certificate expires soon"
     if not key_matches(key, facts):
         return "the certificate belongs to another key"
-    return _record_problem(register, enclave, facts.serial)
+    return _record_problem(enclave.register, enclave.name, facts.serial)
 
 
 def _record_problem(register: Register | None, enclave: str, serial: int) -> str | None:
@@ -230,7 +211,7 @@ def _record_problem(register: Register | None, enclave: str, serial: int) -> str
     return None
 
 
-def _key_is_ours(view: KeystoreView, register: Register, enclave: str, key_pem: bytes) -> bool:
+def _key_is_ours(enclave: _Enclave, register: Register, key_pem: bytes) -> bool:
     """Whether the key is that of the certificate in force, or of one by the present CA that is not revoked: only such
     a key is certified again. What an old CA issued says nothing: nobody revokes it."""
     from keystore.signing.identity import public_half
@@ -239,46 +220,38 @@ def _key_is_ours(view: KeystoreView, register: Register, enclave: str, key_pem: 
         present = fingerprint(spki(public_half(key_pem, "the enclave's key")))
     except SigningUnavailableError:
         return False
-    issuer = fingerprint(view.ca(Role.IDENTITY).der)
+    issuer = fingerprint(enclave.view.ca(Role.IDENTITY).der)
     return any(
         one.key == present and one.revoked is None and (one.in_force or one.issuer == issuer)
-        for one in register.of_enclave(enclave)
+        for one in register.of_enclave(enclave.name)
     )
 
 
-def _permissions_stand(
-    view: KeystoreView, directory: str, expected: bytes | None, reasons: list[str]
-) -> bool:
-    """Whether exactly ``expected`` is signed by our CA, None: whatever it is."""
-    signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
+def _permissions_problem(enclave: _Enclave, expected: bytes | None) -> str | None:
+    """Why not exactly ``expected`` (None: whatever it is) is signed by our CA; None where it is."""
+    signed = enclave.read(layout.PERMISSIONS)
     if signed is None:
-        reasons.append("no permissions")
-        return False
+        return "no permissions"
     try:
-        present = smime.read(signed, f"{directory}/{layout.PERMISSIONS}")
+        present = smime.read(signed, f"{enclave.directory}/{layout.PERMISSIONS}")
     except DamagedKeystoreError:
-        reasons.append("the signed permissions cannot be read")
-        return False
-    if not present.embeds(view.ca(Role.PERMISSIONS).der):
-        reasons.append("the permissions are signed by another CA")
-        return False
+        return "the signed permissions cannot be read"
+    if not present.embeds(enclave.view.ca(Role.PERMISSIONS).der):
+        return "the permissions are signed by another CA"
     document = present.document
     if expected is not None and document != expected:
-        reasons.append(OTHER_PERMISSIONS)
-        return False
-    twin = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS_XML}")
+        return OTHER_PERMISSIONS
+    twin = enclave.read(layout.PERMISSIONS_XML)
     # A deployed enclave has none: nothing reads it but people.
     if twin is None or twin.replace(b"\r\n", b"\n") == document:
-        return True
-    reasons.append("permissions.xml differs from what is signed")
-    return False
+        return None
+    return "permissions.xml differs from what is signed"
 
 
-def _link_stands(view: KeystoreView, relative: str, target: str) -> bool:
+def _link_stands(enclave: _Enclave, name: str, target: str) -> bool:
     """A link to ``target``, or what a file system without links has instead: a copy."""
-    present = safe_files.link_target(view.root, relative)
+    present = safe_files.link_target(enclave.view.root, f"{enclave.directory}/{name}")
     if present is not None:
         return present == target
-    copy = safe_files.read_if_there(view.root, relative)
-    name = relative.rpartition("/")[2]
-    return copy is not None and copy == safe_files.read_if_there(view.root, layout.link_source(name))
+    copy = enclave.read(name)
+    return copy is not None and copy == safe_files.read_if_there(enclave.view.root, layout.link_source(name))

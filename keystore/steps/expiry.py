@@ -92,7 +92,7 @@ def _order(one: Expiry) -> tuple[datetime, str, str]:
 def _expiries(view: KeystoreView, names: Iterable[str], known: Mapping[str, Validity]) -> Iterator[Expiry]:
     for role in Role:
         for ca in view.ca_bundle(role):
-            yield _expiry(role.value.replace("_ca", " CA"), None, ca.validity)
+            yield _expiry(role.label, None, ca.validity)
     if view.has_crl:
         yield _expiry("CRL", None, crl_validity(view))
     for name in names:

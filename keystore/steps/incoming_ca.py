@@ -12,13 +12,15 @@ from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.certificate import read_certificate
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
+from keystore.signing.signer import is_token_uri
 
 
-def put_incoming(opened: Store, role: Role, cert: bytes, key_name: str, key: bytes) -> None:
-    """Stage a CA pair durably; ``install_incoming`` publishes it, now or in the next run."""
+def put_incoming(opened: Store, role: Role, cert: bytes, key: bytes) -> None:
+    """Stage a CA pair durably; ``install_incoming`` publishes it, now or in the next run. ``key``: PEM, or the
+    ``pkcs11:`` URI of one in a token."""
     opened.ensure_directory(layout.PRIVATE)
     opened.ensure_directory(layout.INCOMING)
-    name = layout.KEY_URI if key_name.endswith(".p11") else layout.KEY
+    name = layout.KEY_URI if is_token_uri(key) else layout.KEY
     facts = read_certificate(cert, layout.INCOMING)
     with opened.batch() as batch:
         batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))

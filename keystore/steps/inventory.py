@@ -72,7 +72,7 @@ def _authorities(view: KeystoreView) -> Iterator[KeyEntry]:
         for number, facts in enumerate(view.ca_bundle(role)):
             in_use = number == 0
             yield _entry(
-                role.value.replace("_ca", " CA"),
+                role.label,
                 "in use" if in_use else "still trusted",
                 facts,
                 _place(view.key_file(role)) if in_use else "not looked for",

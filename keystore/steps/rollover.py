@@ -18,6 +18,7 @@ from __future__ import annotations
 import os
 from collections.abc import Collection
 from contextlib import suppress
+from dataclasses import replace
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
@@ -32,11 +33,11 @@ from keystore.formats.certificate import read_certificate, read_pem
 from keystore.formats.der import DerError
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
-from keystore.formats.validity import Validity, utc_now
-from keystore.signing import authority, smime
-from keystore.signing.authority import Authority, pem_certificate
+from keystore.formats.validity import utc_now
+from keystore.signing import smime
+from keystore.signing.authority import pem_certificate
 from keystore.steps.comparison import WantedEnclave, with_domains
-from keystore.steps.creation import CreateOptions, passphrase_for_new_keys
+from keystore.steps.creation import CreateOptions, new_ca
 from keystore.steps.crl import drop_crl
 from keystore.steps.enclaves import keep
 from keystore.steps.incoming_ca import install_incoming, put_incoming
@@ -71,13 +72,14 @@ def roll_over(
     chosen = (options or ProvisionOptions())._replace(create=False)
     root = keystore_at(keystore).root
     now = chosen.now or utc_now()
+    creation = _creation(chosen, now, encrypt)
     with opened_for_change(root, now, chosen) as opened:
         install_incoming(opened)
         for role in roles:
             _forget_installed(opened, role)
         if step is Step.FINISH:
             _refuse_to_strand(opened, roles)
-        done = [_STEPS[step](opened, role, chosen, now, encrypt) for role in roles]
+        done = [_STEPS[step](opened, role, creation) for role in roles]
         refresh_copies(opened)
     if step is not Step.SWITCH:
         warnings = tuple(follow(root, options_of(chosen)))
@@ -87,40 +89,28 @@ def roll_over(
     return report._replace(created=(*(text for text in done if text), *report.created))
 
 
-def _start(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
+def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> CreateOptions:
+    """How the new CAs are made."""
+    given = options.creation or CreateOptions()
+    return replace(given, backdate=options.backdate, access=options.access, encrypt_ca_keys=encrypt, now=now)
+
+
+def _start(opened: Store, role: Role, creation: CreateOptions) -> str:
     view = KeystoreView(opened.root)
     if view.shares_one_ca:
         raise InvalidInputError(
             "one CA for identities and permissions: first run secure-keystore renew KEYSTORE"
         )
     if not opened.is_directory(_waiting(role)):
-        _make_next(opened, role, options, now, encrypt)
+        made, key = new_ca(role, creation)
+        opened.ensure_directory(layout.PRIVATE)
+        opened.ensure_directory(layout.NEXT)
+        pair = {layout.KEY: Content(key, store.PRIVATE_MODE), layout.CERT: Content(made.pem())}
+        with opened.batch() as batch:
+            batch.record(opened.register.with_authority(role, made.facts.der, AuthorityState.WAITING))
+            batch.directory(_waiting(role), pair)
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
     return _trust(opened, role, pem_certificate(view.ca(role).der) + new)
-
-
-def _make_next(
-    opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool
-) -> Authority:
-    made, key = new_ca(role, options, now, encrypt)
-    opened.ensure_directory(layout.PRIVATE)
-    opened.ensure_directory(layout.NEXT)
-    with opened.batch() as batch:
-        batch.record(opened.register.with_authority(role, made.facts.der, AuthorityState.WAITING))
-        batch.directory(
-            _waiting(role), {layout.KEY: Content(key, store.PRIVATE_MODE), layout.CERT: Content(made.pem())}
-        )
-    return made
-
-
-def new_ca(role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> tuple[Authority, bytes]:
-    """A fresh CA and its key file."""
-    creation = options.creation or CreateOptions()
-    validity = Validity.starting(now, creation.ca_lifetime, backdate=options.backdate)
-    signer = authority.new_key(creation.curve)
-    name = creation.names.get(role) or authority.default_ca_name(role)
-    made = authority.self_signed_ca(role, name, signer, validity)
-    return made, authority.key_pem(signer, passphrase_for_new_keys(encrypt, options.access))
 
 
 def _trust(opened: Store, role: Role, bundle: bytes) -> str:
@@ -129,14 +119,14 @@ def _trust(opened: Store, role: Role, bundle: bytes) -> str:
         return ""
     with opened.batch() as batch:
         batch.file(target, bundle)
-    return f"{_title(role)}: trust anchors written"
+    return f"{role.label}: trust anchors written"
 
 
-def _switch(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
+def _switch(opened: Store, role: Role, creation: CreateOptions) -> str:
     if not opened.is_directory(_waiting(role)):
         if len(KeystoreView(opened.root).ca_bundle(role)) > 1 or _retired(opened, role):
             return ""  # switched already
-        raise InvalidInputError(f"there is no new {_title(role)} yet: first --ca start, and deploy")
+        raise InvalidInputError(f"there is no new {role.label} yet: first --ca start, and deploy")
     view = KeystoreView(opened.root)
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
     key = safe_files.read_private(opened.root, f"{_waiting(role)}/{layout.KEY}")
@@ -144,13 +134,13 @@ def _switch(opened: Store, role: Role, options: ProvisionOptions, now: datetime,
     if read_certificate(new, _waiting(role)).der != view.ca(role).der:
         old = retire(opened, role)
         bundle = new if role is Role.IDENTITY and view.has_crl else new + old
-        put_incoming(opened, role, bundle, layout.KEY, key)
+        put_incoming(opened, role, bundle, key)
         install_incoming(opened)
     if role is Role.IDENTITY and view.has_crl:
         drop_crl(opened)
         _retire_for_good(opened, role)
     _forget_next(opened, role)
-    return f"{_title(role)} replaced"
+    return f"{role.label} replaced"
 
 
 def retire(opened: Store, role: Role) -> bytes:
@@ -182,10 +172,10 @@ def _forget_next(opened: Store, role: Role) -> None:
     opened.remove_empty_directory(layout.NEXT)
 
 
-def _finish(opened: Store, role: Role, options: ProvisionOptions, now: datetime, encrypt: bool) -> str:
+def _finish(opened: Store, role: Role, creation: CreateOptions) -> str:
     if opened.is_directory(_waiting(role)):
         raise InvalidInputError(
-            f"everything is still signed by the old {_title(role)}: first --ca switch, and deploy"
+            f"everything is still signed by the old {role.label}: first --ca switch, and deploy"
         )
     said = _trust(opened, role, pem_certificate(KeystoreView(opened.root).ca(role).der))
     _retire_for_good(opened, role)
@@ -238,18 +228,14 @@ def separate_permissions_ca(
 ) -> None:
     """Give a keystore with a single CA its own permissions CA; ``bring_about`` signs all again."""
     retire(opened, Role.PERMISSIONS)
-    made, key = new_ca(Role.PERMISSIONS, options, now, encrypt)
-    put_incoming(opened, Role.PERMISSIONS, made.pem(), layout.KEY, key)
+    made, key = new_ca(Role.PERMISSIONS, _creation(options, now, encrypt))
+    put_incoming(opened, Role.PERMISSIONS, made.pem(), key)
     install_incoming(opened)
     _retire_for_good(opened, Role.PERMISSIONS)
 
 
 def _waiting(role: Role) -> str:
     return f"{layout.NEXT}/{role.value}"
-
-
-def _title(role: Role) -> str:
-    return role.value.replace("_ca", " CA")
 
 
 _STEPS = {Step.START: _start, Step.SWITCH: _switch, Step.FINISH: _finish}

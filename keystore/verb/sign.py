@@ -28,7 +28,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Certify the requests, and print for which keys. Returns 0."""
-    from keystore.formats.strict_yaml import read_given
+    from keystore.formats.given_file import read_given
     from keystore.steps.host_keys import parse_requests
     from keystore.steps.request_signing import SigningOptions, accept_certificates, sign_requests
 

@@ -1,0 +1,18 @@
+"""A file that somebody named: a certificate, a key, a request, YAML. Reads only."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from enclave_launch.boundary.files import read_bytes
+from keystore.errors import InvalidInputError, printable
+
+MAX_BYTES = 200_000
+
+
+def read_given(path: Path) -> bytes:
+    """Its bytes. Raises InvalidInputError for what cannot be read, or is larger than ``MAX_BYTES``."""
+    try:
+        return read_bytes(path, MAX_BYTES)
+    except OSError as error:
+        raise InvalidInputError(f"cannot read {printable(path)}: {error.strerror}") from None
