@@ -34,17 +34,23 @@ def check_authorities(
     register: Register | None,
     access: CaAccess,
     now: datetime,
-    required: Governance | None = None,
+    required: Governance | None,
 ) -> Iterator[Finding]:
-    """Findings about both CAs: certificates, keys, bundles, what is retired."""
-    yield from check_deployed(view, register, now, required)
+    """Findings about both CAs (certificates, keys, bundles), the governance and the CRL."""
+    for role in Role:
+        for facts in view.ca_bundle(role):
+            yield from _check_certificate(view, role, facts, now)
+    yield from _check_governance(view, register, required)
+    if view.has_crl:
+        yield from _check_crl(view, now)
     for role in Role:
         yield from _check_key(view, role, access)
         if register is not None and len(view.ca_bundle(role)) > 1:
+            step = "switch" if os.path.isdir(view.root / layout.NEXT / role.value) else "finish"
             yield Finding(
                 Severity.NOTE, "roll-over", layout.ca_cert(role),
                 "a CA roll-over is under way (two CAs in the file)",
-                repair.run(view.root, "renew", "--ca", _next_step(view, role), note="once this state is deployed"),
+                repair.run(view.root, "renew", "--ca", step, note="once this state is deployed"),
             )  # fmt: skip
     if view.shares_one_ca:
         yield Finding(
@@ -53,22 +59,6 @@ def check_authorities(
             "2.9.2 and 2.10.1 any enclave can sign permissions and governance for itself (CVE-2023-24010, -24011)",
             repair.run(view.root, "renew", note="then deploy all enclaves together"),
         )  # fmt: skip
-
-
-def check_deployed(
-    view: KeystoreView, register: Register | None, now: datetime, required: Governance | None = None
-) -> Iterator[Finding]:
-    """What every host needs of the CAs: their certificates, the governance, the CRL."""
-    for role in Role:
-        for facts in view.ca_bundle(role):
-            yield from _check_certificate(view, role, facts, now)
-    yield from check_governance(view, register, required)
-    if view.has_crl:
-        yield from _check_crl(view, now)
-
-
-def _next_step(view: KeystoreView, role: Role) -> str:
-    return "switch" if os.path.isdir(view.root / layout.NEXT / role.value) else "finish"
 
 
 def _check_certificate(
@@ -92,12 +82,8 @@ def _check_certificate(
 def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Finding]:
     name = view.key_file(role)
     if name is None:
-        yield Finding(
-            Severity.NOTE,
-            "no-ca-key",
-            layout.ca_key(role),
-            f"not here: nothing can be signed on this machine; trusted is {describe(view.ca(role))}",
-        )
+        text = f"not here: nothing can be signed on this machine; trusted is {describe(view.ca(role))}"
+        yield Finding(Severity.NOTE, "no-ca-key", layout.ca_key(role), text)
         return
     try:
         reference = safe_files.read_private(view.root, name)
@@ -105,12 +91,8 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
         return  # the check of all files names it, with what to do about it
     locked = b"ENCRYPTED" in reference and access.passphrase is None
     if locked or (name.endswith(".p11") and access.pin is None):
-        yield Finding(
-            Severity.NOTE,
-            "ca-key-locked",
-            name,
-            "not checked against its certificate: it needs a passphrase or PIN",
-        )
+        text = "not checked against its certificate: it needs a passphrase or PIN"
+        yield Finding(Severity.NOTE, "ca-key-locked", name, text)
         return
     try:
         view.authority(role, access)
@@ -118,20 +100,21 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
         yield Finding(Severity.ERROR, "ca-key", name, str(error), repair.BACKUP)
 
 
-def check_governance(
-    view: KeystoreView, register: Register | None = None, required: Governance | None = None
+def _check_governance(
+    view: KeystoreView, register: Register | None, required: Governance | None
 ) -> Iterator[Finding]:
     """Findings about the governance: signature, strength, whether it was signed last, and the XML beside it."""
     place = layout.GOVERNANCE
     again = repair.sign_governance(view.root)
     try:
-        signed = smime.read(safe_files.read(view.root, place), place)
+        p7s = safe_files.read(view.root, place)
+        signed = smime.read(p7s, place)
         smime.check(signed, view.ca_bundle(Role.PERMISSIONS), place)
         governance = parse_governance(signed.document, place)
     except KeystoreError as error:
         yield Finding(Severity.ERROR, "governance", place, str(error), again)
         return
-    if problem := mime_problem(safe_files.read(view.root, place)):
+    if problem := mime_problem(p7s):
         yield Finding(Severity.ERROR, "governance", place, problem, again)
     if not signed.embeds(view.ca(Role.PERMISSIONS).der):
         yield Finding(

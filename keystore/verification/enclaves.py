@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import datetime
 
 from keystore.disk import layout, safe_files
@@ -99,23 +100,21 @@ def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Findi
         )  # fmt: skip
 
 
+@dataclass
 class _EnclaveCheck:
-    def __init__(
-        self,
-        view: KeystoreView,
-        register: Register | None,
-        enclave: str,
-        revoked: frozenset[int],
-        now: datetime,
-    ):
-        self._view = view
-        self._register = register
-        self._enclave = enclave
-        self._directory = layout.enclave_directory(enclave)
-        self._revoked = revoked
-        self._now = now
-        self.facts: CertificateFacts | None = None
-        self.domains: Domains | None = None
+    """One enclave; ``facts`` of its certificate and ``domains`` of its permissions are known after ``findings``."""
+
+    _view: KeystoreView
+    _register: Register | None
+    _enclave: str
+    _revoked: frozenset[int]
+    _now: datetime
+    facts: CertificateFacts | None = None
+    domains: Domains | None = None
+
+    @property
+    def _directory(self) -> str:
+        return layout.enclave_directory(self._enclave)
 
     def error(self, code: str, file: str, message: str) -> Finding:
         return self._finding(Severity.ERROR, code, file, message, self._renew())
@@ -167,21 +166,15 @@ class _EnclaveCheck:
         if self.facts.serial not in self._revoked:
             yield from check_certificate_issued(self._view, self._register, self._enclave, self.facts)
         key = self._read(layout.KEY)
-        if key is not None and not (key_matches(key, self.facts) and _loads(key)):
-            yield self._wrong_key(key)
-        if key_kind(self.facts.public_key) not in CYCLONE_KINDS:
-            kind = key_kind(self.facts.public_key)
-            yield self._finding(
-                Severity.WARNING, "key-kind", layout.CERT, f"a {kind} key: Cyclone DDS refuses it"
-            )
-
-    def _wrong_key(self, key: bytes) -> Finding:
-        if not _loads(key):
+        if key is not None and not _loads(key):
             fix = repair.run(self._view.root, "renew", self._enclave, "--new-keys")
-            return self._finding(Severity.ERROR, "key", layout.KEY, "not a usable private key", fix)
-        return self.error(
-            "key-mismatch", layout.KEY, "does not belong to cert.pem; Cyclone DDS starts but never talks"
-        )
+            yield self._finding(Severity.ERROR, "key", layout.KEY, "not a usable private key", fix)
+        elif key is not None and not key_matches(key, self.facts):
+            text = "does not belong to cert.pem; Cyclone DDS starts but never talks"
+            yield self.error("key-mismatch", layout.KEY, text)
+        if (kind := key_kind(self.facts.public_key)) not in CYCLONE_KINDS:
+            text = f"a {kind} key: Cyclone DDS refuses it"
+            yield self._finding(Severity.WARNING, "key-kind", layout.CERT, text)
 
     def _chain(self, facts: CertificateFacts) -> Iterator[Finding]:
         bundle = self._view.ca_bundle(Role.IDENTITY)
@@ -199,9 +192,8 @@ class _EnclaveCheck:
                 f"valid from {iso(facts.validity.not_before)} to {iso(facts.validity.not_after)}",
             )  # fmt: skip
         if facts.serial in self._revoked:
-            fix = repair.run(
-                self._view.root, "renew", self._enclave, "--new-keys", note="or secure-keystore remove"
-            )
+            remedy = (self._enclave, "--new-keys")
+            fix = repair.run(self._view.root, "renew", *remedy, note="or secure-keystore remove")
             yield self._finding(Severity.ERROR, "revoked", layout.CERT, "revoked: peers refuse it", fix)
         if facts.can_sign_mail and self._view.shares_one_ca:
             yield self._finding(
@@ -222,10 +214,9 @@ class _EnclaveCheck:
             if safe_files.link_target(self._view.root, relative) is not None:
                 continue  # the target was checked with all files
             copy = self._read(name)
-            if copy is not None and copy != safe_files.read_if_there(
-                self._view.root, layout.link_source(name)
-            ):
-                yield self.error("copy-differs", name, f"a copy that differs from {layout.link_source(name)}")
+            source = layout.link_source(name)
+            if copy is not None and copy != safe_files.read_if_there(self._view.root, source):
+                yield self.error("copy-differs", name, f"a copy that differs from {source}")
 
     def _permissions(self) -> Iterator[Finding]:
         p7s = self._read(layout.PERMISSIONS)
@@ -260,11 +251,8 @@ class _EnclaveCheck:
 
     def _grants(self, grants: tuple[Grant, ...]) -> Iterator[Finding]:
         if len(grants) > 1:
-            yield self._finding(
-                Severity.WARNING, "several-grants", layout.PERMISSIONS,
-                f"{len(grants)} grants; of those with one subject only the first counts",
-                self._renew(),
-            )  # fmt: skip
+            text = f"{len(grants)} grants; of those with one subject only the first counts"
+            yield self._finding(Severity.WARNING, "several-grants", layout.PERMISSIONS, text, self._renew())
         if self.facts is None:
             return
         subject = subject_name(self.facts.common_name or "")
@@ -274,15 +262,8 @@ class _EnclaveCheck:
             return
         yield from self._validity(mine, self.facts)
         yield from self._reach(grants, mine)
-        wide = sorted(
-            {
-                topic
-                for rule in mine.rules
-                for topic in (*rule.publish, *rule.subscribe)
-                if _WILDCARD.search(topic)
-            }
-        )
-        if wide:
+        topics = {topic for rule in mine.rules for topic in (*rule.publish, *rule.subscribe)}
+        if wide := sorted(filter(_WILDCARD.search, topics)):
             shown = ", ".join(wide[:4]) + (" ..." if len(wide) > 4 else "")
             yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, f"grants by wildcard: {shown}")
 
@@ -298,10 +279,7 @@ class _EnclaveCheck:
                 f"also grants to {', '.join(map(printable, others[:4]))}, whoever holds that subject",
                 self._renew(),
             )  # fmt: skip
-        everything = [
-            topic for rule in mine.rules for topic in (*rule.publish, *rule.subscribe) if topic == "*"
-        ]
-        if everything:
+        if any("*" in (*rule.publish, *rule.subscribe) for rule in mine.rules):
             yield self._finding(
                 Severity.EXPOSURE, "everything", layout.PERMISSIONS, "grants every topic (*)", self._renew()
             )
@@ -319,11 +297,8 @@ class _EnclaveCheck:
             dates = f"valid from {grant.not_before} to {grant.not_after}"
             yield self.error("permissions-expired", layout.PERMISSIONS, dates)
         elif validity.not_after != facts.validity.not_after or parse_moment(grant.not_after) > LATEST:
-            yield self._finding(
-                Severity.WARNING, "validity-differs", layout.PERMISSIONS,
-                "not valid as long as the certificate",
-                self._renew(),
-            )  # fmt: skip
+            text = "not valid as long as the certificate"
+            yield self._finding(Severity.WARNING, "validity-differs", layout.PERMISSIONS, text, self._renew())
 
 
 def _loads(key_pem: bytes) -> bool:

@@ -32,7 +32,11 @@ _KNOWN = frozenset({
 _NEXT_CAS = frozenset(
     f"{layout.NEXT}/{role.value}/{name}" for role in Role for name in (layout.KEY, layout.CERT)
 )
-_PRIVATE_FOLDERS = (layout.RETIRED, layout.SHARES, layout.BUNDLES, layout.REQUESTS)
+_PRIVATE_FOLDERS: dict[str, tuple[str, ...]] = {
+    layout.RETIRED: (".cert.pem",), layout.SHARES: (".json", ".lock"), layout.BUNDLES: (".p7s",),
+    layout.REQUESTS: (".csr",),
+}  # fmt: skip
+"""How the names of what belongs in each of them end."""
 _UNFINISHED = (layout.STAGING, layout.INCOMING)
 
 
@@ -136,39 +140,46 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
     directory, _, name = relative.rpartition("/")
     secret = directory == layout.PRIVATE or name == layout.KEY or relative == layout.ZENOH_ROUTER_KEY
     yield from _check_owner(root, relative, info, private=secret)
-    if secret:
-        yield from check_hard_links(root, relative, info)
+    if secret and info.st_nlink > 1:
+        yield Finding(
+            Severity.ERROR, "hard-link", relative,
+            f"the same file has {info.st_nlink} names; whoever reads one of the others has the key",
+            repair.run_on(root, "find / -xdev -samefile", relative, "then renew --new-keys --revoke-old"),
+        )  # fmt: skip
     if relative in _KNOWN or name in layout.ENCLAVE_FILES:
         yield from check_content(root, relative)
-    if relative in _KNOWN or (directory == layout.RETIRED and name.endswith(".cert.pem")):
+    if _belongs(root, directory, name):
         return
-    if directory == layout.SHARES and name.endswith((".json", ".lock")):
-        return
-    if (directory == layout.BUNDLES and name.endswith(".p7s")) or (
-        directory == layout.REQUESTS and name.endswith(".csr")
-    ):
-        return
-    if relative in _NEXT_CAS:
-        return
-    if directory.split("/")[0] == layout.ENCLAVES and name in {*layout.ENCLAVE_FILES, layout.ENCLAVE_ZENOH}:
-        return
-    if name == layout.KEY_URI and not os.path.lexists(root / directory / layout.KEY):
-        return  # the enclave's key is in a token
     if name.endswith(".p11"):
         yield _stray(root, relative, "rcl prefers it to the .pem beside it, and Fast DDS takes only keys so")
     else:
         yield _stray(root, relative, "no keystore has this file")
 
 
+def _belongs(root: Path, directory: str, name: str) -> bool:
+    relative = f"{directory}/{name}".lstrip("/")
+    if relative in _KNOWN or relative in _NEXT_CAS or name.endswith(_PRIVATE_FOLDERS.get(directory, ())):
+        return True
+    if directory.split("/")[0] == layout.ENCLAVES and name in {*layout.ENCLAVE_FILES, layout.ENCLAVE_ZENOH}:
+        return True
+    # Alone, the URI is that of the enclave's key in a token.
+    return name == layout.KEY_URI and not os.path.lexists(root / directory / layout.KEY)
+
+
 def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bool) -> Iterator[Finding]:
+    """What is not secret must be ours or the administrator's all the same."""
     path = root / relative
-    if private and (problem := safe_files.private_problem(path, info)):
+    problem = safe_files.private_problem(path, info) if private else None
+    if problem is not None:
+        fix = safe_files.private_repair(path, info)
+        yield Finding(Severity.ERROR, "unsafe-owner", relative, problem, fix)
+    elif not private and not _is_trusted(info):
         yield Finding(
-            Severity.ERROR, "unsafe-owner", relative, problem, safe_files.private_repair(path, info)
-        )
-    elif not private:
-        yield from check_owner(root, relative, info)
-    if info.st_mode & 0o022 and not (private and safe_files.private_problem(path, info)):
+            Severity.ERROR, "foreign-owner", relative,
+            f"belongs to user {info.st_uid}, who can change it at any time",
+            repair.run_on(root, f"chown {os.geteuid()}", relative),
+        )  # fmt: skip
+    if info.st_mode & 0o022 and problem is None:
         yield Finding(
             Severity.ERROR, "writable-by-others", relative,
             f"others can write it (mode {safe_files.mode_text(info)})", safe_files.close_to_others(root),
@@ -225,26 +236,6 @@ def check_parents(root: Path) -> Iterator[Finding]:
                 f"{safe_files.mode_text(info)}) and put another keystore in this place",
                 f"chmod go-w {shlex.quote(str(parent))}",
             )  # fmt: skip
-
-
-def check_owner(root: Path, relative: str, info: os.stat_result) -> Iterator[Finding]:
-    """A file or folder that is not secret: it must be ours or the administrator's all the same."""
-    if not _is_trusted(info):
-        yield Finding(
-            Severity.ERROR, "foreign-owner", relative,
-            f"belongs to user {info.st_uid}, who can change it at any time",
-            repair.run_on(root, f"chown {os.geteuid()}", relative),
-        )  # fmt: skip
-
-
-def check_hard_links(root: Path, relative: str, info: os.stat_result) -> Iterator[Finding]:
-    """A secret file with a second name: deleting or closing this one leaves the other."""
-    if info.st_nlink > 1:
-        yield Finding(
-            Severity.ERROR, "hard-link", relative,
-            f"the same file has {info.st_nlink} names; whoever reads one of the others has the key",
-            repair.run_on(root, "find / -xdev -samefile", relative, "then renew --new-keys --revoke-old"),
-        )  # fmt: skip
 
 
 def _is_trusted(info: os.stat_result) -> bool:
