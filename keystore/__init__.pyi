@@ -13,11 +13,6 @@ from keystore.steps.creation import CreateOptions as CreateOptions
 from keystore.steps.creation import CreateReport as CreateReport
 from keystore.steps.creation import ImportedCa as ImportedCa
 from keystore.steps.creation import create_keystore as create_keystore
-from keystore.steps.enclaves import apply_policy as apply_policy
-from keystore.steps.enclaves import create_enclave as create_enclave
-from keystore.steps.enclaves import create_enclaves as create_enclaves
-from keystore.steps.enclaves import drop_shares as drop_shares
-from keystore.steps.enclaves import list_enclaves as list_enclaves
 from keystore.steps.expiry import Expiry as Expiry
 from keystore.steps.expiry import StatusReport as StatusReport
 from keystore.steps.expiry import expires_soon as expires_soon
@@ -37,6 +32,11 @@ from keystore.steps.importing import import_bundle as import_bundle
 from keystore.steps.options import EnclaveReport as EnclaveReport
 from keystore.steps.options import ProvisionOptions as ProvisionOptions
 from keystore.steps.options import ProvisionReport as ProvisionReport
+from keystore.steps.provisioning import apply_policy as apply_policy
+from keystore.steps.provisioning import create_enclave as create_enclave
+from keystore.steps.provisioning import create_enclaves as create_enclaves
+from keystore.steps.provisioning import drop_shares as drop_shares
+from keystore.steps.provisioning import list_enclaves as list_enclaves
 from keystore.steps.provisioning import provision as provision
 from keystore.steps.removal import RemoveOptions as RemoveOptions
 from keystore.steps.removal import RemoveReport as RemoveReport

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -153,6 +154,18 @@ class KeystoreView:
             raise InvalidInputError(
                 f"no enclave {', '.join(unknown)} in {printable(self.root)}; secure-keystore list shows all"
             )
+
+    def matching(self, patterns: Iterable[str]) -> list[str]:
+        """Enclaves that fit a pattern (``/robot1/*``). Raises InvalidInputError for a pattern that none fits."""
+        names, fitting = self.enclaves(), set[str]()
+        for pattern in patterns:
+            found = [name for name in names if fnmatchcase(name, pattern)]
+            if not found:
+                raise InvalidInputError(
+                    f"no enclave matches {printable(pattern)}; secure-keystore list shows all"
+                )
+            fitting.update(found)
+        return [name for name in names if name in fitting]
 
     def enclave_file(self, enclave: str, name: str) -> bytes | None:
         """A public file of an enclave, ``None`` where it has none."""

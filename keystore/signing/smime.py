@@ -23,7 +23,6 @@ from keystore.formats.certificate import CertificateFacts
 
 if TYPE_CHECKING:
     from keystore.signing.authority import Authority
-    from keystore.signing.signer import Signer
 
 _TEXT_HEADER = b"Content-Type: text/plain\r\n\r\n"
 _LF_HEADER = b"Content-Type: text/plain\n\n"
@@ -38,19 +37,13 @@ _SIGNING_TIME = der.object_identifier("1.2.840.113549.1.9.5")
 _CONSTRUCTED_0 = 0xA0
 
 
-def sign(document: bytes, certificate: CertificateFacts, signer: Signer, now: datetime) -> bytes:
-    """The ``.p7s`` file of ``document``, signed by ``certificate``'s key.
+def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
+    """The ``.p7s`` file of ``document``, signed by ``ca``.
 
     Raises InvalidInputError when the document holds a bare CR or a NUL, which verifiers read differently.
     """
     content = _TEXT_HEADER + _with_crlf(document)
-    pkcs7 = _signed_data(content, certificate, signer, now)
-    return _multipart(content, pkcs7)
-
-
-def sign_document(document: bytes, ca: Authority, now: datetime) -> bytes:
-    """``document`` signed by ``ca`` as S/MIME, the form that DDS-Security asks for."""
-    return sign(document, ca.facts, ca.signer, now)
+    return _multipart(content, _signed_data(content, ca, now))
 
 
 def _with_crlf(document: bytes) -> bytes:
@@ -60,8 +53,9 @@ def _with_crlf(document: bytes) -> bytes:
     return lines.replace(b"\n", b"\r\n")
 
 
-def _signed_data(content: bytes, certificate: CertificateFacts, signer: Signer, now: datetime) -> bytes:
+def _signed_data(content: bytes, ca: Authority, now: datetime) -> bytes:
     """SignedData of RFC 5652 section 5.1, version 1, detached, with the signer's certificate."""
+    certificate = ca.facts
     attributes = _attributes(_sha256(content), now)
     signer_info = der.encode(
         der.SEQUENCE,
@@ -71,7 +65,7 @@ def _signed_data(content: bytes, certificate: CertificateFacts, signer: Signer, 
         der.encode(_CONSTRUCTED_0, attributes),
         _signature_algorithm(certificate),
         # RFC 5652 section 5.4: what is signed is the SET OF, not the [0] that stands in the message.
-        der.encode(der.OCTET_STRING, signer.sign(der.encode(der.SET, attributes))),
+        der.encode(der.OCTET_STRING, ca.signer.sign(der.encode(der.SET, attributes))),
     )
     body = der.encode(
         der.SEQUENCE,

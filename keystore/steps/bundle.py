@@ -7,7 +7,6 @@ those of the enclaves below it), strays. Every file is named one by one from the
 
 from __future__ import annotations
 
-import fnmatch
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
@@ -22,8 +21,6 @@ from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
 from keystore.formats.validity import utc_now
 from keystore.verification import Finding, Severity, verify
-
-_LINKED = ("identity_ca.cert.pem", "permissions_ca.cert.pem", layout.ENCLAVE_GOVERNANCE, layout.ENCLAVE_CRL)
 
 
 class PublicFiles(str, Enum):
@@ -50,10 +47,11 @@ def export(
     accepted.
     """
     view = keystore_at(keystore)
-    names = matching(view.enclaves(), list(patterns))
+    names = view.matching(patterns)
     refuse_unfit(view, names, now or utc_now(), accept_exposures)
     _refuse_without_key(view, names)
-    files = list(_files(view, names, public))
+    files = files_of(view, names)
+    files += [file for name in names for file in _public_files(view, name, public)]
     target = Path(output)
     if target.exists() or target.is_symlink():
         raise InvalidInputError(f"{printable(target)} exists already; choose a new name or remove it")
@@ -73,16 +71,6 @@ def _refuse_without_key(view: KeystoreView, names: list[str]) -> None:
                 f"the key of enclave {name} was made on its host and is only there; export a signed bundle for that "
                 f"host (--host NAME --enclave {name}) and import it there"
             )
-
-
-def matching(names: list[str], patterns: list[str]) -> list[str]:
-    """Those of ``names`` that fit a pattern; raises InvalidInputError for a pattern that fits none."""
-    for pattern in patterns:
-        if not any(fnmatch.fnmatchcase(name, pattern) for name in names):
-            raise InvalidInputError(
-                f"no enclave matches {printable(pattern)}; secure-keystore list shows all"
-            )
-    return [name for name in names if any(fnmatch.fnmatchcase(name, pattern) for pattern in patterns)]
 
 
 def refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_exposures: bool) -> None:
@@ -123,26 +111,20 @@ def _refuse(what: str, finding: Finding, accept_exposures: bool) -> None:
         raise DamagedKeystoreError(f"{what} is exposed: {found}; or export with --accept-exposures")
 
 
-def _files(view: KeystoreView, names: list[str], public: PublicFiles) -> Iterator[ExportedFile]:
-    for name in (
-        *(layout.link_source(link) for link in _LINKED[:3]),
-        *([layout.CRL] if view.has_crl else []),
-    ):
-        yield ExportedFile(name, store.PUBLIC_MODE, safe_files.read(view.root, name))
-    for enclave in names:
-        yield from _enclave_files(view, enclave, public)
+def files_of(view: KeystoreView, names: Iterable[str]) -> list[ExportedFile]:
+    """What every bundle of these enclaves holds, by path; a key only where it was not made on its host."""
+    enclaves = [(name, not view.has_request(name)) for name in names]
+    found = []
+    for path in sorted(layout.bundle_files(enclaves, crl=view.has_crl)):
+        is_key = path.endswith(f"/{layout.KEY}")
+        data = (safe_files.read_private if is_key else safe_files.read)(view.root, path)
+        found.append(ExportedFile(path, store.PRIVATE_MODE if is_key else store.PUBLIC_MODE, data))
+    return found
 
 
-def _enclave_files(view: KeystoreView, enclave: str, public: PublicFiles) -> Iterator[ExportedFile]:
+def _public_files(view: KeystoreView, enclave: str, public: PublicFiles) -> Iterator[ExportedFile]:
     directory = layout.enclave_directory(enclave)
-    for name in (layout.CERT, layout.PERMISSIONS):
-        yield ExportedFile(
-            f"{directory}/{name}", store.PUBLIC_MODE, safe_files.read(view.root, f"{directory}/{name}")
-        )
-    key = safe_files.read_private(view.root, f"{directory}/{layout.KEY}")
-    yield ExportedFile(f"{directory}/{layout.KEY}", store.PRIVATE_MODE, key)
-    links = layout.enclave_links(enclave, crl=view.has_crl)
-    for name, target in links.items():
+    for name, target in layout.enclave_links(enclave, crl=view.has_crl).items():
         if public is PublicFiles.LINK:
             yield ExportedFile(f"{directory}/{name}", 0o777, link=target)
         else:

@@ -29,7 +29,7 @@ from keystore.signing import smime
 from keystore.signing.public_key import fingerprint
 from keystore.signing.records import permissions_record
 from keystore.signing.smime import sign_document
-from keystore.steps.bundle import matching, refuse_unfit
+from keystore.steps.bundle import files_of, refuse_unfit
 from keystore.steps.opening import ChangeOptions, opened_for_change
 
 SUFFIX = ".bundle"
@@ -93,7 +93,7 @@ def _enclaves_of(host: str, view: KeystoreView, patterns: list[str]) -> list[str
     refuse_host_name(host, "host")
     if not patterns:
         raise InvalidInputError(f"host {host} has no enclave")
-    return matching(view.enclaves(), patterns)
+    return view.matching(patterns)
 
 
 def _refuse_shared(names: Mapping[str, Iterable[str]]) -> None:
@@ -113,7 +113,7 @@ def _export(
     opened: Store, output: Path, host: str, names: list[str], options: BundleOptions, now: datetime
 ) -> HostBundle:
     view = KeystoreView(opened.root)
-    files = {file.path: file for file in _files(view, names)}
+    files = {file.path: file for file in files_of(view, names)}
     manifest = _manifest(view, host, names, files)
     present = last_signed(view, host)
     is_new = present is None or not manifest.same_content(present[0])
@@ -143,22 +143,6 @@ def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
         return manifest._replace(files={}), signed
     smime.check(document, [view.ca(Role.PERMISSIONS)], place)
     return manifest, signed
-
-
-def _files(view: KeystoreView, names: list[str]) -> list[ExportedFile]:
-    crl = [layout.CRL] if view.has_crl else []
-    public = (*(layout.ca_cert(role) for role in Role), layout.GOVERNANCE, *crl)
-    files = [ExportedFile(name, store.PUBLIC_MODE, safe_files.read(view.root, name)) for name in public]
-    for enclave in names:
-        directory = layout.enclave_directory(enclave)
-        for name in (layout.CERT, layout.PERMISSIONS):
-            path = f"{directory}/{name}"
-            files.append(ExportedFile(path, store.PUBLIC_MODE, safe_files.read(view.root, path)))
-        if not view.has_request(enclave):
-            path = f"{directory}/{layout.KEY}"
-            key = safe_files.read_private(view.root, path)
-            files.append(ExportedFile(path, store.PRIVATE_MODE, key))
-    return files
 
 
 def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[str, ExportedFile]) -> Manifest:

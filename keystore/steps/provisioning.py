@@ -1,6 +1,6 @@
 """Enclaves brought to exactly the wanted state: what a launch calls before it starts anything.
 
-    provision      policies -> what each enclave should have
+    provision      policies -> what each enclave should have; as ``create_enclaves``, ``apply_policy``, ``drop_shares``
     bring_about    compare (``comparison``, no lock)  -> as wanted -> done
                                                       -> reconcile (``reconciliation``, under the lock)
 
@@ -8,21 +8,32 @@ Idempotent: what is as wanted is not touched, keys are never replaced unless ask
 by the next one, because the comparison finds every missing step again.
 """
 
+from __future__ import annotations
+
 import os
 from collections.abc import Iterable, Mapping
+from datetime import timedelta
 from pathlib import Path
 
 from keystore.disk import layout, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
-from keystore.formats.policy import EnclavePolicy
-from keystore.formats.validity import utc_now
-from keystore.steps.comparison import WantedEnclave, compare, wanted_enclave, with_domains
+from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore.formats.validity import Validity, utc_now
+from keystore.steps.comparison import (
+    WantedEnclave,
+    asked_end,
+    compare,
+    permissions_source,
+    wanted_enclave,
+    with_domains,
+)
+from keystore.steps.enclave_state import PermissionsSource
 from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.sharing import refuse_running
+from keystore.steps.sharing import given_up, refuse_running
 from keystore.verification.before_launch import exposures
 
 
@@ -92,3 +103,75 @@ def bring_about(
         report = reconcile(root, wanted, options, now)
         report = report._replace(warnings=(*report.warnings, *_zenoh(root, options)))
     return report._replace(warnings=(*report.warnings, *exposures(KeystoreView(root))))
+
+
+def create_enclaves(
+    keystore: Path | str,
+    names: Iterable[str],
+    *,
+    allow_all: bool = False,
+    options: ProvisionOptions | None = None,
+) -> ProvisionReport:
+    """Enclaves with a valid identity. New ones may do nothing, existing ones keep their permissions, unless
+    ``allow_all`` asks for every topic, service and action. The keystore must exist.
+    """
+    root = resolve_root(keystore)
+    chosen = with_domains(root, _as_long_as_asked(options or ProvisionOptions()))
+    ordered = sorted({validate_enclave_name(name) for name in names})
+    wanted = {
+        name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep, ends_by=asked_end(chosen))
+        for name in ordered
+    }
+    return bring_about(root, wanted, chosen)
+
+
+def create_enclave(
+    keystore: Path | str, name: str, *, allow_all: bool = False, options: ProvisionOptions | None = None
+) -> ProvisionReport:
+    """``create_enclaves`` for one."""
+    return create_enclaves(keystore, [name], allow_all=allow_all, options=options)
+
+
+def keep(_subject: str, _validity: Validity) -> None:
+    """The permissions source of those who do not want to change permissions."""
+
+
+def _allow_all(name: str, options: ProvisionOptions) -> PermissionsSource:
+    """SROS2's default policy of create_enclave: everything on ``/*``, asked for by name here."""
+    everything = tuple(Rule(operation, Qualifier.ALLOW, "/*") for operation in Operation)
+    return permissions_source(EnclavePolicy(name, (Profile("/", "all", everything),)), options)
+
+
+def apply_policy(
+    keystore: Path | str, policy: Policy, *, options: ProvisionOptions | None = None
+) -> ProvisionReport:
+    """Exactly the policy's permissions for the policy's enclaves, created where missing, in a keystore that
+    exists."""
+    chosen = _as_long_as_asked(options or ProvisionOptions())
+    return provision(keystore, policy.enclaves, options=chosen)
+
+
+def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
+    """A life that is asked for is given to existing enclaves too: what ends an hour sooner or later is issued anew."""
+    end = asked_end(options)
+    within = options.renew_within if end is None else end - (options.now or utc_now()) - timedelta(hours=1)
+    return options._replace(create=False, renew_within=max(options.renew_within, within))
+
+
+def list_enclaves(keystore: Path | str) -> list[str]:
+    """Names of all enclaves, sorted; the root is ``/``. Raises NotAKeystoreError."""
+    view = keystore_at(keystore)
+    return view.enclaves()
+
+
+def drop_shares(
+    keystore: Path | str, owner: str, *, options: ProvisionOptions | None = None
+) -> ProvisionReport:
+    """Take the shares of a launch out of every enclave; what no other launch asks for is taken away for good.
+
+    Raises InvalidInputError when it has none, or while a launch runs on one of these enclaves.
+    """
+    root = keystore_at(keystore).root
+    chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
+    wanted = {one.enclave: WantedEnclave(one.document, share=one) for one in given_up(root, owner)}
+    return bring_about(root, wanted, chosen)

@@ -35,12 +35,11 @@ from keystore.steps import rollover
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.crl import restore_crl
 from keystore.steps.enclave_state import Reissue
-from keystore.steps.enclaves import keep
 from keystore.steps.governance import mirror_governance
 from keystore.steps.incoming_ca import install_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning import bring_about
+from keystore.steps.provisioning import bring_about, keep
 from keystore.steps.removal import revoke_replaced
 
 DEFAULT_WITHIN = timedelta(days=30)

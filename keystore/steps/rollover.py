@@ -39,11 +39,10 @@ from keystore.signing.authority import pem_certificate
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import CreateOptions, new_ca
 from keystore.steps.crl import drop_crl
-from keystore.steps.enclaves import keep
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning import bring_about
+from keystore.steps.provisioning import bring_about, keep
 from keystore.steps.zenoh_configuration import follow, options_of
 
 

@@ -18,9 +18,8 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.subject import Half, guid_prefix
 from keystore.formats.tool_needs import FOLDER, TOOLS, tool_enclave_name, tool_policy, tool_targets
-from keystore.steps.enclaves import apply_policy
 from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import apply_policy, provision
 
 DEFAULT_LIFETIME = timedelta(hours=8)
 """A working day: what is forgotten on a laptop ends by itself."""

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from datetime import datetime, timedelta
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,7 +30,7 @@ from keystore.disk.zenoh_files import (
     session_file,
     zenoh_enclaves,
 )
-from keystore.errors import InvalidInputError, KeystoreError, printable
+from keystore.errors import KeystoreError
 from keystore.formats.certificate import read_der
 from keystore.formats.register import UNKNOWN, IssuedCertificate
 from keystore.formats.role import Role
@@ -93,15 +92,9 @@ def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> l
     """Those that match one of ``patterns`` (``/robot1/*``); without patterns all, but none more where some are on Zenoh
     already. Raises InvalidInputError for a pattern that none matches."""
     view = keystore_at(keystore)
-    names = view.enclaves()
     if patterns is None:
-        return [] if has_router(view) else names
-    for pattern in patterns:
-        if not any(fnmatchcase(name, pattern) for name in names):
-            raise InvalidInputError(
-                f"no enclave matches {printable(pattern)}; secure-keystore list shows all"
-            )
-    return [name for name in names if any(fnmatchcase(name, one) for one in patterns)]
+        return [] if has_router(view) else view.enclaves()
+    return view.matching(patterns)
 
 
 def options_of(options: ProvisionOptions) -> ZenohOptions:

@@ -48,7 +48,7 @@ def _offer(parser: argparse.ArgumentParser) -> None:
 
 
 def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    from keystore.steps.enclaves import list_enclaves
+    from keystore.steps.provisioning import list_enclaves
 
     try:
         return list_enclaves(parsed_args.keystore)

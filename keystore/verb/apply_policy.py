@@ -19,7 +19,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Apply the policy, and print which enclaves changed. Returns 0."""
     from keystore.formats.policy_xml import read_policy
-    from keystore.steps.enclaves import apply_policy
+    from keystore.steps.provisioning import apply_policy
 
     document = read_policy(arguments.policy)
     common.warn(document.warnings, arguments)

@@ -21,7 +21,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Create the enclaves, and print which are new. Returns 0."""
-    from keystore.steps.enclaves import create_enclaves
+    from keystore.steps.provisioning import create_enclaves
 
     options = common.provision_options(arguments, domains=common.domains(arguments))
     report = create_enclaves(

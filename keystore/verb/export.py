@@ -89,8 +89,8 @@ def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
             raise InvalidInputError("without --hosts FILE give one --host NAME and its --enclave PATTERN")
         return {arguments.host[0]: arguments.enclave}
     from keystore.formats.hosts import load_hosts
-    from keystore.steps.enclaves import list_enclaves
     from keystore.steps.host_bundles import enclaves_of_hosts
+    from keystore.steps.provisioning import list_enclaves
 
     if arguments.enclave:
         raise InvalidInputError("--hosts FILE says which enclaves: leave --enclave out")

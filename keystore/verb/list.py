@@ -15,7 +15,7 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the names of all enclaves. Returns 0."""
-    from keystore.steps.enclaves import list_enclaves
+    from keystore.steps.provisioning import list_enclaves
 
     names = list_enclaves(arguments.keystore)
     if arguments.format == "json":

@@ -23,8 +23,8 @@ def describe(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Print which launch shares which enclave, or drop a launch. Returns 0."""
-    from keystore.steps.enclaves import drop_shares
     from keystore.steps.options import ProvisionOptions
+    from keystore.steps.provisioning import drop_shares
     from keystore.steps.sharing import list_shares
 
     if arguments.drop is not None:

@@ -13,8 +13,7 @@ from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import Policy
 from keystore.steps.bundle import export
 from keystore.steps.comparison import differences
-from keystore.steps.enclaves import apply_policy, create_enclaves
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import apply_policy, create_enclaves, provision
 from keystore.verb import main
 from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
 

@@ -21,8 +21,7 @@ from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
-from keystore.steps.enclaves import apply_policy, create_enclave, list_enclaves
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import apply_policy, create_enclave, list_enclaves, provision
 from keystore.verification import verify
 from tests.keystore.kit import (
     ARTICLE,

@@ -29,9 +29,8 @@ from keystore.formats.register import (
 )
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, common_name, generation_of, names_enclave
-from keystore.steps.enclaves import create_enclaves
 from keystore.steps.governance import GovernanceOptions, set_governance
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import create_enclaves, provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.rollover import Step, roll_over

@@ -15,9 +15,8 @@ from keystore.formats.certificate import read_certificates
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.role import Role
 from keystore.steps.creation import CreateOptions
-from keystore.steps.enclaves import create_enclave, list_enclaves
 from keystore.steps.expiry import expires_soon, status
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import create_enclave, list_enclaves, provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.rollover import Step, roll_over

@@ -14,9 +14,8 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_pem
 from keystore.steps.bundle import export
-from keystore.steps.enclaves import list_enclaves
 from keystore.steps.expiry import status
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import list_enclaves, provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.verification import verify

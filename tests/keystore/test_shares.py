@@ -19,9 +19,8 @@ from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.steps.comparison import differences
-from keystore.steps.enclaves import drop_shares
 from keystore.steps.options import ProvisionReport
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import drop_shares, provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.sharing import list_shares, shared_enclaves
 from keystore.verb import main

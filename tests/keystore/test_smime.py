@@ -36,7 +36,7 @@ CA, OTHER = new_ca(), new_ca()
 
 
 def sign(document: bytes, by: Authority = CA) -> bytes:
-    return smime.sign(document, by.facts, by.signer, NOW)
+    return smime.sign_document(document, by, NOW)
 
 
 def check(p7s: bytes, by: Authority = CA) -> bytes:
@@ -132,7 +132,7 @@ def test_a_certificate_below_the_ca_is_refused() -> None:
 
 def test_a_forger_with_the_cas_name_and_serial_is_refused() -> None:
     """Issuer and serial alone prove nothing: the signature must be by the CA's key."""
-    forged = smime.sign(DOCUMENT, CA.facts, OTHER.signer, NOW)
+    forged = smime.sign_document(DOCUMENT, Authority(CA.facts, OTHER.signer), NOW)
     with pytest.raises(DamagedKeystoreError, match="not by the permissions CA"):
         check(forged)
 

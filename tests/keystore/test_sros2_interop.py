@@ -12,8 +12,7 @@ from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.subject import SubjectScheme
-from keystore.steps.enclaves import create_enclave, list_enclaves
-from keystore.steps.provisioning import provision
+from keystore.steps.provisioning import create_enclave, list_enclaves, provision
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.verification import Severity, verify
 from tests.keystore import sros2_peer
