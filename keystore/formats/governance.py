@@ -8,9 +8,9 @@ without an error. Defaults are SROS2's. Element order is the schema's, which Fas
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from enum import Enum
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.domains import Domains
@@ -132,10 +132,10 @@ def governance_document(governance: Governance) -> bytes:
 
 
 def _domain_rule(rule: DomainRule) -> str:
-    settings = "".join(_leaf(name, getattr(rule, name)) for name in _DOMAIN_LEAVES)
+    settings = "".join(_leaf(name, getattr(rule, name)) for name in DOMAIN_SETTINGS)
     topics = "".join(
         "<topic_rule>\n"
-        + "".join(_leaf(name, getattr(topic, name)) for name in _TOPIC_LEAVES)
+        + "".join(_leaf(name, getattr(topic, name)) for name in ("topic_expression", *TOPIC_SETTINGS))
         + "</topic_rule>\n"
         for topic in rule.topic_rules
     )
@@ -155,15 +155,11 @@ def _leaf(name: str, value: bool | str | Protection) -> str:
     return f"<{name}>{escaped}</{name}>\n"
 
 
-_DOMAIN_LEAVES = (
-    "allow_unauthenticated_participants", "enable_join_access_control", "discovery_protection_kind",
-    "liveliness_protection_kind", "rtps_protection_kind",
-)  # fmt: skip
-_TOPIC_LEAVES = (
-    "topic_expression", "enable_discovery_protection", "enable_liveliness_protection",
-    "enable_read_access_control", "enable_write_access_control", "metadata_protection_kind",
-    "data_protection_kind",
-)  # fmt: skip
+DOMAIN_SETTINGS = tuple(
+    each.name for each in fields(DomainRule) if each.name not in ("domains", "topic_rules")
+)
+TOPIC_SETTINGS = tuple(each.name for each in fields(TopicRule) if each.name != "topic_expression")
+"""Named and in the order of the schema, after the domains and the expression that they are for."""
 
 
 def parse_governance(document: bytes, where: str) -> Governance:
@@ -176,37 +172,23 @@ def parse_governance(document: bytes, where: str) -> Governance:
 def _read_rule(element: etree._Element) -> DomainRule:
     return DomainRule(
         domains=Domains(tuple(_range(part) for part in element[0])),
-        allow_unauthenticated_participants=_flag(element, "allow_unauthenticated_participants"),
-        enable_join_access_control=_flag(element, "enable_join_access_control"),
-        discovery_protection_kind=_kind(element, "discovery_protection_kind"),
-        liveliness_protection_kind=_kind(element, "liveliness_protection_kind"),
-        rtps_protection_kind=_kind(element, "rtps_protection_kind"),
         topic_rules=tuple(_read_topic_rule(rule) for rule in element.iter("topic_rule")),
+        **{name: _setting(element, name) for name in DOMAIN_SETTINGS},
     )
 
 
 def _read_topic_rule(element: etree._Element) -> TopicRule:
-    return TopicRule(
-        topic_expression=_text(element, "topic_expression"),
-        enable_discovery_protection=_flag(element, "enable_discovery_protection"),
-        enable_liveliness_protection=_flag(element, "enable_liveliness_protection"),
-        enable_read_access_control=_flag(element, "enable_read_access_control"),
-        enable_write_access_control=_flag(element, "enable_write_access_control"),
-        metadata_protection_kind=_kind(element, "metadata_protection_kind"),
-        data_protection_kind=_kind(element, "data_protection_kind"),
-    )
+    settings = {name: _setting(element, name) for name in TOPIC_SETTINGS}
+    return TopicRule(_text(element, "topic_expression"), **settings)
 
 
 def _text(element: etree._Element, name: str) -> str:
     return (element.findtext(name) or "").strip()
 
 
-def _flag(element: etree._Element, name: str) -> bool:
-    return _text(element, name) in ("true", "1")
-
-
-def _kind(element: etree._Element, name: str) -> Protection:
-    return Protection(_text(element, name))
+def _setting(element: etree._Element, name: str) -> Any:
+    text = _text(element, name)
+    return Protection(text) if name.endswith("_kind") else text in ("true", "1")
 
 
 def _range(element: etree._Element) -> tuple[int, int]:

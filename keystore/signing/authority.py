@@ -124,14 +124,15 @@ def refuse_ca_name(name: str) -> None:
         raise InvalidInputError('a CA name has 1 to 64 bytes of UTF-8 and none of , + " \\ = / | < > ; #')
 
 
-def _key_usage(role: Role) -> x509.KeyUsage:
+def _key_usage(role: Role | None) -> x509.KeyUsage:
+    """Of the CA for ``role``; None: of an enclave."""
     from cryptography import x509
 
-    identity = role is Role.IDENTITY
+    is_leaf = role is None
     return x509.KeyUsage(
-        digital_signature=not identity, key_cert_sign=True, crl_sign=identity,
-        content_commitment=False, key_encipherment=False, data_encipherment=False,
-        key_agreement=False, encipher_only=False, decipher_only=False,
+        digital_signature=is_leaf or role is Role.PERMISSIONS, key_cert_sign=not is_leaf,
+        crl_sign=role is Role.IDENTITY, content_commitment=False, key_encipherment=False,
+        data_encipherment=False, key_agreement=False, encipher_only=False, decipher_only=False,
     )  # fmt: skip
 
 
@@ -144,32 +145,28 @@ class IdentityIssuer:
 
     def __init__(self, authority: Authority):
         from cryptography import x509
-        from cryptography.x509 import NameOID
         from cryptography.x509.oid import ExtendedKeyUsageOID
 
         ca = x509.load_der_x509_certificate(authority.facts.der)
         self._authority = authority
         self._issuer = ca.subject
         self._x509 = x509
-        self._common_name = NameOID.COMMON_NAME
         self._constraints = x509.BasicConstraints(ca=False, path_length=None)
-        self._usage = _leaf_key_usage()
-        self._extended = x509.ExtendedKeyUsage(
-            [ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH]
+        self._usage = _key_usage(None)
+        server, client = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
+        self._extended, self._server = (
+            x509.ExtendedKeyUsage([server, client]),
+            x509.ExtendedKeyUsage([server]),
         )
-        self._server = x509.ExtendedKeyUsage([ExtendedKeyUsageOID.SERVER_AUTH])
-        self._authority_key = _authority_key_id(ca)
+        self._authority_key = _authority_key_id(ca, authority.signer)
 
-    @property
-    def validity(self) -> Validity:
-        """Of the CA: no certificate outlives it."""
-        return self._authority.validity
-
-    def issue(self, common_name: str, key: PublicKey, validity: Validity, hosts: Sequence[str] = ()) -> bytes:
-        """DER certificate for an already valid common name. With ``hosts`` (names and addresses): of a server that is
-        found there, and of nothing else."""
+    def issue(
+        self, common_name: str, key: PublicKey, validity: Validity, hosts: Sequence[str] = ()
+    ) -> CertificateFacts:
+        """A certificate for an already valid common name, which does not outlive the CA. With ``hosts`` (names and
+        addresses): of a server that is found there, and of nothing else."""
         x509 = self._x509
-        name = x509.Name([x509.NameAttribute(self._common_name, common_name)])
+        name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, common_name)])
         builder = (
             _builder(name, self._issuer, validity.within(self._authority.validity), key)
             .add_extension(self._constraints, critical=True)
@@ -180,7 +177,7 @@ class IdentityIssuer:
         )
         if hosts:
             builder = builder.add_extension(_alternative_names(hosts), critical=False)
-        return _sign(builder, self._authority.signer)
+        return certificate.read_der(_sign(builder, self._authority.signer))
 
     def revocation_list(
         self, serials: dict[int, datetime], now: datetime, next_update: datetime, number: int
@@ -216,33 +213,15 @@ def _alternative_names(hosts: Sequence[str]) -> x509.SubjectAlternativeName:
     return x509.SubjectAlternativeName(names)
 
 
-def _leaf_key_usage() -> x509.KeyUsage:
-    from cryptography import x509
-
-    return x509.KeyUsage(
-        digital_signature=True, content_commitment=False, key_encipherment=False, data_encipherment=False,
-        key_agreement=False, key_cert_sign=False, crl_sign=False, encipher_only=False, decipher_only=False,
-    )  # fmt: skip
-
-
-def _authority_key_id(ca: x509.Certificate) -> x509.AuthorityKeyIdentifier:
+def _authority_key_id(ca: x509.Certificate, signer: Signer) -> x509.AuthorityKeyIdentifier:
     """From the CA's own SKI when it has one (SROS2's have none), as RFC 5280 section 4.2.1.1 asks."""
     from cryptography import x509
 
     try:
         key_id = ca.extensions.get_extension_for_class(x509.SubjectKeyIdentifier).value
     except x509.ExtensionNotFound:
-        return x509.AuthorityKeyIdentifier.from_issuer_public_key(_issuer_key(ca))
+        return x509.AuthorityKeyIdentifier.from_issuer_public_key(signer.public_key())
     return x509.AuthorityKeyIdentifier.from_issuer_subject_key_identifier(key_id)
-
-
-def _issuer_key(ca: x509.Certificate) -> PublicKey:
-    from cryptography.hazmat.primitives.asymmetric import ec, rsa
-
-    key = ca.public_key()
-    if not isinstance(key, (ec.EllipticCurvePublicKey, rsa.RSAPublicKey)):
-        raise SigningUnavailableError("the CA key is neither EC nor RSA; DDS-Security knows only these")
-    return key
 
 
 def _builder(

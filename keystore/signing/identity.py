@@ -13,6 +13,7 @@ from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives import hashes, serialization
 
 from keystore.errors import DamagedKeystoreError
+from keystore.formats.certificate import CertificateFacts
 from keystore.formats.validity import Validity
 from keystore.signing.authority import (
     Curve,
@@ -32,15 +33,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Identity:
-    """The files ``cert.pem`` and ``key.pem``; ``key`` is None when an existing key was certified anew.
+    """A certificate, and the key file that was made for it; None when an existing key was certified."""
 
-    ``validity`` is what the certificate got: its CA may have cut what was asked for.
-    """
+    facts: CertificateFacts
+    key: bytes | None = field(default=None, repr=False)
 
-    common_name: str
-    validity: Validity
-    cert: bytes
-    key: bytes | None = field(repr=False)
+    @property
+    def cert(self) -> bytes:
+        """The file ``cert.pem``."""
+        return pem_certificate(self.facts.der)
 
 
 def new_identity(
@@ -48,20 +49,7 @@ def new_identity(
 ) -> Identity:
     """A new key pair, and a certificate for it from ``issuer``."""
     signer = new_key(curve)
-    return certify(issuer, common_name, signer.public_key(), validity, key_pem(signer))
-
-
-def certify(
-    issuer: IdentityIssuer,
-    common_name: str,
-    public_key: PublicKey,
-    validity: Validity,
-    key: bytes | None = None,
-) -> Identity:
-    """A certificate for a key that exists already, as ``renew`` and interrupted runs need it."""
-    granted = validity.within(issuer.validity)
-    cert = pem_certificate(issuer.issue(common_name, public_key, granted))
-    return Identity(common_name, granted, cert, key)
+    return Identity(issuer.issue(common_name, signer.public_key(), validity), key_pem(signer))
 
 
 def public_half(pem: bytes, place: str) -> PublicKey:

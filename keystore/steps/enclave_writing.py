@@ -14,7 +14,7 @@ from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
 from keystore.disk.zenoh_files import has_router
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
-from keystore.formats.certificate import read_certificate
+from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.register import IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
@@ -29,7 +29,7 @@ from keystore.formats.subject import (
 )
 from keystore.formats.validity import Validity, iso
 from keystore.signing.authority import Authority, IdentityIssuer
-from keystore.signing.identity import Identity, certify, new_identity, public_half
+from keystore.signing.identity import Identity, new_identity, public_half
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.smime import sign_document
 from keystore.steps.crl import can_revoke, revocable
@@ -122,12 +122,12 @@ class EnclaveWriter:
         lost = what_is_taken_away(self._view, self._register, state.enclave, permissions)
         if lost:
             state = self._end_rights(state, lost)
-        named = self._identity(state, bool(lost), entries, actions)
+        facts = self._identity(state, bool(lost), entries, actions)
         links = layout.enclave_links(state.enclave, crl=True)
         for name in state.links:
             entries[name] = Link(links[name], layout.link_source(name))
         if state.permissions:
-            self._permissions(state, *named, permissions, entries)
+            self._permissions(state.enclave, facts, permissions, entries)
         if "created" not in actions:
             actions += [
                 word for word, done in (("permissions", state.permissions), ("links", state.links)) if done
@@ -185,18 +185,17 @@ class EnclaveWriter:
         new_generation: bool,
         entries: dict[str, Content | Link],
         actions: list[str],
-    ) -> tuple[str, Validity]:
-        """Common name and validity of the certificate the enclave will have."""
+    ) -> CertificateFacts:
+        """Of the certificate the enclave will have."""
         if state.reissue is Reissue.NOTHING and state.facts is not None:
-            return state.facts.common_name or "", state.facts.validity
+            return state.facts
         made = self._issue(state, self._subject(state.enclave, new_generation), actions)
         if made.key is not None:
             entries[layout.KEY] = Content(made.key, store.PRIVATE_MODE)
         entries[layout.CERT] = Content(made.cert)
-        facts = read_certificate(made.cert, "the new certificate")
-        self._issued.append(certificate_record(state.enclave, facts, self._identity_ca.facts))
-        self._revoke_longer(state, made.validity)
-        return made.common_name, made.validity
+        self._issued.append(certificate_record(state.enclave, made.facts, self._identity_ca.facts))
+        self._revoke_longer(state, made.facts.validity)
+        return made.facts
 
     def _issue(self, state: EnclaveState, cn: str, actions: list[str]) -> Identity:
         made_on_host = self._view.has_request(state.enclave)
@@ -207,15 +206,14 @@ class EnclaveWriter:
             )
         if state.reissue is Reissue.KEY_PAIR:
             known = state.facts is not None or bool(self._register.of_enclave(state.enclave))
-            actions.append("key and certificate" if known and not _is_new(state) else "created")
+            actions.append("key and certificate" if known and state.reasons != (NEW,) else "created")
             return new_identity(self._issuer, cn, self._validity, self._view.settings.curve)
         directory = layout.enclave_directory(state.enclave)
         relative = layout.request(state.enclave) if made_on_host else f"{directory}/{layout.KEY}"
         key = safe_files.read_private(self._view.root, relative)
         actions.append("certificate")
-        return certify(
-            self._issuer, cn, public_half(key, printable(self._view.root / relative)), self._validity
-        )
+        public = public_half(key, printable(self._view.root / relative))
+        return Identity(self._issuer.issue(cn, public, self._validity))
 
     def _subject(self, enclave: str, new_generation: bool) -> str:
         """The subject it has; another one for a new generation, or after a change of the scheme."""
@@ -254,26 +252,22 @@ class EnclaveWriter:
 
     def _permissions(
         self,
-        state: EnclaveState,
-        cn: str,
-        validity: Validity,
+        enclave: str,
+        facts: CertificateFacts,
         source: PermissionsSource,
         entries: dict[str, Content | Link],
     ) -> None:
-        subject = subject_name(cn)
-        document = source(subject, validity) or kept_permissions(
-            self._view, self._register, state.enclave, subject, validity, self._options.rmw
+        name = facts.common_name or ""
+        subject = subject_name(name)
+        document = source(subject, facts.validity) or kept_permissions(
+            self._view, self._register, enclave, subject, facts.validity, self._options.rmw
         )
         signed = sign_document(document, self._permissions_ca, self._now)
-        self._signed.append(permissions_record(state.enclave, cn, document))
+        self._signed.append(permissions_record(enclave, name, document))
         if len(signed) >= WARN_BYTES:
             self.warnings.append(
-                f"the permissions of enclave {state.enclave} take {len(signed)} bytes; Fast DDS carries "
+                f"the permissions of enclave {enclave} take {len(signed)} bytes; Fast DDS carries "
                 f"at most {FAST_DDS_LIMIT_BYTES}, beyond that its peers never match: split the enclave"
             )
         entries[layout.PERMISSIONS_XML] = Content(document)
         entries[layout.PERMISSIONS] = Content(signed)
-
-
-def _is_new(state: EnclaveState) -> bool:
-    return state.reasons == (NEW,)

@@ -31,7 +31,6 @@ from keystore.disk.zenoh_files import (
     zenoh_enclaves,
 )
 from keystore.errors import KeystoreError
-from keystore.formats.certificate import read_der
 from keystore.formats.register import UNKNOWN, IssuedCertificate
 from keystore.formats.role import Role
 from keystore.formats.validity import DEFAULT_BACKDATE, Validity, later, utc_now
@@ -192,27 +191,24 @@ def _write(
             changed = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != wanted.content
             if changed or identity_problem(view, later(now, options.renew_within)) is not None:
                 restart = has_router(view)
-                issued = _issue(view, address, options.access, now)
-                batch.record(opened.register.with_certificates([issued.record]))
-                files |= {**issued.files, layout.ZENOH_ROUTER: wanted.content}
+                record, issued = _issue(view, address, options.access, now)
+                batch.record(opened.register.with_certificates([record]))
+                files |= {**issued, layout.ZENOH_ROUTER: wanted.content}
         for file, content in files.items():
             batch.file(file, content, PRIVATE_MODE if file == layout.ZENOH_ROUTER_KEY else PUBLIC_MODE)
     return ZenohReport(view.root, address, tuple(files), wanted.served, wanted.gaps, restart)
 
 
-class _Issued(NamedTuple):
-    record: IssuedCertificate
-    files: dict[str, bytes]
-
-
-def _issue(view: KeystoreView, address: RouterAddress, access: CaAccess, now: datetime) -> _Issued:
+def _issue(
+    view: KeystoreView, address: RouterAddress, access: CaAccess, now: datetime
+) -> tuple[IssuedCertificate, dict[str, bytes]]:
     """A certificate for the router's host; its key stays unless it is missing or others could read it."""
     authority = view.authority(Role.IDENTITY, access)
     key = router_key(view)
     fresh = None if key is not None else new_key(view.settings.curve)
     public = fresh.public_key() if fresh is not None else public_half(key or b"", layout.ZENOH_ROUTER_KEY)
     validity = Validity.starting(now, view.settings.lifetime, backdate=DEFAULT_BACKDATE)
-    der = IdentityIssuer(authority).issue(ROUTER_NAME, public, validity, address.hosts)
-    record = certificate_record(UNKNOWN, read_der(der), authority.facts)._replace(replaced=True)
+    facts = IdentityIssuer(authority).issue(ROUTER_NAME, public, validity, address.hosts)
     files = {layout.ZENOH_ROUTER_KEY: key_pem(fresh)} if fresh is not None else {}
-    return _Issued(record, {**files, layout.ZENOH_ROUTER_CERT: pem_certificate(der)})
+    record = certificate_record(UNKNOWN, facts, authority.facts)._replace(replaced=True)
+    return record, {**files, layout.ZENOH_ROUTER_CERT: pem_certificate(facts.der)}

@@ -7,7 +7,14 @@ from pathlib import Path
 
 from keystore.disk import layout
 from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule
+from keystore.formats.governance import (
+    DOMAIN_SETTINGS,
+    TOPIC_SETTINGS,
+    DomainRule,
+    Governance,
+    Protection,
+    TopicRule,
+)
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
@@ -19,22 +26,14 @@ _STRENGTH = {
     Protection.ENCRYPT_WITH_ORIGIN_AUTHENTICATION: 2,
 }
 _PERMISSIVE = "allow_unauthenticated_participants"  # the one flag whose ``true`` is the weaker value
-_OF_DOMAIN = (
-    _PERMISSIVE, "enable_join_access_control", "discovery_protection_kind", "liveliness_protection_kind",
-    "rtps_protection_kind",
-)  # fmt: skip
-_OF_TOPIC = (
-    "enable_discovery_protection", "enable_liveliness_protection", "enable_read_access_control",
-    "enable_write_access_control", "metadata_protection_kind", "data_protection_kind",
-)  # fmt: skip
 
 
 def weaknesses(governance: Governance) -> Iterator[str]:
     """Each attribute of each rule that is weaker than the default, as ``rtps_protection_kind NONE (default SIGN)``."""
     for rule in governance.domain_rules:
-        yield from _weaker(rule, DomainRule(), _OF_DOMAIN, f"domains {rule.domains}")
+        yield from _weaker(rule, DomainRule(), DOMAIN_SETTINGS, f"domains {rule.domains}")
         for topic in rule.topic_rules:
-            yield from _weaker(topic, TopicRule(), _OF_TOPIC, f"topics {topic.topic_expression}")
+            yield from _weaker(topic, TopicRule(), TOPIC_SETTINGS, f"topics {topic.topic_expression}")
 
 
 def _weaker(

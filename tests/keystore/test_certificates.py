@@ -76,7 +76,7 @@ def test_cas_have_names_of_their_own() -> None:
 
 def test_an_enclave_never_outlives_its_ca(identity_ca: Authority) -> None:
     made = new_identity(IdentityIssuer(identity_ca), "ros.a", Validity.starting(NOW, 900 * DAY))
-    assert made.validity == VALIDITY
+    assert made.facts.validity == VALIDITY
 
 
 def test_a_ca_and_another_ones_key_are_told_apart(identity_ca: Authority) -> None:

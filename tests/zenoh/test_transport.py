@@ -55,7 +55,7 @@ def identity(
     span = validity or Validity.starting(utc_now(), LIFE)
     folder.mkdir(exist_ok=True)
     cert, key = folder / "cert.pem", folder / "key.pem"
-    cert.write_bytes(pem_certificate(IdentityIssuer(ca).issue(name, signer.public_key(), span, hosts)))
+    cert.write_bytes(pem_certificate(IdentityIssuer(ca).issue(name, signer.public_key(), span, hosts).der))
     key.write_bytes(key_pem(signer))
     return {
         "connect_certificate": str(cert), "connect_private_key": str(key),
