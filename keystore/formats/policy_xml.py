@@ -74,7 +74,8 @@ def read_policy(path: str | Path) -> PolicyDocument:
 def parse_policy(document: bytes, where: str = "policy.xml", folder: Path | None = None) -> PolicyDocument:
     """As ``read_policy``, from bytes; includes are followed only with a ``folder`` and below it."""
     root = parse_xml(document, where)
-    return _PolicyReader(folder).read(root, Place(where if folder is None else str(Path(where).resolve())))
+    file = where if folder is None else str(Path(where).resolve())
+    return _PolicyReader(folder).read(Written(root, file))
 
 
 class _PolicyReader:
@@ -86,98 +87,93 @@ class _PolicyReader:
         self._warnings: list[str] = []
         self._notes: list[str] = []
 
-    def read(self, root: etree._Element, place: Place) -> PolicyDocument:
-        self._expect(root, place, "policy", required=("version",))
-        if root.get("version") != VERSION:
+    def read(self, root: Written) -> PolicyDocument:
+        self._expect(root, "policy", required=("version",))
+        if (version := root.element.get("version", "")) != VERSION:
             raise PolicyError(
-                f"{place.at(root)}: policy version {printable(root.get('version', ''))} is not supported, "
-                f"only {VERSION}"
+                f"{root.where}: policy version {printable(version)} is not supported, only {VERSION}"
             )
-        (enclaves, inner), *rest = list(self._reader.children(root, place)) or [(root, place)]
+        enclaves, *rest = list(self._reader.children(root)) or [root]
         if rest:
-            raise PolicyError(f"{rest[0][1].at(rest[0][0])}: a policy has exactly one <enclaves>")
-        self._expect(enclaves, inner, "enclaves")
-        for element, at in self._some_children(enclaves, inner, "enclave"):
-            self._enclave(element, at)
+            raise PolicyError(f"{rest[0].where}: a policy has exactly one <enclaves>")
+        self._expect(enclaves, "enclaves")
+        for enclave in self._some_children(enclaves, "enclave"):
+            self._enclave(enclave)
         return self._result()
 
-    def _enclave(self, element: etree._Element, place: Place) -> None:
-        self._expect(element, place, "enclave", required=("path",))
-        path = element.get("path", "")
+    def _enclave(self, enclave: Written) -> None:
+        self._expect(enclave, "enclave", required=("path",))
+        path = enclave.element.get("path", "")
         try:
             validate_enclave_name(path)
         except InvalidEnclaveNameError as error:
-            raise PolicyError(f"{place.at(element)}: {error}") from None
+            raise PolicyError(f"{enclave.where}: {error}") from None
         if path in self._enclaves:
-            self._warnings.append(f"{place.at(element)}: enclave {path} is defined again; both are merged")
+            self._warnings.append(f"{enclave.where}: enclave {path} is defined again; both are merged")
         profiles = self._enclaves.setdefault(path, {})
-        for child, at in self._some_children(element, place, "profiles"):
-            self._expect(child, at, "profiles", optional=("type",))
-            self._profiles(path, child, at, profiles)
+        for child in self._some_children(enclave, "profiles"):
+            self._expect(child, "profiles", optional=("type",))
+            self._profiles(path, child, profiles)
 
-    def _profiles(self, path: str, element: etree._Element, place: Place, profiles: Profiles) -> None:
+    def _profiles(self, path: str, group: Written, profiles: Profiles) -> None:
         found = 0
-        for child, at in self._reader.children(element, place):
-            if child.tag == "metadata" and found:
+        for child in self._reader.children(group):
+            if child.element.tag == "metadata" and found:
                 continue
-            self._expect(child, at, "profile", required=("ns", "node"))
-            key = (child.get("ns", ""), child.get("node", ""))
-            self._profile(path, Profile(*key, ()), child, at, profiles.setdefault(key, {}))
+            self._expect(child, "profile", required=("ns", "node"))
+            key = (child.element.get("ns", ""), child.element.get("node", ""))
+            self._profile(path, Profile(*key, ()), child, profiles.setdefault(key, {}))
             found += 1
         if not found:
-            raise PolicyError(f"{place.at(element)}: <profiles> needs at least one <profile>")
+            raise PolicyError(f"{group.where}: <profiles> needs at least one <profile>")
 
-    def _profile(
-        self, path: str, profile: Profile, element: etree._Element, place: Place, rules: Rules
-    ) -> None:
-        self._check_name("~/x", profile, place.at(element))  # looks at ns and node
-        for group, at in self._reader.children(element, place):
-            if group.tag not in _GROUPS:
-                raise PolicyError(f"{at.at(group)}: <{group.tag}> is not allowed in a <profile>")
-            entry, operations = _GROUPS[str(group.tag)]
-            self._expect(group, at, str(group.tag), optional=tuple(o.value for o in operations))
-            qualifiers = self._qualifiers(group, at, operations)
-            for expression, spot in self._some_children(group, at, entry):
-                self._expect(expression, spot, entry)
-                self._rules(path, profile, expression, spot, qualifiers, rules)
+    def _profile(self, path: str, profile: Profile, written: Written, rules: Rules) -> None:
+        self._check_name("~/x", profile, written.where)  # looks at ns and node
+        for group in self._reader.children(written):
+            tag = str(group.element.tag)
+            if tag not in _GROUPS:
+                raise PolicyError(f"{group.where}: <{tag}> is not allowed in a <profile>")
+            entry, operations = _GROUPS[tag]
+            self._expect(group, tag, optional=tuple(o.value for o in operations))
+            qualifiers = self._qualifiers(group, operations)
+            for expression in self._some_children(group, entry):
+                self._expect(expression, entry)
+                self._rules(path, profile, expression, qualifiers, rules)
 
-    def _qualifiers(
-        self, group: etree._Element, place: Place, operations: Iterable[Operation]
-    ) -> list[tuple[Operation, Qualifier]]:
-        found: list[tuple[Operation, Qualifier]] = []
+    def _qualifiers(self, group: Written, operations: Iterable[Operation]) -> dict[Operation, Qualifier]:
+        found: dict[Operation, Qualifier] = {}
         for operation in operations:
-            value = group.get(operation.value)
+            value = group.element.get(operation.value)
             if value is None:
                 continue
             if value not in ("ALLOW", "DENY"):
                 raise PolicyError(
-                    f"{place.at(group)}: {operation.value}={printable(value)} must be ALLOW or DENY"
+                    f"{group.where}: {operation.value}={printable(value)} must be ALLOW or DENY"
                 )
-            found.append((operation, Qualifier(value)))
+            found[operation] = Qualifier(value)
         if not found:
             names = " or ".join(operation.value for operation in operations)
-            self._warnings.append(f"{place.at(group)}: <{group.tag}> without {names} has no effect")
+            self._warnings.append(f"{group.where}: <{group.element.tag}> without {names} has no effect")
         return found
 
     def _rules(
         self,
         path: str,
         profile: Profile,
-        element: etree._Element,
-        place: Place,
-        qualifiers: Iterable[tuple[Operation, Qualifier]],
+        written: Written,
+        granted: Mapping[Operation, Qualifier],
         rules: Rules,
     ) -> None:
-        expression = element.text or ""
-        if len(element):
-            raise PolicyError(f"{place.at(element)}: <{element.tag}> must hold a name only")
-        self._check_name(expression, profile, place.at(element))
-        for operation, qualifier in qualifiers:
-            rules.setdefault(Rule(operation, qualifier, expression), place.at(element))
+        expression = written.element.text or ""
+        if len(written.element):
+            raise PolicyError(f"{written.where}: <{written.element.tag}> must hold a name only")
+        self._check_name(expression, profile, written.where)
+        for operation, qualifier in granted.items():
+            rules.setdefault(Rule(operation, qualifier, expression), written.where)
             if qualifier is Qualifier.DENY or has_wildcard(expression):
                 kind = "wildcard" if has_wildcard(expression) else "denial"
                 self._notes.append(
-                    f"{place.at(element)}: enclave {path}: {kind} {qualifier.value} {operation.value} {expression}"
+                    f"{written.where}: enclave {path}: {kind} {qualifier.value} {operation.value} {expression}"
                 )
 
     def _check_name(self, expression: str, profile: Profile, where: str) -> None:
@@ -186,29 +182,23 @@ class _PolicyReader:
         except PolicyError as error:
             raise PolicyError(f"{where}: {error}") from None
 
-    def _some_children(
-        self, element: etree._Element, place: Place, tag: str
-    ) -> list[tuple[etree._Element, Place]]:
-        children = list(self._reader.children(element, place))
+    def _some_children(self, parent: Written, tag: str) -> list[Written]:
+        children = list(self._reader.children(parent))
         if not children:
-            raise PolicyError(f"{place.at(element)}: <{element.tag}> needs at least one <{tag}>")
+            raise PolicyError(f"{parent.where}: <{parent.element.tag}> needs at least one <{tag}>")
         return children
 
     def _expect(
-        self,
-        element: etree._Element,
-        place: Place,
-        tag: str,
-        required: tuple[str, ...] = (),
-        optional: tuple[str, ...] = (),
+        self, written: Written, tag: str, required: tuple[str, ...] = (), optional: tuple[str, ...] = ()
     ) -> None:
-        if element.tag != tag:
-            raise PolicyError(f"{place.at(element)}: expected <{tag}>, found <{element.tag}>")
-        missing = [name for name in required if name not in element.attrib]
-        unknown = [str(name) for name in element.attrib if name not in (*required, *optional)]
+        present = written.element.attrib
+        if written.element.tag != tag:
+            raise PolicyError(f"{written.where}: expected <{tag}>, found <{written.element.tag}>")
+        missing = [name for name in required if name not in present]
+        unknown = [str(name) for name in present if name not in (*required, *optional)]
         if missing or unknown:
             text = f"needs the attribute {missing[0]}" if missing else f"has no attribute {unknown[0]}"
-            raise PolicyError(f"{place.at(element)}: <{tag}> {text}")
+            raise PolicyError(f"{written.where}: <{tag}> {text}")
 
     def _result(self) -> PolicyDocument:
         enclaves: list[EnclavePolicy] = []
@@ -216,12 +206,8 @@ class _PolicyReader:
         for path, profiles in sorted(self._enclaves.items()):
             for (ns, node), rules in profiles.items():
                 places.update({(path, ns, node, rule): place for rule, place in rules.items()})
-            enclaves.append(
-                EnclavePolicy(
-                    path,
-                    tuple(Profile(ns, node, tuple(sorted(r))) for (ns, node), r in sorted(profiles.items())),
-                )
-            )
+            found = (Profile(*key, tuple(sorted(rules))) for key, rules in sorted(profiles.items()))
+            enclaves.append(EnclavePolicy(path, tuple(found)))
         return PolicyDocument(Policy(tuple(enclaves)), places, tuple(self._warnings), tuple(self._notes))
 
 
@@ -273,15 +259,17 @@ _XML_BASE = "{http://www.w3.org/XML/1998/namespace}base"
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """The file an element is written in, and the files whose includes led there, outermost first."""
+class Written:
+    """An element, the file it is written in, and the files whose includes led there, outermost first."""
 
+    element: etree._Element
     file: str
     chain: tuple[str, ...] = ()
 
-    def at(self, element: etree._Element) -> str:
+    @property
+    def where(self) -> str:
         included = "".join(f", included from {file}" for file in reversed(self.chain))
-        return f"{self.file}:{element.sourceline}{included}"
+        return f"{self.file}:{self.element.sourceline}{included}"
 
 
 class IncludingReader:
@@ -293,44 +281,43 @@ class IncludingReader:
         self._bytes = 0
         self._followed = 0
 
-    def children(self, element: etree._Element, place: Place) -> Iterator[tuple[etree._Element, Place]]:
-        """Each child element and where it is written. Raises ``PolicyError`` for an unsafe include."""
-        for child in element:
-            if child.tag in _INCLUDE_TAGS:
-                yield from self._included(child, place)
-            else:
-                child.attrib.pop(_XML_BASE, "")
-                yield child, place
+    def children(self, parent: Written) -> Iterator[Written]:
+        """Each child element. Raises ``PolicyError`` for an unsafe include."""
+        return self._found(parent.element, parent.file, parent.chain)
 
-    def _included(self, include: etree._Element, place: Place) -> Iterator[tuple[etree._Element, Place]]:
-        where = place.at(include)
-        path = self._path(include, place, where)
+    def _found(
+        self, elements: Iterable[etree._Element], file: str, chain: tuple[str, ...]
+    ) -> Iterator[Written]:
+        for element in elements:
+            if element.tag in _INCLUDE_TAGS:
+                yield from self._included(Written(element, file, chain))
+            else:
+                element.attrib.pop(_XML_BASE, "")
+                yield Written(element, file, chain)
+
+    def _included(self, include: Written) -> Iterator[Written]:
+        where = include.where
+        path = self._path(include)
         self._followed += 1
         if self._followed > MAX_INCLUDES:
             raise PolicyError(f"{where}: more than {MAX_INCLUDES} includes")
-        chain = (*place.chain, f"{place.file}:{include.sourceline}")
-        inner = Place(str(path), chain)
-        if len(chain) > MAX_DEPTH or str(path) in (place.file, *(c.rpartition(":")[0] for c in chain)):
+        chain = (*include.chain, f"{include.file}:{include.element.sourceline}")
+        if len(chain) > MAX_DEPTH or str(path) in (include.file, *(c.rpartition(":")[0] for c in chain)):
             raise PolicyError(f"{where}: the include of {printable(path)} goes round in a circle or too deep")
-        root = self._root(path, where)
-        for found in _pointed(root, include, where):
-            if found.tag in _INCLUDE_TAGS:
-                yield from self._included(found, inner)
-            else:
-                found.attrib.pop(_XML_BASE, "")
-                yield found, inner
+        found = _pointed(self._root(path, where), include.element, where)
+        yield from self._found(found, str(path), chain)
 
-    def _path(self, include: etree._Element, place: Place, where: str) -> Path:
-        href = include.get("href", "")
-        if include.get("parse", "xml") != "xml":
+    def _path(self, include: Written) -> Path:
+        where, href = include.where, include.element.get("href", "")
+        if include.element.get("parse", "xml") != "xml":
             raise PolicyError(f'{where}: an include may only read XML (parse="xml")')
-        if len(include):
+        if len(include.element):
             raise PolicyError(f"{where}: an include with a fallback is not supported; every file must exist")
         if self._folder is None:
             raise PolicyError(f"{where}: includes are only followed in a policy file, not here")
         if not href or ":" in href or "\\" in href or not href.isprintable() or href.startswith("/"):
             raise PolicyError(f"{where}: {printable(href)} is not a relative path of a file")
-        path = (Path(place.file).parent / href).resolve()
+        path = (Path(include.file).parent / href).resolve()
         if not path.is_relative_to(self._folder):
             raise PolicyError(
                 f"{where}: {printable(href)} is outside the policy's folder {printable(self._folder)}; "
