@@ -24,7 +24,7 @@ from keystore.formats.zenoh.rules import access_rules
 from keystore.steps.creation import CreateOptions, create_keystore
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
-from keystore.steps.zenoh_configuration import ZenohOptions, write_zenoh
+from keystore.steps.zenoh_configuration import write_zenoh
 
 _OPERATIONS = tuple(Operation)
 _MESSAGES = 20_000
@@ -61,21 +61,25 @@ def main(nodes: int = 1000, interfaces: int = 20) -> None:
         create_keystore(root, CreateOptions(durable=False))
         timed("provision (certificates and DDS permissions)", lambda: provision(
             root, wanted, options=ProvisionOptions(durable=False)))  # fmt: skip
-        zenoh_options = ZenohOptions("localhost:17447", durable=False)
         paths = [one.path for one in wanted]
         timed(
             "secure-keystore zenoh, for the first time",
-            lambda: write_zenoh(root, paths, options=zenoh_options),
+            lambda: write_zenoh(
+                root, paths, router="localhost:17447", options=ProvisionOptions(durable=False)
+            ),
         )
         timed(
-            "secure-keystore zenoh, nothing changed", lambda: write_zenoh(root, paths, options=zenoh_options)
+            "secure-keystore zenoh, nothing changed",
+            lambda: write_zenoh(
+                root, paths, router="localhost:17447", options=ProvisionOptions(durable=False)
+            ),
         )
         _sizes(root)
         _router(root, "router with the rules of all")
         few = Path(folder) / "few"
         create_keystore(few, CreateOptions(durable=False))
         provision(few, wanted[:2], options=ProvisionOptions(durable=False))
-        write_zenoh(few, paths[:2], options=zenoh_options)
+        write_zenoh(few, paths[:2], router="localhost:17447", options=ProvisionOptions(durable=False))
         _router(few, "router with the rules of two")
 
 

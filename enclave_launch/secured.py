@@ -96,13 +96,13 @@ def provision_with_zenoh(
 ) -> tuple[ProvisionOptions, ProvisionReport, ZenohReport]:
     """As ``provision_policies``, and the configuration of what is on Zenoh. Gives the options that were used, too."""
     from enclave_launch.review.middlewares import zenoh_enclaves
-    from keystore.steps.zenoh_configuration import options_of, write_zenoh
+    from keystore.steps.zenoh_configuration import write_zenoh
 
     wanted = zenoh_enclaves(plan, os.environ)
     options = options._replace(types={path: types_text(types) for path, types in wanted.items()})
     report = provision_policies(settings, plan, options)
     with keystore_errors():
-        return options, report, write_zenoh(settings.keystore, wanted, options=options_of(options))
+        return options, report, write_zenoh(settings.keystore, wanted, options=options)
 
 
 def launch_owner(plan: LaunchPlan) -> str:

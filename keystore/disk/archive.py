@@ -12,8 +12,10 @@ import os
 import tarfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
-from keystore.errors import DamagedKeystoreError
+from enclave_launch.boundary.files import read_bytes
+from keystore.errors import DamagedKeystoreError, StorageError, printable
 
 MAX_ARCHIVE = 256_000_000
 """Bytes; some 20 000 enclaves."""
@@ -46,6 +48,15 @@ def archive_bytes(files: Iterable[ExportedFile], *, compressed: bool = False) ->
         return buffer.getvalue()
 
     return gzip.compress(buffer.getvalue(), mtime=0)
+
+
+def read_bundle(bundle: Path) -> dict[str, bytes]:
+    """As ``read_archive``, from a file. Raises StorageError, too."""
+    try:
+        content = read_bytes(bundle, MAX_ARCHIVE)
+    except OSError as error:
+        raise StorageError.of(error, "reading the bundle") from None
+    return read_archive(content, printable(bundle))
 
 
 def read_archive(content: bytes, place: str) -> dict[str, bytes]:

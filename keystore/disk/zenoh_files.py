@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import stat
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from datetime import datetime
 from typing import NamedTuple
 
@@ -200,11 +200,6 @@ def _topics(grant: Grant, qualifier: Qualifier) -> TopicSets:
 
 def _domains(grant: Grant) -> Domains:
     """Of all that it allows; our own documents have one set of domains."""
-    return Domains(_ranges(grant))
-
-
-def _ranges(grant: Grant) -> Iterator[tuple[int, int]]:
-    for rule in grant.rules:
-        if rule.qualifier is Qualifier.ALLOW:
-            for low, high in rule.domains:
-                yield low, HIGHEST_ID if high is None else high
+    allowed = [rule for rule in grant.rules if rule.qualifier is Qualifier.ALLOW]
+    spans = [span for rule in allowed for span in rule.domains]
+    return Domains((low, HIGHEST_ID if high is None else high) for low, high in spans)

@@ -32,7 +32,7 @@ from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.given_file import read_given
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, parse_governance
-from keystore.formats.strict_yaml import Strict, parse_strict
+from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
 
 
 class _Topic(Strict):
@@ -55,8 +55,7 @@ class _Domain(Strict):
     topic_rules: list[_Topic] = Field(default_factory=list)
 
 
-class _Document(Strict):
-    version: StrictInt
+class _Document(StrictDocument):
     domain_rules: list[_Domain]
 
 
@@ -75,8 +74,6 @@ def governance_of(path: Path) -> Governance:
 def parse_governance_yaml(text: bytes, where: str) -> Governance:
     """Read ``governance.yaml``. Raises ``InvalidInputError``, which begins with ``where``."""
     document = parse_strict(_Document, text, where)
-    if document.version != 1:
-        raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
     if not document.domain_rules:
         raise InvalidInputError(f"{where}: domain_rules: at least one rule is needed")
     try:

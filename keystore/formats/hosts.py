@@ -26,11 +26,11 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import NamedTuple, Optional
 
-from pydantic import Field, StrictBool, StrictInt, StrictStr
+from pydantic import Field, StrictBool, StrictStr
 
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.given_file import read_given
-from keystore.formats.strict_yaml import Strict, parse_strict
+from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
 
 _HOST = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]{0,61}[A-Za-z0-9])?\Z")
 _MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")
@@ -122,8 +122,7 @@ class _Needs(Strict):
     memory: Optional[StrictStr] = None
 
 
-class _Document(Strict):
-    version: StrictInt
+class _Document(StrictDocument):
     hosts: dict[StrictStr, _Host] = Field(default_factory=dict)
     needs: list[_Needs] = Field(default_factory=list)
 
@@ -136,8 +135,6 @@ def load_hosts(path: Path) -> Hosts:
 def parse_hosts(text: bytes, where: str) -> Hosts:
     """As ``load_hosts``, from the file's content."""
     document = parse_strict(_Document, text, where)
-    if document.version != 1:
-        raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
     for name in document.hosts:
         refuse_host_name(name, where)
     hosts = tuple(

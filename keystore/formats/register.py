@@ -137,13 +137,9 @@ class Register:
 
     def with_certificates(self, issued: Iterable[IssuedCertificate]) -> Register:
         """Each takes the place of what its enclave had."""
-        fresh = list(issued)
-        enclaves = {one.enclave for one in fresh}
-        known = {
-            serial: one._replace(replaced=True) if one.enclave in enclaves else one
-            for serial, one in self.certificates.items()
-        }
-        return replace(self, certificates={**known, **{one.serial: one for one in fresh}})
+        fresh = {one.serial: one for one in issued}
+        before = self.without_enclaves(one.enclave for one in fresh.values()).certificates
+        return replace(self, certificates={**before, **fresh})
 
     def with_documents(self, signed: Iterable[SignedPermissions]) -> Register:
         fresh = tuple(signed)

@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Any, TypeVar
 
 import yaml
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, StrictInt, ValidationError
 
 from keystore.errors import InvalidInputError
 from keystore.formats.given_file import MAX_BYTES
@@ -19,7 +19,13 @@ class Strict(BaseModel, extra="forbid"):
     """The base of all entries: an unknown key is an error."""
 
 
-_Document = TypeVar("_Document", bound=Strict)
+class StrictDocument(Strict):
+    """The base of whole files."""
+
+    version: StrictInt
+
+
+_Document = TypeVar("_Document", bound=StrictDocument)
 
 
 def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
@@ -37,11 +43,14 @@ def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
         keys = " and ".join(name for name in ("version", *_others(model)))
         raise InvalidInputError(f"{where}: document: not a mapping with the keys {keys}")
     try:
-        return model(**content)
+        document = model(**content)
     except ValidationError as error:
         first = error.errors()[0]
         place = ".".join(str(part) for part in first["loc"]) or "document"
         raise InvalidInputError(f"{where}: {place}: {first['msg']}") from None
+    if document.version != 1:
+        raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
+    return document
 
 
 def _others(model: type[Strict]) -> list[str]:

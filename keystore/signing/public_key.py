@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import binascii
 import hashlib
+from collections.abc import Iterable
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -39,6 +40,11 @@ def _loaded(spki: bytes) -> PublicKeyTypes | None:
         return _load(spki)
     except (ValueError, UnsupportedAlgorithm):
         return None
+
+
+def fingerprints(named: Iterable[str]) -> frozenset[str]:
+    """SHA-256 as somebody wrote them, such as openssl does with colons, in the form of ``fingerprint``."""
+    return frozenset(one.replace(":", "").lower() for one in named)
 
 
 def signature_is_valid(spki: bytes, signature: bytes, data: bytes, algorithm: bytes | None = None) -> bool:

@@ -13,9 +13,8 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, safe_files
-from keystore.disk.archive import MAX_ARCHIVE, read_archive
+from keystore.disk.archive import read_bundle
 from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import own_permissions_cas
@@ -125,14 +124,11 @@ def _sources(places: Iterable[Path | str]) -> Iterator[Path]:
 
 
 def _manifest(place: Path, reference: Reference | None) -> Manifest:
-    try:
-        signed = (
-            read_archive(read_bytes(place, MAX_ARCHIVE), printable(place)).get(layout.BUNDLE, b"")
-            if place.is_file()
-            else safe_files.read(place, layout.BUNDLE)
-        )
-    except OSError as error:
-        raise StorageError.of(error, "reading the bundle") from None
+    signed = (
+        read_bundle(place).get(layout.BUNDLE, b"")
+        if place.is_file()
+        else safe_files.read(place, layout.BUNDLE)
+    )
     document = smime.read(signed, printable(place))
     if reference is not None:
         smime.check(document, list(reference.signers), printable(place))

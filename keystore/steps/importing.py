@@ -14,15 +14,13 @@ from enum import Enum
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.boundary.files import read_bytes
 from keystore.disk import layout, lock, safe_files, store
-from keystore.disk.archive import MAX_ARCHIVE, read_archive
+from keystore.disk.archive import read_bundle
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import Versions
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidInputError,
-    StorageError,
     UnsafeKeystoreError,
     printable,
 )
@@ -31,7 +29,7 @@ from keystore.formats.certificate import read_certificates
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
-from keystore.signing.public_key import fingerprint
+from keystore.signing.public_key import fingerprint, fingerprints
 from keystore.steps.host_keys import HostKey, find_key, forget_pending
 from keystore.verification import Severity, verify
 
@@ -83,7 +81,7 @@ def import_bundle(
     """
     chosen = options or ImportOptions()
     versions = Versions(keystore)
-    content = _read(Path(bundle))
+    content = read_bundle(Path(bundle))
     with versions.opened(chosen.lock_timeout):
         present = deployed_manifest(versions.current) if versions.current else None
         found = _checked(content, printable(bundle), present, chosen)
@@ -99,14 +97,6 @@ def deployed_manifest(version: Path) -> Manifest:
     """Of an imported keystore. Raises DamagedKeystoreError."""
     place = printable(version / layout.BUNDLE)
     return parse_manifest(smime.read(safe_files.read(version, layout.BUNDLE), place).document, place)
-
-
-def _read(bundle: Path) -> dict[str, bytes]:
-    try:
-        content = read_bytes(bundle, MAX_ARCHIVE)
-    except OSError as error:
-        raise StorageError.of(error, "reading the bundle") from None
-    return read_archive(content, printable(bundle))
 
 
 def _checked(
@@ -130,7 +120,7 @@ def _checked(
 
 def _pins(present: Manifest | None, options: ImportOptions) -> frozenset[str]:
     """The CAs named by hand, else those of what is in force. Raises UnsafeKeystoreError without either."""
-    named = frozenset(one.replace(":", "").lower() for one in options.authorities)
+    named = fingerprints(options.authorities)
     if not named and present is None:
         raise UnsafeKeystoreError(
             "nothing is pinned on this host yet: give the fingerprints of both CAs with --require-ca; "
@@ -192,7 +182,7 @@ def _check_files(found: _Bundle) -> None:
 
 def _check_authorities(found: _Bundle, options: ImportOptions) -> None:
     """The trust files hold the CAs that the manifest names; with pins by hand, only those."""
-    named = frozenset(one.replace(":", "").lower() for one in options.authorities)
+    named = fingerprints(options.authorities)
     for role in Role:
         name = layout.ca_cert(role)
         present = tuple(fingerprint(ca.der) for ca in read_certificates(found.files[name], name))

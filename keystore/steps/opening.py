@@ -29,7 +29,6 @@ from keystore.signing.records import certificate_record, permissions_record
 
 if TYPE_CHECKING:
     from keystore.steps.options import ProvisionOptions
-    from keystore.steps.zenoh_configuration import ZenohOptions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,7 +44,7 @@ class ChangeOptions:
 
 @contextmanager
 def opened_for_change(
-    root: Path, now: datetime, options: ChangeOptions | ProvisionOptions | ZenohOptions
+    root: Path, now: datetime, options: ChangeOptions | ProvisionOptions
 ) -> Iterator[Store]:
     """As ``store.opened``; a complete keystore without a register gets one made from what stands in it."""
     with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:

@@ -87,9 +87,9 @@ def _zenoh(root: Path, options: ProvisionOptions) -> list[str]:
     """The router's rules follow from what was just changed."""
     if not os.path.lexists(f"{root}/{layout.ZENOH_ROUTER}"):
         return []
-    from keystore.steps.zenoh_configuration import follow, options_of
+    from keystore.steps.zenoh_configuration import follow
 
-    return follow(root, options_of(options))
+    return follow(root, options)
 
 
 def bring_about(

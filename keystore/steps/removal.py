@@ -27,7 +27,8 @@ from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
 from keystore.steps.crl import publish_crl, refuse_without_crl_sign, restore_crl, revocable, revoke
 from keystore.steps.opening import ChangeOptions, opened_for_change
-from keystore.steps.zenoh_configuration import ZenohOptions, follow
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.zenoh_configuration import follow
 
 # The key first, so that nothing usable remains; the certificate last, so that a repeated run can revoke it.
 _DELETE_ORDER = (
@@ -79,7 +80,7 @@ def remove(
                 _delete(opened, name)
         issuer = fingerprint(KeystoreView(root).ca(Role.IDENTITY).der)
         revoked = len(opened.register.revoked(issuer))
-    zenoh = ZenohOptions(
+    zenoh = ProvisionOptions(
         access=chosen.access, lock_timeout=chosen.lock_timeout, durable=chosen.durable, now=chosen.now
     )
     return RemoveReport(tuple(wanted), revoked, (*warnings, *follow(root, zenoh)))

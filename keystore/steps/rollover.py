@@ -43,7 +43,7 @@ from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about, keep
-from keystore.steps.zenoh_configuration import follow, options_of
+from keystore.steps.zenoh_configuration import follow
 
 
 class Step(str, Enum):
@@ -81,7 +81,7 @@ def roll_over(
         done = [_STEPS[step](opened, role, creation) for role in roles]
         refresh_copies(opened)
     if step is not Step.SWITCH:
-        warnings = tuple(follow(root, options_of(chosen)))
+        warnings = tuple(follow(root, chosen))
         return ProvisionReport(root, tuple(text for text in done if text), (), warnings)
     wanted = {name: WantedEnclave(keep) for name in KeystoreView(root).enclaves()}
     report = bring_about(root, wanted, with_domains(root, chosen))

@@ -11,11 +11,11 @@ knows the present rules, and one that does not is restarted.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
-from keystore.disk import layout, lock, safe_files
+from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import PRIVATE_MODE, PUBLIC_MODE, Store
 from keystore.disk.view import KeystoreView, keystore_at
@@ -43,17 +43,6 @@ from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
 
 
-class ZenohOptions(NamedTuple):
-    """``router``: where it is (``HOST:PORT``); None: as before, ``localhost:7447`` for the first time."""
-
-    router: str | None = None
-    access: CaAccess = CaAccess()
-    lock_timeout: float = lock.DEFAULT_TIMEOUT
-    durable: bool = True
-    renew_within: timedelta = timedelta(0)
-    now: datetime | None = None
-
-
 class ZenohReport(NamedTuple):
     """``written``: files that were not as they are now. ``gaps``: what Zenoh cannot grant, and who is shut out.
     ``restart``: a router that runs has to be started anew to know of it."""
@@ -67,19 +56,25 @@ class ZenohReport(NamedTuple):
 
 
 def write_zenoh(
-    keystore: Path | str, enclaves: Iterable[str], *, options: ZenohOptions | None = None
+    keystore: Path | str,
+    enclaves: Iterable[str],
+    *,
+    router: str | None = None,
+    options: ProvisionOptions | None = None,
 ) -> ZenohReport:
     """Session files for ``enclaves``; the router serves them and those that had one before. Idempotent.
+
+    ``router``: where it is (``HOST:PORT``); None: as before, ``localhost:7447`` for the first time.
 
     On a host without ``private/`` only session files are written: the router's are where certificates are issued.
     Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA key.
     """
-    chosen = options or ZenohOptions()
+    chosen = options or ProvisionOptions()
     view = keystore_at(keystore)
     asked = set(enclaves)
     view.require_enclaves(asked)
     names = sorted({*asked, *zenoh_enclaves(view)})
-    address = _address(view, chosen)
+    address = RouterAddress.parse(router) if router is not None else present_address(view) or RouterAddress()
     if (found := _as_wanted(view, names, address, chosen)) is not None:
         return ZenohReport(view.root, address, (), found.served, found.gaps, restart=False)
     now = chosen.now or utc_now()
@@ -96,15 +91,7 @@ def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> l
     return view.matching(patterns)
 
 
-def options_of(options: ProvisionOptions) -> ZenohOptions:
-    """The part of ``options`` that concerns Zenoh's files."""
-    return ZenohOptions(
-        access=options.access, lock_timeout=options.lock_timeout, durable=options.durable,
-        renew_within=options.renew_within, now=options.now,
-    )  # fmt: skip
-
-
-def follow(root: Path, options: ZenohOptions) -> list[str]:
+def follow(root: Path, options: ProvisionOptions) -> list[str]:
     """After a change of the keystore: what was done for Zenoh, in words; nothing without a router's file."""
     view = KeystoreView(root)
     if not has_router(view):
@@ -145,14 +132,8 @@ RESTART = (
 )
 
 
-def _address(view: KeystoreView, options: ZenohOptions) -> RouterAddress:
-    if options.router is not None:
-        return RouterAddress.parse(options.router)
-    return present_address(view) or RouterAddress()
-
-
 def _as_wanted(
-    view: KeystoreView, names: list[str], address: RouterAddress, options: ZenohOptions
+    view: KeystoreView, names: list[str], address: RouterAddress, options: ProvisionOptions
 ) -> RouterFile | None:
     """What the router serves, when nothing is to be written. Asked before each secured launch."""
     if _stale_sessions(view, names, address):
@@ -180,7 +161,7 @@ def _serves_no_router(view: KeystoreView) -> bool:
 
 
 def _write(
-    opened: Store, names: list[str], address: RouterAddress, options: ZenohOptions, now: datetime
+    opened: Store, names: list[str], address: RouterAddress, options: ProvisionOptions, now: datetime
 ) -> ZenohReport:
     view = KeystoreView(opened.root)
     files = _stale_sessions(view, names, address)

@@ -133,6 +133,11 @@ def access(arguments: argparse.Namespace) -> CaAccess:
     return CaAccess(passphrase=passphrase if passphrase.is_given else None, pin=pin if pin.is_given else None)
 
 
+def change(arguments: argparse.Namespace) -> dict[str, Any]:
+    """How the keystore is opened, from the arguments of ``add_change``: for the options of any change."""
+    return {"access": access(arguments), "lock_timeout": arguments.lock_timeout}
+
+
 @dataclass(frozen=True, slots=True)
 class Span:
     """``--valid-for`` and ``--backdate`` as the functions want them."""
@@ -166,10 +171,9 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
         backdate=validity.backdate,
         subjects=SubjectScheme.COMPATIBLE if arguments.compatible_subjects else None,
         allow_subject_overlap=arguments.allow_subject_overlap,
-        access=access(arguments),
-        lock_timeout=arguments.lock_timeout,
         revoke=not arguments.no_revoke,
         progress=ProgressBar("enclaves") if wanted(arguments.quiet) else None,
+        **change(arguments),
         **more,
     )
 

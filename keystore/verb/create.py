@@ -72,9 +72,8 @@ def run(arguments: argparse.Namespace) -> int:
         names={role: given[f"{role.value}_name"] for role in Role if given[f"{role.value}_name"]},
         imported=imported,
         encrypt_ca_keys=arguments.encrypt_ca_keys,
-        access=common.access(arguments),
-        lock_timeout=arguments.lock_timeout,
         now=now,
+        **common.change(arguments),
     )
     report = create_keystore(arguments.keystore, options)
     if not arguments.quiet:

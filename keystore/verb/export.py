@@ -70,8 +70,7 @@ def _export_hosts(arguments: argparse.Namespace) -> int:
     options = BundleOptions(
         accept_exposures=arguments.accept_exposures,
         accept_shared=arguments.accept_shared_enclaves,
-        access=common.access(arguments),
-        lock_timeout=arguments.lock_timeout,
+        **common.change(arguments),
     )
     made = export_hosts(arguments.keystore, arguments.output, _assigned(arguments), options=options)
     for one in made:

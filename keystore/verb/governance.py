@@ -26,7 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
     from keystore.steps.governance import GovernanceOptions, set_governance
 
     governance = load_governance_yaml(arguments.file)
-    options = GovernanceOptions(access=common.access(arguments), lock_timeout=arguments.lock_timeout)
+    options = GovernanceOptions(**common.change(arguments))
     changed = set_governance(arguments.keystore, governance, options=options)
     print(
         "governance signed; deploy it to all participants"

@@ -23,9 +23,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Remove the enclaves, and print what was revoked. Returns 0."""
     from keystore.steps.removal import RemoveOptions, remove
 
-    options = RemoveOptions(
-        revoke=not arguments.no_revoke, access=common.access(arguments), lock_timeout=arguments.lock_timeout
-    )
+    options = RemoveOptions(revoke=not arguments.no_revoke, **common.change(arguments))
     report = remove(arguments.keystore, arguments.enclaves, options=options)
     if not arguments.quiet:
         common.print_lines(f"removed {name}" for name in report.removed)

@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Make keys, print or write the requests for them. Returns 0."""
     from keystore.steps.host_keys import RequestOptions, request, requests_text
 
-    options = RequestOptions(arguments.token, common.access(arguments), arguments.lock_timeout)
+    options = RequestOptions(arguments.token, **common.change(arguments))
     made = request(arguments.keystore, arguments.enclaves, options=options)
     text = requests_text(made)
     if arguments.output is None:

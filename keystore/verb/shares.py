@@ -28,7 +28,7 @@ def run(arguments: argparse.Namespace) -> int:
     from keystore.steps.sharing import list_shares
 
     if arguments.drop is not None:
-        options = ProvisionOptions(access=common.access(arguments), lock_timeout=arguments.lock_timeout)
+        options = ProvisionOptions(**common.change(arguments))
         common.print_report(drop_shares(arguments.keystore, arguments.drop, options=options), arguments)
         return 0
     found = list_shares(arguments.keystore)

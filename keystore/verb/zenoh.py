@@ -32,13 +32,12 @@ def describe(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Write the files, and print which changed and how to use them. Returns 0."""
     from keystore.disk import layout
-    from keystore.steps.zenoh_configuration import RESTART, ZenohOptions, matching_enclaves, write_zenoh
+    from keystore.steps.options import ProvisionOptions
+    from keystore.steps.zenoh_configuration import RESTART, matching_enclaves, write_zenoh
 
     names = matching_enclaves(arguments.keystore, arguments.enclave)
-    options = ZenohOptions(
-        arguments.router, access=common.access(arguments), lock_timeout=arguments.lock_timeout
-    )
-    report = write_zenoh(arguments.keystore, names, options=options)
+    options = ProvisionOptions(**common.change(arguments))
+    report = write_zenoh(arguments.keystore, names, router=arguments.router, options=options)
     common.print_lines(f"{name} written" for name in report.written)
     if not report.written:
         print("everything is as it should be")

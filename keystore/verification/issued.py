@@ -19,7 +19,7 @@ from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import iso
-from keystore.signing.public_key import fingerprint
+from keystore.signing.public_key import fingerprint, fingerprints
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
@@ -47,7 +47,7 @@ def check_anchors(
             f"holds a CA that this keystore did not make, or has retired: {describe(ca)}; whoever has its key can make "
             "enclaves that Fast DDS lets in", repair.run(view.root, "renew", note="once it is known who put it there"),
         )  # fmt: skip
-    wanted = {one.replace(":", "").lower() for one in required}
+    wanted = fingerprints(required)
     for role in Role:
         bundle = view.ca_bundle(role)
         for ca in bundle:

@@ -15,13 +15,14 @@ from keystore.errors import InvalidInputError
 from keystore.formats.register import UNKNOWN
 from keystore.formats.validity import utc_now
 from keystore.formats.zenoh.configuration import RouterAddress
+from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
 from keystore.steps.rollover import Step
-from keystore.steps.zenoh_configuration import ZenohOptions, matching_enclaves, write_zenoh
+from keystore.steps.zenoh_configuration import matching_enclaves, write_zenoh
 from keystore.verb import main
 from tests.keystore.kit import filled, openssl, options, policy
 
-FAST = ZenohOptions(durable=False)
+FAST = ProvisionOptions(durable=False)
 
 
 @pytest.fixture
@@ -260,7 +261,7 @@ def test_a_certificate_that_ends_soon_is_issued_anew(keystore: Path) -> None:
 def test_on_a_host_only_the_files_of_processes_are_written(keystore: Path, tmp_path: Path) -> None:
     export(keystore, tmp_path / "host", ["/a"])
     assert not (tmp_path / "host/zenoh").exists()
-    report = write_zenoh(tmp_path / "host", ["/a"], options=FAST._replace(router="base.local:7000"))
+    report = write_zenoh(tmp_path / "host", ["/a"], router="base.local:7000", options=FAST)
     assert report.written == ("enclaves/a/zenoh.json5",)
     text = json.loads((tmp_path / "host/enclaves/a/zenoh.json5").read_text())
     assert text["connect"]["endpoints"] == ["tls/base.local:7000"]

@@ -13,7 +13,7 @@ from keystore import ProvisionOptions, apply_policy, create_keystore
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.steps.creation import CreateOptions
-from keystore.steps.zenoh_configuration import ZenohOptions, write_zenoh
+from keystore.steps.zenoh_configuration import write_zenoh
 from tests.zenoh import kit
 
 Grants = dict[str, dict[str, tuple[str, ...]]]
@@ -49,7 +49,7 @@ def keystore_of(root: Path, system: Grants) -> Path:
     domains = {path: OTHER_DOMAIN.get(path, Domains.single(0)) for path in system}
     options = ProvisionOptions(Domains(((0, 1),)), enclave_domains=domains, durable=False)
     apply_policy(root, policy_of(system), options=options)
-    write_zenoh(root, system, options=ZenohOptions(f"localhost:{kit.free_port()}", durable=False))
+    write_zenoh(root, system, router=f"localhost:{kit.free_port()}", options=ProvisionOptions(durable=False))
     return root
 
 
