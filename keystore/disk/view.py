@@ -68,6 +68,13 @@ class KeystoreView:
         except OSError as error:
             raise StorageError.of(error, "looking for a keystore at") from None
 
+    def refuse_foreign(self) -> None:
+        """Raises NotAKeystoreError for a directory with other things in it, in which no keystore can be made."""
+        if not self.is_complete and not self.can_be_completed:
+            raise NotAKeystoreError(
+                f"{printable(self.root)} exists and is not a keystore; choose an empty or new directory"
+            )
+
     def require_complete(self) -> None:
         if not self.root.is_dir():
             raise NotAKeystoreError(
@@ -85,11 +92,9 @@ class KeystoreView:
         from keystore.disk.settings import KeystoreSettings
 
         text = safe_files.read_if_there(self.root, layout.SETTINGS)
-        return (
-            KeystoreSettings.from_json(text, str(self.root / layout.SETTINGS))
-            if text is not None
-            else KeystoreSettings()
-        )
+        if text is None:
+            return KeystoreSettings()
+        return KeystoreSettings.from_json(text, str(self.root / layout.SETTINGS))
 
     def ca_bundle(self, role: Role) -> list[CertificateFacts]:
         """All certificates of a trust anchor file, the one in use first."""

@@ -8,15 +8,11 @@ from __future__ import annotations
 
 import base64
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
-
+from keystore.signing.authority import spki
 from keystore.signing.public_key import fingerprint
 from keystore.signing.signer import Signer
-
-if TYPE_CHECKING:
-    from cryptography.hazmat.primitives.asymmetric.types import PublicKeyTypes
 
 
 def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any]:
@@ -25,7 +21,7 @@ def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any
     Raises SigningUnavailableError as ``signer``.
     """
     signature = signer.sign(signed_bytes(payload, payload_type))
-    key = {"keyid": fingerprint(_spki(signer.public_key())), "sig": base64.b64encode(signature).decode()}
+    key = {"keyid": fingerprint(spki(signer.public_key())), "sig": base64.b64encode(signature).decode()}
     return {"payload": base64.b64encode(payload).decode(), "payloadType": payload_type, "signatures": [key]}
 
 
@@ -38,7 +34,3 @@ def signed_bytes(payload: bytes, payload_type: str) -> bytes:
 def envelope_text(content: dict[str, Any]) -> str:
     """An envelope as the JSON text that is written."""
     return json.dumps(content, indent=2) + "\n"
-
-
-def _spki(key: PublicKeyTypes) -> bytes:
-    return key.public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)

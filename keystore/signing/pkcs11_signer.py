@@ -115,9 +115,8 @@ def _pin(attributes: Mapping[str, str], pin: Secret | None) -> str | None:
 
 
 def _find(pkcs11: Any, attributes: Mapping[str, str], module: str, pin: str | None) -> tuple[Any, PublicKey]:
-    token = pkcs11.lib(module).get_token(
-        token_label=attributes.get("token"), token_serial=_serial(attributes)
-    )
+    serial = attributes.get("serial", "").encode() or None
+    token = pkcs11.lib(module).get_token(token_label=attributes.get("token"), token_serial=serial)
     session = _session(pkcs11, token, pin)
     wanted: dict[Any, Any] = {}
     if "object" in attributes:
@@ -137,11 +136,6 @@ def _session(pkcs11: Any, token: Any, pin: str | None) -> Any:
         return token.open()
 
 
-def _serial(attributes: Mapping[str, str]) -> bytes | None:
-    serial = attributes.get("serial")
-    return serial.encode() if serial else None
-
-
 def _single(session: Any, kind: Any, wanted: Mapping[Any, Any], pkcs11: Any) -> Any:
     found = list(session.get_objects({pkcs11.Attribute.CLASS: kind, **wanted}))
     if len(found) != 1:
@@ -155,8 +149,7 @@ def _public_key(pkcs11: Any, key: Any) -> PublicKey:
     if key.key_type == pkcs11.KeyType.RSA:
         from pkcs11.util.rsa import encode_rsa_public_key
 
-        numbers = encode_rsa_public_key(key)
-        loaded = load_der_public_key(numbers)
+        loaded = load_der_public_key(encode_rsa_public_key(key))
     else:
         from pkcs11.util.ec import encode_ec_public_key
 

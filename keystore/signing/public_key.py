@@ -25,6 +25,10 @@ _RSA_SHA384, _RSA_SHA512 = (
 )
 
 
+CYCLONE_KINDS = ("P-256", "RSA-2048")
+"""The keys that Cyclone DDS takes; Fast DDS takes any."""
+
+
 @lru_cache(maxsize=16)
 def _load(spki: bytes) -> PublicKeyTypes:
     from cryptography.hazmat.primitives.serialization import load_der_public_key

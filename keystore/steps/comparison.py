@@ -51,7 +51,12 @@ def compare(
     """
     view = KeystoreView(root)
     if not view.is_complete:
-        _refuse_unless_it_can_be_made(view, options)
+        if not options.create:
+            raise NotAKeystoreError(
+                f"{printable(view.root)} is not a complete keystore, and creating it was forbidden; "
+                "make it with: secure-keystore create"
+            )
+        view.refuse_foreign()
         return None
     if any(os.path.lexists(f"{root}/{name}") for name in (layout.INCOMING, layout.CRL_UNLINKED)):
         return None  # a run was interrupted: of changing a CA, or of giving the CRL to all
@@ -70,18 +75,6 @@ def compare(
     more = [state.reasons[0] for state in states if state.reasons]
     more += kept_shares(one.share for one in wanted.values() if one.share is not None)
     return ProvisionReport(root, (), tuple(as_found(state) for state in states), tuple(more), ends)
-
-
-def _refuse_unless_it_can_be_made(view: KeystoreView, options: ProvisionOptions) -> None:
-    if not options.create:
-        raise NotAKeystoreError(
-            f"{printable(view.root)} is not a complete keystore, and creating it was forbidden; "
-            "make it with: secure-keystore create"
-        )
-    if not view.can_be_completed:
-        raise NotAKeystoreError(
-            f"{printable(view.root)} exists and is not a keystore; choose an empty or new directory"
-        )
 
 
 def _first_end(view: KeystoreView, enclaves: Iterable[Validity | None]) -> datetime:

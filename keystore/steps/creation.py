@@ -19,7 +19,7 @@ from keystore.disk.safe_files import resolve_root
 from keystore.disk.settings import KeystoreSettings
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, InvalidInputError, NotAKeystoreError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.domains import Domains
 from keystore.formats.given_file import read_given
@@ -31,7 +31,7 @@ from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validi
 from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import Secret
-from keystore.signing.public_key import key_kind
+from keystore.signing.public_key import CYCLONE_KINDS, key_kind
 from keystore.signing.signer import Signer, open_signer
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
@@ -85,7 +85,7 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
     require("cryptography", "lxml")
     chosen = options or CreateOptions()
     root = resolve_root(keystore)
-    _refuse_foreign(root)
+    KeystoreView(root).refuse_foreign()
     refuse_unusable(chosen)
     store.create_root(root)
     now = chosen.now or utc_now()
@@ -109,18 +109,10 @@ def refuse_unusable(options: CreateOptions) -> None:
             _import_ca(role, options, given.key)
 
 
-def _refuse_foreign(root: Path) -> None:
-    view = KeystoreView(root)
-    if not view.is_complete and not view.can_be_completed:
-        raise NotAKeystoreError(
-            f"{printable(root)} exists and is not a keystore; choose an empty or new directory"
-        )
-
-
 def complete(opened: Store, options: CreateOptions) -> CreateReport:
     """What ``create_keystore`` does once it holds the lock."""
-    _refuse_foreign(opened.root)
     view = KeystoreView(opened.root)
+    view.refuse_foreign()
     actions: list[str] = []
     warnings: list[str] = []
     install_incoming(opened)
@@ -169,7 +161,7 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
         verb, warnings = "created", []
     put_incoming(opened, role, made.pem(), key)
     install_incoming(opened)
-    if (kind := key_kind(made.facts.public_key)) not in ("P-256", "RSA-2048"):
+    if (kind := key_kind(made.facts.public_key)) not in CYCLONE_KINDS:
         warnings.append(
             f"the {role.label} key is {kind}: Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
         )

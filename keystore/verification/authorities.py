@@ -19,14 +19,12 @@ from keystore.formats.validity import iso
 from keystore.signing import smime
 from keystore.signing.authority import check_can_serve
 from keystore.signing.ca_access import CaAccess
-from keystore.signing.public_key import issued_by, key_kind
+from keystore.signing.public_key import CYCLONE_KINDS, issued_by, key_kind
 from keystore.verification import repair
 from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_strength
 from keystore.verification.issued import check_governance_issued
-
-CYCLONE_KINDS = ("P-256", "RSA-2048")
 
 
 def check_authorities(

@@ -39,10 +39,9 @@ from keystore.formats.subject import (
 from keystore.formats.validity import LATEST, Validity, iso, parse_moment
 from keystore.signing import smime
 from keystore.signing.authority import spki
-from keystore.signing.public_key import issued_by, key_kind, key_matches, signature_is_valid
+from keystore.signing.public_key import CYCLONE_KINDS, issued_by, key_kind, key_matches, signature_is_valid
 from keystore.signing.signer import FileSigner, load_private_key
 from keystore.verification import repair
-from keystore.verification.authorities import CYCLONE_KINDS
 from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_domains

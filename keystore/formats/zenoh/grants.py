@@ -14,7 +14,7 @@ from typing import NamedTuple
 from keystore.formats.permissions import TopicSets, dds_rules
 from keystore.formats.permissions_names import DISCOVERY_TOPIC
 from keystore.formats.permissions_patterns import can_meet
-from keystore.formats.policy import EnclavePolicy
+from keystore.formats.policy import EnclavePolicy, Operation
 from keystore.formats.zenoh.key_expressions import NotExpressible, name_expressions
 
 
@@ -29,6 +29,13 @@ class Use(str, Enum):
     SERVE = "serve"
 
 
+PLAIN_USES = {
+    Operation.PUBLISH: Use.PUBLISH,
+    Operation.SUBSCRIBE: Use.SUBSCRIBE,
+    Operation.REQUEST: Use.CALL,
+    Operation.REPLY: Use.SERVE,
+}
+"""Of what is not an action."""
 Types = Mapping[tuple[Use, str], tuple[str, ...]]
 """Use and absolute name -> the type chunks it has; a name that is missing may have any type."""
 

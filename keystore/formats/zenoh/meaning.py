@@ -10,19 +10,14 @@ import re
 from typing import NamedTuple
 
 from keystore.formats.policy import Operation
-from keystore.formats.zenoh.grants import Use
+from keystore.formats.zenoh.grants import PLAIN_USES, Use
 from keystore.formats.zenoh.rules import GRAPH_KINDS
 
 _TYPE = re.compile(r"([A-Za-z][A-Za-z0-9_]*)::(msg|srv|action)::dds_::([A-Za-z][A-Za-z0-9_]*)_\Z")
 _DOMAIN = re.compile(r"(?:[0-9]{1,10}|\*{1,2})\Z")
 _ACTION_SERVICE = re.compile(r"(/.+)/_action/(?:send_goal|get_result|cancel_goal)\Z")
 _ACTION_TOPIC = re.compile(r"(/.+)/_action/(?:feedback|status)\Z")
-_OPERATIONS = {
-    Use.PUBLISH: Operation.PUBLISH,
-    Use.SUBSCRIBE: Operation.SUBSCRIBE,
-    Use.CALL: Operation.REQUEST,
-    Use.SERVE: Operation.REPLY,
-}
+_OPERATIONS = {use: operation for operation, use in PLAIN_USES.items()}
 _USES = {
     ("ingress", "put"): Use.PUBLISH,
     ("ingress", "delete"): Use.PUBLISH,

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Iterator
 from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation
 from keystore.formats.shares import Share
-from keystore.formats.zenoh.grants import Types, Use, grants_of_policy
+from keystore.formats.zenoh.grants import PLAIN_USES, Types, Use, grants_of_policy
 from keystore.formats.zenoh.key_expressions import type_chunk
 
 
@@ -24,7 +24,7 @@ def types_of_interface(
     """
     if operation not in (Operation.CALL, Operation.EXECUTE):
         part = "msg" if operation in (Operation.PUBLISH, Operation.SUBSCRIBE) else "srv"
-        yield _PLAIN[operation], name, type_chunk(ros_type) if f"/{part}/" in ros_type else None
+        yield PLAIN_USES[operation], name, type_chunk(ros_type) if f"/{part}/" in ros_type else None
         return
     service, topic = (Use.CALL, Use.SUBSCRIBE) if operation is Operation.CALL else (Use.SERVE, Use.PUBLISH)
     own = type_chunk(ros_type) if "/action/" in ros_type else None
@@ -33,14 +33,6 @@ def types_of_interface(
     yield service, f"{name}/_action/cancel_goal", type_chunk("action_msgs/srv/CancelGoal")
     yield topic, f"{name}/_action/feedback", own and own[:-1] + "_FeedbackMessage_"
     yield topic, f"{name}/_action/status", type_chunk("action_msgs/msg/GoalStatusArray")
-
-
-_PLAIN = {
-    Operation.PUBLISH: Use.PUBLISH,
-    Operation.SUBSCRIBE: Use.SUBSCRIBE,
-    Operation.REQUEST: Use.CALL,
-    Operation.REPLY: Use.SERVE,
-}
 
 
 def united_types(known: Iterable[tuple[Use, str, str | None]]) -> Types:
