@@ -41,6 +41,7 @@ REQUESTS = "private/requests"
 """Of enclaves whose keys were made on their hosts: the certificate requests, in the place of the keys."""
 BUNDLES = "private/bundles"
 """The manifest that was signed last for each host."""
+PRIVATE_FOLDERS = (INCOMING, NEXT, RETIRED, SHARES, BUNDLES, REQUESTS)
 CRL_UNLINKED = "private/crl-unlinked"
 """There while a published CRL is given to the enclaves: an interrupted run left some without."""
 

@@ -136,15 +136,7 @@ def refuse_unsafe_private(root: Path, relative: str) -> None:
 
 def refuse_unsafe_private_directories(root: Path) -> None:
     """What waits in ``private/`` is installed as a CA, what is retired there is trusted: nobody else may add to it."""
-    for relative in (
-        layout.PRIVATE,
-        layout.INCOMING,
-        layout.NEXT,
-        layout.RETIRED,
-        layout.SHARES,
-        layout.BUNDLES,
-        layout.REQUESTS,
-    ):
+    for relative in (layout.PRIVATE, *layout.PRIVATE_FOLDERS):
         path = root / relative
         if not os.path.lexists(path):
             continue

@@ -89,7 +89,8 @@ def import_bundle(
             return ImportReport(
                 versions.root, present, (), (), Restart.NOBODY, ("this bundle is in force already",)
             )
-        _refuse_earlier(found, present, versions.current)
+        if present is not None:
+            _refuse_earlier(found, present)
         return _put_in_force(versions, found, present, chosen.now or utc_now())
 
 
@@ -192,9 +193,7 @@ def _check_authorities(found: _Bundle, options: ImportOptions) -> None:
             raise UnsafeKeystoreError(f"{found.place}: {name} trusts a CA that is not pinned: {what}")
 
 
-def _refuse_earlier(found: _Bundle, present: Manifest | None, version: Path | None) -> None:
-    if present is None or version is None:
-        return
+def _refuse_earlier(found: _Bundle, present: Manifest) -> None:
     if found.manifest.number <= present.number:
         raise UnsafeKeystoreError(
             f"{found.place} is number {found.manifest.number}, but {present.number} is in force here: an earlier "

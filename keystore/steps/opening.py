@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.crl_file import crl_number, revoked_serials
-from keystore.disk.register_file import needs_register, superseded
+from keystore.disk.register_file import needs_register
 from keystore.disk.signed_documents import trusted_document
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
@@ -20,9 +21,11 @@ from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats import certificate
 from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.der import DerError
+from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import UNKNOWN, AuthorityState, IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
 from keystore.formats.subject import common_name
+from keystore.formats.validity import parse_moment
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
@@ -117,12 +120,26 @@ def _certificates_in(view: KeystoreView, directory: str, prefix: str) -> Iterato
 
 
 def _replaced(view: KeystoreView, now: datetime) -> Iterator[IssuedCertificate]:
+    """What an earlier version remembered of certificates that were replaced and had not ended: whoever copied one, with
+    its key, can still use it, so that removing its enclave has to revoke it. Raises DamagedKeystoreError."""
+    if safe_files.read_if_there(view.root, layout.SUPERSEDED) is None:
+        return
+    text = safe_files.read_private(view.root, layout.SUPERSEDED)
     issuer = fingerprint(view.ca(Role.IDENTITY).der)
-    for one in superseded(view):
-        subject = common_name(one.enclave)
-        yield IssuedCertificate(
-            one.serial, one.enclave, subject, UNKNOWN, issuer, now, one.not_after, replaced=True
-        )
+    try:
+        content: Any = json.loads(text)
+        if content["version"] != 1:
+            raise KeyError("version")
+        for entry in content["certificates"]:
+            enclave, serial = validate_enclave_name(entry["enclave"]), int(entry["serial"], 16)
+            end = parse_moment(entry["not_after"])
+            yield IssuedCertificate(
+                serial, enclave, common_name(enclave), UNKNOWN, issuer, now, end, replaced=True
+            )
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
+        raise DamagedKeystoreError(
+            f"{printable(view.root / layout.SUPERSEDED)} is not a list of replaced certificates; restore it"
+        ) from None
 
 
 def _issued(view: KeystoreView) -> Iterator[IssuedCertificate]:
