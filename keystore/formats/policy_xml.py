@@ -75,7 +75,7 @@ def parse_policy(document: bytes, where: str = "policy.xml", folder: Path | None
     """As ``read_policy``, from bytes; includes are followed only with a ``folder`` and below it."""
     root = parse_xml(document, where)
     file = where if folder is None else str(Path(where).resolve())
-    return _PolicyReader(folder).read(Written(root, file))
+    return _PolicyReader(folder).read(PolicyElement(root, file))
 
 
 class _PolicyReader:
@@ -87,7 +87,7 @@ class _PolicyReader:
         self._warnings: list[str] = []
         self._notes: list[str] = []
 
-    def read(self, root: Written) -> PolicyDocument:
+    def read(self, root: PolicyElement) -> PolicyDocument:
         self._expect(root, "policy", required=("version",))
         if (version := root.element.get("version", "")) != VERSION:
             raise PolicyError(
@@ -101,7 +101,7 @@ class _PolicyReader:
             self._enclave(enclave)
         return self._result()
 
-    def _enclave(self, enclave: Written) -> None:
+    def _enclave(self, enclave: PolicyElement) -> None:
         self._expect(enclave, "enclave", required=("path",))
         path = enclave.element.get("path", "")
         try:
@@ -115,7 +115,7 @@ class _PolicyReader:
             self._expect(child, "profiles", optional=("type",))
             self._profiles(path, child, profiles)
 
-    def _profiles(self, path: str, group: Written, profiles: Profiles) -> None:
+    def _profiles(self, path: str, group: PolicyElement, profiles: Profiles) -> None:
         found = 0
         for child in self._reader.children(group):
             if child.element.tag == "metadata" and found:
@@ -127,7 +127,7 @@ class _PolicyReader:
         if not found:
             raise PolicyError(f"{group.where}: <profiles> needs at least one <profile>")
 
-    def _profile(self, path: str, profile: Profile, written: Written, rules: Rules) -> None:
+    def _profile(self, path: str, profile: Profile, written: PolicyElement, rules: Rules) -> None:
         self._check_name("~/x", profile, written.where)  # looks at ns and node
         for group in self._reader.children(written):
             tag = str(group.element.tag)
@@ -140,7 +140,9 @@ class _PolicyReader:
                 self._expect(expression, entry)
                 self._rules(path, profile, expression, qualifiers, rules)
 
-    def _qualifiers(self, group: Written, operations: Iterable[Operation]) -> dict[Operation, Qualifier]:
+    def _qualifiers(
+        self, group: PolicyElement, operations: Iterable[Operation]
+    ) -> dict[Operation, Qualifier]:
         found: dict[Operation, Qualifier] = {}
         for operation in operations:
             value = group.element.get(operation.value)
@@ -160,7 +162,7 @@ class _PolicyReader:
         self,
         path: str,
         profile: Profile,
-        written: Written,
+        written: PolicyElement,
         granted: Mapping[Operation, Qualifier],
         rules: Rules,
     ) -> None:
@@ -182,14 +184,14 @@ class _PolicyReader:
         except PolicyError as error:
             raise PolicyError(f"{where}: {error}") from None
 
-    def _some_children(self, parent: Written, tag: str) -> list[Written]:
+    def _some_children(self, parent: PolicyElement, tag: str) -> list[PolicyElement]:
         children = list(self._reader.children(parent))
         if not children:
             raise PolicyError(f"{parent.where}: <{parent.element.tag}> needs at least one <{tag}>")
         return children
 
     def _expect(
-        self, written: Written, tag: str, required: tuple[str, ...] = (), optional: tuple[str, ...] = ()
+        self, written: PolicyElement, tag: str, required: tuple[str, ...] = (), optional: tuple[str, ...] = ()
     ) -> None:
         present = written.element.attrib
         if written.element.tag != tag:
@@ -259,7 +261,7 @@ _XML_BASE = "{http://www.w3.org/XML/1998/namespace}base"
 
 
 @dataclass(frozen=True, slots=True)
-class Written:
+class PolicyElement:
     """An element, the file it is written in, and the files whose includes led there, outermost first."""
 
     element: etree._Element
@@ -281,21 +283,21 @@ class IncludingReader:
         self._bytes = 0
         self._followed = 0
 
-    def children(self, parent: Written) -> Iterator[Written]:
+    def children(self, parent: PolicyElement) -> Iterator[PolicyElement]:
         """Each child element. Raises ``PolicyError`` for an unsafe include."""
         return self._found(parent.element, parent.file, parent.chain)
 
     def _found(
         self, elements: Iterable[etree._Element], file: str, chain: tuple[str, ...]
-    ) -> Iterator[Written]:
+    ) -> Iterator[PolicyElement]:
         for element in elements:
             if element.tag in _INCLUDE_TAGS:
-                yield from self._included(Written(element, file, chain))
+                yield from self._included(PolicyElement(element, file, chain))
             else:
                 element.attrib.pop(_XML_BASE, "")
-                yield Written(element, file, chain)
+                yield PolicyElement(element, file, chain)
 
-    def _included(self, include: Written) -> Iterator[Written]:
+    def _included(self, include: PolicyElement) -> Iterator[PolicyElement]:
         where = include.where
         path = self._path(include)
         self._followed += 1
@@ -307,7 +309,7 @@ class IncludingReader:
         found = _pointed(self._root(path, where), include.element, where)
         yield from self._found(found, str(path), chain)
 
-    def _path(self, include: Written) -> Path:
+    def _path(self, include: PolicyElement) -> Path:
         where, href = include.where, include.element.get("href", "")
         if include.element.get("parse", "xml") != "xml":
             raise PolicyError(f'{where}: an include may only read XML (parse="xml")')

@@ -15,7 +15,6 @@ import re
 import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
-from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
@@ -71,7 +70,6 @@ class RequestOptions:
     token: str | None = None
     access: CaAccess = field(default_factory=CaAccess)
     lock_timeout: float = lock.DEFAULT_TIMEOUT
-    now: datetime | None = None
 
 
 def request(
