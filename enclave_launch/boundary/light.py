@@ -68,6 +68,9 @@ else:
             found = vars(self)[name] = getattr(re.compile(*vars(self)["_given"]), name)
             return found
 
+        def __reduce__(self):  # for copies
+            return re.compile, self._given
+
     _FEW = 20  # instances that are made sooner than a constructor is compiled
     _Field = type(namedtuple("_One", "field").field)
 

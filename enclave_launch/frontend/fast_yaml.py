@@ -14,13 +14,14 @@ import io
 import marshal
 import re
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Container, Iterator
+from contextlib import ExitStack, contextmanager, suppress
 from functools import lru_cache
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 
 from enclave_launch.boundary.light import Any, late_pattern
+from enclave_launch.boundary.plain_yaml import TUPLE_TAG, block_text
 
 _NAMES = ("load", "dump", "safe_load", "safe_dump")
 _LOADERS = {
@@ -29,19 +30,25 @@ _LOADERS = {
     "Loader": "CLoader",
     "UnsafeLoader": "CUnsafeLoader",
 }
-_DUMPERS = {"Dumper": "CDumper", "SafeDumper": "CSafeDumper"}
-_LEARNT = (  # class attributes that change when somebody teaches a loader or dumper something
-    *("yaml_constructors", "yaml_multi_constructors", "yaml_implicit_resolvers", "yaml_path_resolvers"),
-    *("yaml_representers", "yaml_multi_representers"),
+_TUPLE_TAGS = {"Dumper": TUPLE_TAG, "SafeDumper": ""}
+_TABLES = ("yaml_constructors", "yaml_multi_constructors", "yaml_representers", "yaml_multi_representers")
+_TYPED_BY_FIRST_CHARACTER = {
+    "bool": "yYnNtTfFoO",
+    "float": "-+0123456789.",
+    "int": "-+0123456789",
+    "merge": "<",
+    "null": ("~", "n", "N", ""),
+    "timestamp": "0123456789",
+    "value": "=",
+    "yaml": "!&*",
+}
+_PATTERNS = sorted(
+    (first, f"tag:yaml.org,2002:{kind}")
+    for kind, firsts in _TYPED_BY_FIRST_CHARACTER.items()
+    for first in firsts
 )
 _MAX_KEPT = 2**20  # characters of a text that is kept with its values
-
-# Text that both emitters write alike, folded lines included: printable ASCII without line breaks.
-_is_simple_text = re.compile(r"[ -~]{0,1000}").fullmatch
-_is_simple_key = re.compile(r"[ -~]{1,100}").fullmatch  # a key of 128 characters has a form of its own
-_SCALARS = {bool, int, float, type(None)}
-_MAX_DEPTH = 10
-_OPTIONS = {bool, type(None)}  # types of what is said of the style
+_OPTIONS = {"default_flow_style", "sort_keys"}
 
 
 @contextmanager
@@ -75,7 +82,7 @@ class _OnImport:
             run = spec.loader.exec_module
 
             def exec_module(module: ModuleType) -> None:
-                with _large_pattern_compiled_when_used():
+                with _patterns_compiled_when_used():
                     run(module)
                 self._stack.enter_context(accelerated(module))
 
@@ -88,14 +95,14 @@ class _OnImport:
 
 
 @contextmanager
-def _large_pattern_compiled_when_used() -> Iterator[None]:
-    """The pattern of what may not stand in YAML names nearly all characters there are: to compile it takes a third of
-    PyYAML's import, and only the scanner in Python searches with it (``bench/resolve.py``)."""
+def _patterns_compiled_when_used() -> Iterator[None]:
+    """PyYAML's patterns take half of its import to compile. One names nearly all characters there are, for the scanner
+    in Python alone; by the others scalars are typed, most of which need none (``bench/resolve.py``)."""
     compile_now = re.compile
 
     def compile_later(pattern: Any, flags: Any = 0) -> Any:
-        large = isinstance(pattern, str) and pattern[-2:-1] == chr(sys.maxunicode)
-        return late_pattern(pattern) if large else compile_now(pattern, flags)
+        of_pyyaml = sys._getframe(1).f_globals.get("__name__", "").startswith("yaml.")
+        return late_pattern(pattern, flags) if of_pyyaml else compile_now(pattern, flags)
 
     re.compile = compile_later
     try:
@@ -129,14 +136,22 @@ class _Fast:
         self._yaml = yaml
         self._original = original
 
-    def _fast(self, slow: Any, names: dict[str, str]) -> Any:
-        """libyaml's class for ``slow``, if that is one of PyYAML's own and nobody taught it anything."""
-        name = names.get(getattr(slow, "__name__", ""))
-        if name is None or getattr(self._yaml, slow.__name__, None) is not slow:
-            return None
-        fast = getattr(self._yaml, name)
-        same = all(getattr(slow, part, None) is getattr(fast, part, None) for part in _LEARNT)
-        return fast if same else None
+    def _as_shipped(self, name: str, known: Container[str], given: Any) -> bool:
+        """Whether ``given`` is PyYAML's own class ``name`` and nobody taught it anything."""
+        return name in known and getattr(self._yaml, name, None) is given and _is_untaught(given)
+
+
+def _is_untaught(own: Any) -> bool:
+    """Whether all that a loader or dumper of PyYAML's does is written in PyYAML."""
+    functions = [value for base in own.__mro__[:-1] for value in vars(base).values() if callable(value)]
+    for table in _TABLES:
+        functions += getattr(own, table, {}).values()
+    patterns = [(str(first), tag) for first, found in own.yaml_implicit_resolvers.items() for tag, _ in found]
+    return (
+        all(getattr(function, "__module__", "").startswith("yaml.") for function in functions)
+        and sorted(patterns) == _PATTERNS
+        and not own.yaml_path_resolvers
+    )
 
 
 class _Load(_Fast):
@@ -145,13 +160,13 @@ class _Load(_Fast):
     def __call__(self, stream: Any, Loader: Any = None) -> Any:
         if Loader is None:  # PyYAML 5 warns and goes on, PyYAML 6 refuses
             return self._original(stream)
-        fast = self._fast(Loader, _LOADERS)
-        if fast is None:
+        name = getattr(Loader, "__name__", "")
+        if not self._as_shipped(name, _LOADERS, Loader):
             return self._original(stream, Loader)
         text = stream if isinstance(stream, str) else _text_of(stream)
         if text is None:
             return self._original(stream, Loader)
-        found = _read(text, fast)
+        found = _read(text, getattr(self._yaml, _LOADERS[name]))
         if found is not None:
             return marshal.loads(found)
         return self._original(stream if isinstance(stream, str) else _Again(text, stream), Loader)
@@ -178,17 +193,20 @@ def _read(text: str, loader: Any) -> bytes | None:
     """The values of ``text``, packed, so that each reader gets its own; ``None`` where PyYAML must read it."""
     from enclave_launch.boundary.yaml_nodes import refuse_deep_nesting
     from enclave_launch.frontend.yaml_tree import libyaml_reads_alike
+    from enclave_launch.frontend.yaml_values import values_of
 
     if len(text) > _MAX_KEPT or not libyaml_reads_alike(text):
         return None
     try:
         refuse_deep_nesting(text)
-        return marshal.dumps(_values(text, loader))
+        with suppress(Exception):  # what only nodes give
+            return marshal.dumps(values_of(text, loader))
+        return marshal.dumps(_values_of_nodes(text, loader))
     except Exception:  # dates cannot be packed; other errors PyYAML meets again and words itself
         return None
 
 
-def _values(text: str, loader: Any) -> Any:
+def _values_of_nodes(text: str, loader: Any) -> Any:
     reader = loader(text)
     try:
         return reader.get_single_data()
@@ -201,54 +219,14 @@ class _Dump(_Fast):
 
     def __call__(self, data: Any, stream: Any = None, Dumper: Any = None, **given: Any) -> Any:
         slow = Dumper or self._yaml.Dumper
-        fast = self._fast(slow, _DUMPERS)
-        whole = type(data) in (dict, list) and _is_simple(data, 0, set())
-        if fast is None or not whole or not _plain_options(given):
+        name = getattr(slow, "__name__", "")
+        text = None
+        if _is_default(given) and self._as_shipped(name, _TUPLE_TAGS, slow):
+            text = block_text(data, sort_keys=given.get("sort_keys", True), tuple_tag=_TUPLE_TAGS[name])
+        if text is None:
             return self._original(data, stream, slow, **given)
-        text = _written(marshal.dumps(data, 2), self._original, fast, tuple(given.items()))
         return text if stream is None else (stream.write(text), None)[1]
 
 
-@lru_cache(maxsize=64)
-def _written(
-    packed: bytes, write: Callable[..., str], dumper: Any, given: tuple[tuple[str, Any], ...]
-) -> str:
-    """The text of packed values; equal values are written once."""
-    text = write(marshal.loads(packed), None, dumper, **dict(given))
-    if len(_texts_written) == 64:
-        _texts_written.clear()
-    _texts_written.add(text)
-    return text
-
-
-_texts_written: set[str] = set()
-
-
-def was_written(text: str) -> bool:
-    """Whether ``text`` is just what ``yaml.dump`` wrote here, and therefore well-formed."""
-    return text in _texts_written
-
-
-def _plain_options(given: dict[str, Any]) -> bool:
-    known = given.keys() <= {"default_flow_style", "sort_keys"}
-    return known and not given.get("default_flow_style", False) and {*map(type, given.values())} <= _OPTIONS
-
-
-def _is_simple(value: Any, depth: int, inside: set[int]) -> bool:
-    """A list or dict of plain values that both emitters write alike, nowhere shared and not too deep."""
-    if depth > _MAX_DEPTH or id(value) in inside:
-        return False
-    inside.add(id(value))
-    if type(value) is dict:
-        for key in value:
-            if type(key) is not str or not _is_simple_key(key):
-                return False
-        value = value.values()
-    for item in value:
-        kind = type(item)
-        if kind is str:
-            if not _is_simple_text(item):
-                return False
-        elif kind not in _SCALARS and not (kind in (list, dict) and _is_simple(item, depth + 1, inside)):
-            return False
-    return True
+def _is_default(given: dict[str, Any]) -> bool:
+    return given.keys() <= _OPTIONS and given.get("default_flow_style", False) is False

@@ -9,31 +9,41 @@ from __future__ import annotations
 from functools import lru_cache
 
 from enclave_launch.boundary.light import Any, late_pattern
+from enclave_launch.boundary.plain_yaml import decimal
 
 # PyYAML types a plain scalar by its first character; one of these can only become text, a bool or null.
 # Printable ASCII without ': ' and ' #' has no other meaning in YAML once the first character is harmless.
 _WORD = late_pattern(r"[A-Za-z_/$](?:[!-~ ]*[!-~])?")
-_INT = late_pattern(r"[-+]?(?:0|[1-9][0-9]{0,17})")
-_FLOAT = late_pattern(r"[-+]?[0-9]{1,17}\.[0-9]{0,17}")
+_BEGIN_OTHER_TYPES = frozenset("+-.0123456789<=")
 _NOT_TEXT: dict[str, bool | None] = {
     **{word: True for text in ("yes", "true", "on") for word in (text, text.title(), text.upper())},
     **{word: False for text in ("no", "false", "off") for word in (text, text.title(), text.upper())},
-    **dict.fromkeys(("null", "Null", "NULL")),
+    **dict.fromkeys(("null", "Null", "NULL", "~", "")),
 }
+UNDECIDED = object()
 
 
 def load(text: str) -> Any:
     """``yaml.safe_load(text)``; raises ``yaml.YAMLError`` or ``ValueError`` as it does."""
-    if _WORD.fullmatch(text):
-        if text in _NOT_TEXT:
-            return _NOT_TEXT[text]
-        if ": " not in text and " #" not in text and text[-1] != ":":
-            return text
-    elif _INT.fullmatch(text):
-        return int(text)
-    elif _FLOAT.fullmatch(text):
-        return float(text)
-    return _load_with_yaml(text)
+    if not _WORD.fullmatch(text):
+        value = _number(text)
+    elif ": " in text or " #" in text or text[-1] == ":":
+        value = UNDECIDED
+    else:
+        value = plain(text)
+    return _load_with_yaml(text) if value is UNDECIDED else value
+
+
+def plain(text: str) -> Any:
+    """The value of a plain scalar by YAML 1.1; ``UNDECIDED`` where PyYAML's patterns must be asked."""
+    if text in _NOT_TEXT:
+        return _NOT_TEXT[text]
+    return _number(text) if text[0] in _BEGIN_OTHER_TYPES else text
+
+
+def _number(text: str) -> Any:
+    number = decimal(text)
+    return UNDECIDED if number is None else number
 
 
 _MAX_KEPT = 10_000  # characters of a text whose value is remembered

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Generator
+from contextlib import suppress
 
 import yaml
 
@@ -20,12 +21,13 @@ from enclave_launch.boundary.yaml_nodes import (
     refuse_deep_nesting,
     refuse_many_aliases,
 )
+from enclave_launch.frontend.yaml_values import values_of
 
 MAX_CHARACTERS = 8_000_000  # libyaml and PyYAML together take some ten seconds for each million
 MAX_SLOW_CHARACTERS = 500_000  # of a text that only PyYAML's own scanner can read, at a third of that speed
 
 # Where libyaml reads otherwise, found by fuzzing: trailing tab, lone tag, "?" in flow context, mark inside.
-_LIBYAML_DIFFERS = late_pattern(r"[\t!?\ufeff]")
+_LIBYAML_DIFFERS = ("\t", "!", "?", "\ufeff")
 # Surely no part of a text whose quotes end in the same line.
 _COMMENT = late_pattern(r"(?<!\S)#[^'\"\n\r\x85\u2028\u2029]*$", re.MULTILINE)
 
@@ -57,9 +59,22 @@ def parse_yaml(text: str) -> YamlDocument:
     return _load(text, yaml.SafeLoader)
 
 
+def values_of_yaml(text: str) -> Any:
+    """As ``parse_yaml``, the values alone."""
+    if len(text) <= MAX_SLOW_CHARACTERS and libyaml_reads_alike(text):
+        refuse_deep_nesting(text)
+        with suppress(Exception):  # what only nodes give, and errors
+            return values_of(text, SafeLoader)
+    return parse_yaml(text).root
+
+
 def libyaml_reads_alike(text: str) -> bool:
     """Whether libyaml, where it accepts ``text``, reads the same as PyYAML's own scanner."""
-    return not (_LIBYAML_DIFFERS.search(text) and _LIBYAML_DIFFERS.search(_COMMENT.sub("", text)))
+    return not _may_differ(text) or not _may_differ(_COMMENT.sub("", text))
+
+
+def _may_differ(text: str) -> bool:
+    return any(mark in text for mark in _LIBYAML_DIFFERS)
 
 
 def _load(text: str, base: Any) -> YamlDocument:

@@ -1,4 +1,4 @@
-"""Parameter files and values of ``-p`` as rcl reads them: libyaml's events in, sections of parameters out. Pure.
+"""Parameter files and values of ``-p`` as rcl reads them: what libyaml finds in, sections of parameters out. Pure.
 
 rcl takes less than YAML has, and in places something else: several documents are one file; aliases are refused, so are
 a value before ``ros__parameters``, a parameter without a value, a list of two types. No node starts that is given what
@@ -7,12 +7,14 @@ rcl refuses. Rules of ros2/rcl ``rcl_yaml_param_parser`` (``parse.c``, ``namespa
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from functools import lru_cache
 
 import yaml
 
+from enclave_launch.boundary.light import Any
+from enclave_launch.boundary.plain_yaml import QUOTES, known_parts
 from enclave_launch.boundary.yaml_nodes import EventParser, refuse_deep_nesting
 from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
 
@@ -20,8 +22,15 @@ Section = Mapping[str, ParameterValue]
 
 _PARAMETERS_KEY = "ros__parameters"  # a key that begins so counts, too
 _TEXT_TAG = "tag:yaml.org,2002:str"
-_NAMESPACE_TOKEN = re.compile(r"\*{1,2}|[A-Za-z_][A-Za-z0-9_]{0,243}")
-_NODE_NAME = re.compile(r"\*{1,2}|[A-Za-z_][A-Za-z0-9_]{0,254}")
+_KINDS = {
+    yaml.ScalarEvent: "scalar",
+    yaml.MappingStartEvent: "{",
+    yaml.MappingEndEvent: "}",
+    yaml.SequenceStartEvent: "[",
+    yaml.SequenceEndEvent: "]",
+    yaml.AliasEvent: "*",
+}
+_LONGEST_TOKEN, _LONGEST_NODE_NAME = 244, 255
 
 
 class RefusedParameters(ValueError):
@@ -34,10 +43,17 @@ def sections_of_text(text: str) -> Mapping[str, Section]:
 
     Raises ``RefusedParameters``, and ``yaml.YAMLError`` for what is not YAML.
     """
-    refuse_deep_nesting(text)
+    known = known_parts(text)
+    if known is not None:
+        with suppress(RefusedParameters):  # which is said with its line
+            return _sections(known)
+    return _sections(parts_of(text))
+
+
+def _sections(parts: Iterable[tuple[Any, ...]]) -> Mapping[str, Section]:
     reader = _FileReader()
-    for event in yaml.parse(text, Loader=EventParser):
-        reader.take(event)
+    for part in parts:
+        reader.take(*part)
     return reader.sections()
 
 
@@ -46,11 +62,24 @@ def value_of_text(text: str) -> ParameterValue | None:
     if not text:
         raise RefusedParameters("the value is missing")
     values, reader = _Values(), _ValueReader()
-    for event in yaml.parse(text, Loader=EventParser):
-        if isinstance(event, (yaml.AliasEvent, yaml.MappingStartEvent)):
+    for kind, text_of_scalar, style, line in parts_of(text):
+        if kind in ("{", "*"):
             raise RefusedParameters("it must be a value or a list, not a mapping or an alias")
-        reader.take(event, values)
+        reader.take(values, kind, text_of_scalar, style, line)
     return values.first
+
+
+def parts_of(text: str) -> Iterator[tuple[str, str, str, int]]:
+    """As ``known_parts``, each with its line; ``*`` is an alias, and the style of a tagged text its tag."""
+    refuse_deep_nesting(text)
+    event: Any
+    for event in yaml.parse(text, Loader=EventParser):
+        kind = _KINDS.get(type(event))
+        if kind == "scalar":
+            style = event.tag if event.tag == _TEXT_TAG and event.style not in QUOTES else event.style
+            yield kind, event.value, style, event.start_mark.line + 1
+        elif kind:
+            yield kind, "", "", event.start_mark.line + 1
 
 
 class _Values:
@@ -87,26 +116,26 @@ class _ValueReader:
         self.in_list = False
         self._type: type | None = None  # of the items so far
 
-    def take(self, event: yaml.Event, values: _Values) -> None:
-        if isinstance(event, yaml.SequenceStartEvent):
+    def take(self, values: _Values, kind: str, text: str, style: str, line: int) -> None:
+        if kind == "scalar":
+            value = _scalar_of(text, style, line)
+            if self.in_list:
+                self._take_item(value, values, line)
+            else:
+                values.put(value)
+        elif kind == "[":
             self.in_list, self._type = True, None
-        elif isinstance(event, yaml.SequenceEndEvent):
+        elif kind == "]":
             if self.in_list and self._type is None:
                 values.begin_list([])
             self.in_list = False
-        elif isinstance(event, yaml.ScalarEvent):
-            value = _scalar_of(event)
-            if self.in_list:
-                self._take_item(value, values, event)
-            else:
-                values.put(value)
 
-    def _take_item(self, item: Scalar, values: _Values, event: yaml.Event) -> None:
+    def _take_item(self, item: Scalar, values: _Values, line: int) -> None:
         if self._type is None:
             self._type = type(item)
             values.begin_list([item])
         elif self._type is not type(item) or not values.append(item):
-            raise _refused(event, "the items of a list must be of one type")
+            raise _refused(line, "the items of a list must be of one type")
 
 
 class _Path:
@@ -156,7 +185,7 @@ class _Section:
 
 
 class _FileReader:
-    """The events of one file, in their order. A key at the level of parameters is a group once a mapping follows it."""
+    """The parts of one file, in their order. A key at the level of parameters is a group once a mapping follows it."""
 
     def __init__(self) -> None:
         self._sections: dict[str, _Section] = {}
@@ -172,25 +201,28 @@ class _FileReader:
     def sections(self) -> Mapping[str, Section]:
         return {name: section.read() for name, section in self._sections.items()}
 
-    def take(self, event: yaml.Event) -> None:
+    def take(self, kind: str, text: str, style: str, line: int = 0) -> None:
         """Raises ``RefusedParameters``."""
-        if isinstance(event, yaml.ScalarEvent):
-            (self._take_key if self._key_is_next else self._take_value)(event)
-        elif isinstance(event, yaml.SequenceStartEvent):
+        if kind == "scalar":
             if self._key_is_next:
-                raise _refused(event, "a list cannot be a key")
+                self._take_key(text, line)
+            else:
+                self._take_value(text, style, line)
+        elif kind == "[":
+            if self._key_is_next:
+                raise _refused(line, "a list cannot be a key")
             if not self._below_parameters_key:
-                raise _too_early(event)
-            self._values.take(event, self._current)
-        elif isinstance(event, yaml.SequenceEndEvent):
-            self._values.take(event, self._current)
+                raise _too_early(line)
+            self._values.take(self._current, kind, text, style, line)
+        elif kind == "]":
+            self._values.take(self._current, kind, text, style, line)
             self._key_is_next = True
-        elif isinstance(event, yaml.MappingStartEvent):
+        elif kind == "{":
             self._begin_mapping()
-        elif isinstance(event, yaml.MappingEndEvent):
+        elif kind == "}":
             self._end_mapping()
-        elif isinstance(event, yaml.AliasEvent):
-            raise _refused(event, "rcl does not take aliases")
+        else:
+            raise _refused(line, "rcl does not take aliases")
 
     @property
     def _current(self) -> _Values:
@@ -213,53 +245,51 @@ class _FileReader:
             self._below_parameters_key = False
         self._depth -= 1
 
-    def _take_key(self, event: yaml.ScalarEvent) -> None:
-        if not event.value:
-            raise _refused(event, "a key is empty")
+    def _take_key(self, text: str, line: int) -> None:
+        if not text:
+            raise _refused(line, "a key is empty")
         if self._below_parameters_key:
-            self._name_parameter(event)
-        elif event.value.startswith(_PARAMETERS_KEY):
-            self._begin_section(event)
+            self._name_parameter(text, line)
+        elif text.startswith(_PARAMETERS_KEY):
+            self._begin_section(text, line)
         else:
-            self._node.add(event.value)
+            self._node.add(text)
         self._key_is_next = False
 
-    def _begin_section(self, event: yaml.ScalarEvent) -> None:
+    def _begin_section(self, text: str, line: int) -> None:
         if not self._node.count:
-            raise _refused(event, f"no node is named before {_PARAMETERS_KEY}")
+            raise _refused(line, f"no node is named before {_PARAMETERS_KEY}")
         name = self._node.text
         if why := _why_no_section(name):
-            raise _refused(event, f"{name!r} names no node: {why}")
+            raise _refused(line, f"{name!r} names no node: {why}")
         self._section = self._sections.setdefault(name, _Section())
         self._node.drop()
         self._below_parameters_key = True
 
-    def _name_parameter(self, event: yaml.ScalarEvent) -> None:
+    def _name_parameter(self, text: str, line: int) -> None:
         if self._mapping_began:
             if self._at >= len(self._section.names):
-                raise _refused(event, "a mapping stands where a parameter or a node must be named first")
+                raise _refused(line, "a mapping stands where a parameter or a node must be named first")
             self._group.text, self._group.count = self._section.names[self._at], self._group.count + 1
             self._mapping_began = False
         if not self._group.count:
-            self._at = self._section.find(event.value)
+            self._at = self._section.find(text)
             return
         self._at = self._section.find(self._group.text)
-        self._section.rename(self._at, f"{self._group.text}.{event.value}")
+        self._section.rename(self._at, f"{self._group.text}.{text}")
 
-    def _take_value(self, event: yaml.ScalarEvent) -> None:
+    def _take_value(self, text: str, style: str, line: int) -> None:
         if not self._below_parameters_key or not self._section.names:
-            raise _too_early(event)
-        self._values.take(event, self._current)
+            raise _too_early(line)
+        self._values.take(self._current, "scalar", text, style, line)
         self._key_is_next = not self._values.in_list
 
 
-def _scalar_of(event: yaml.ScalarEvent) -> Scalar:
-    quoted = event.style in ("'", '"')
-    if not quoted and not event.value:
-        raise _refused(event, "a parameter has no value")
-    if quoted or event.tag == _TEXT_TAG:
-        return str(event.value)
-    return plain_scalar(event.value)
+def _scalar_of(text: str, style: str, line: int) -> Scalar:
+    quoted = style in QUOTES
+    if not quoted and not text:
+        raise _refused(line, "a parameter has no value")
+    return text if quoted or style == _TEXT_TAG else plain_scalar(text)
 
 
 def _why_no_section(name: str) -> str:
@@ -270,15 +300,20 @@ def _why_no_section(name: str) -> str:
     tokens = namespace.removeprefix("/").split("/") if namespace.strip("/") else []
     if "//" in name:
         return "it contains '//'"
-    if not _NODE_NAME.fullmatch(node) or not all(map(_NAMESPACE_TOKEN.fullmatch, tokens)):
+    if not _is_token(node, _LONGEST_NODE_NAME) or not all(
+        _is_token(token, _LONGEST_TOKEN) for token in tokens
+    ):
         return "a token is letters, digits and '_', without a digit in front, or '*' or '**'"
     return ""
 
 
-def _too_early(event: yaml.Event) -> RefusedParameters:
-    return _refused(event, f"a value stands before {_PARAMETERS_KEY}")
+def _is_token(text: str, longest: int) -> bool:
+    return text in ("*", "**") or (text.isascii() and text.isidentifier() and len(text) <= longest)
 
 
-def _refused(event: yaml.Event, why: str) -> RefusedParameters:
-    line = event.start_mark.line + 1 if event.start_mark else "?"
+def _too_early(line: int) -> RefusedParameters:
+    return _refused(line, f"a value stands before {_PARAMETERS_KEY}")
+
+
+def _refused(line: int, why: str) -> RefusedParameters:
     return RefusedParameters(f"line {line}: {why}")

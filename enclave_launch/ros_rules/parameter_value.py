@@ -7,6 +7,7 @@ import math
 import re
 
 from enclave_launch.boundary.light import late_pattern
+from enclave_launch.boundary.plain_yaml import decimal
 
 Scalar = bool | int | float | str
 ParameterValue = Scalar | bytes | tuple[Scalar | bytes, ...]
@@ -40,6 +41,8 @@ def plain_scalar(text: str) -> Scalar:
         return _BOOLEANS[text]
     if text[:1] not in _BEGIN_NUMBERS:
         return text
+    if (plain := decimal(text)) is not None:
+        return plain
     number = _strtoll(text) if _INTEGER.fullmatch(text) else None
     return _strtod(text) if number is None else number
 

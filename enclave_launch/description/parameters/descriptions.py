@@ -6,6 +6,7 @@ import os
 
 from enclave_launch.boundary.files import as_path, read_text
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, cast
+from enclave_launch.boundary.plain_yaml import known_parts
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
 from enclave_launch.description.parameters import yaml_text
@@ -17,7 +18,6 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
-from enclave_launch.frontend.fast_yaml import was_written
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -160,7 +160,7 @@ def _substituted(context: LaunchContext, path: str) -> str:
         return path  # told where it is used
     text = perform_substitutions(context, parse_substitution(read_text(path)))
     try:
-        if not was_written(text):
+        if known_parts(text) is None:
             yaml_text.load_shared(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
