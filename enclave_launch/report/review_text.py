@@ -19,8 +19,7 @@ def plan_text(plan: PlanDocument) -> str:
 
 def _enclave(plan: PlanDocument, path: str) -> Iterator[str]:
     nodes = plan.nodes_of(path)
-    asked = frozenset[GrantedName]().union(*(node.own for node in nodes))
-    shown = asked if nodes else plan.enclaves[path]
+    shown = plan.own(path) if nodes else plan.enclaves[path]
     yield f"enclave {path}"
     yield from (f"  node {node.fqn}  ({node.program})" for node in nodes)
     for operation in OPERATIONS:

@@ -92,24 +92,18 @@ def changes(before: PlanDocument, after: PlanDocument) -> Changes:
 def _enclave_changes(before: PlanDocument, after: PlanDocument) -> list[EnclaveChange]:
     found = []
     for path in sorted(before.enclaves.keys() | after.enclaves.keys()):
-        old, new = before.enclaves.get(path), after.enclaves.get(path)
+        old, new = (plan.enclaves.get(path, frozenset()) for plan in (before, after))
         change = EnclaveChange(
             path,
-            tuple(sorted((new or frozenset()) - (old or frozenset()))),
-            tuple(sorted((old or frozenset()) - (new or frozenset()))),
-            _built_in(before, path) | _built_in(after, path),
-            is_new=old is None,
-            is_gone=new is None,
+            tuple(sorted(new - old)),
+            tuple(sorted(old - new)),
+            before.built_in(path) | after.built_in(path),
+            is_new=path not in before.enclaves,
+            is_gone=path not in after.enclaves,
         )
         if change.added or change.removed or change.is_new or change.is_gone:
             found.append(change)
     return found
-
-
-def _built_in(plan: PlanDocument, enclave: str) -> frozenset[GrantedName]:
-    nodes = plan.nodes_of(enclave)
-    own, everywhere = frozenset[GrantedName](), frozenset[GrantedName]()
-    return everywhere.union(*(node.built_in for node in nodes)) - own.union(*(node.own for node in nodes))
 
 
 def _edges(graph: FlowGraph) -> set[tuple[str, str]]:

@@ -79,6 +79,15 @@ class PlanDocument(NamedTuple):
     def nodes_of(self, enclave: str) -> tuple[NodeView, ...]:
         return tuple(node for node in self.nodes if node.enclave == enclave)
 
+    def own(self, enclave: str) -> frozenset[GrantedName]:
+        """What its nodes ask for themselves."""
+        return frozenset[GrantedName]().union(*(node.own for node in self.nodes_of(enclave)))
+
+    def built_in(self, enclave: str) -> frozenset[GrantedName]:
+        """What its nodes have as every node, and none of them asks for."""
+        everywhere = (node.built_in for node in self.nodes_of(enclave))
+        return frozenset[GrantedName]().union(*everywhere) - self.own(enclave)
+
     def units_of(self, enclave: str) -> dict[str, frozenset[GrantedName]]:
         """What can have an enclave of its own: each node that the launch file starts, with what it and the helpers in
         its process ask for."""

@@ -19,6 +19,7 @@ from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
 from enclave_launch.errors import UsageError
+from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, Told, plan_from_document
 from enclave_launch.review.information_flow import FlowStep, flow_graph, shortest_paths
 
@@ -84,35 +85,11 @@ def read_expectations(content: Any, place: str) -> Expectations:
 def rule_findings(document: Mapping[str, Any], rules: Iterable[Never]) -> list[Told]:
     """A forbidden flow is an error, a rule that names nothing in this plan a warning."""
     broken, idle = broken_rules(plan_from_document(document), rules)
-    forbidden = [
-        Told(
-            "error",
-            "flow-forbidden",
-            found.source,
-            None,
-            0,
-            _told(found),
-            "remove one of these steps, or the rule",
-        )
-        for found in broken
-    ]
-    unknown = "correct its names, or remove it"
-    return forbidden + [
-        Told(
-            "warning",
-            "rule-idle",
-            rule.source,
-            None,
-            0,
-            f"no {rule.source} or no {rule.target} in this plan",
-            unknown,
-        )
+    forbidden = [finding("flow-forbidden", found.source, _told(found)) for found in broken]
+    return [told._replace(severity="error") for told in forbidden] + [
+        finding("rule-idle", rule.source, f"no {rule.source} or no {rule.target} in this plan")
         for rule in idle
     ]
-
-
-def _nothing(rule: Never) -> str:
-    return f"this plan has no {rule.source}, or nothing that receives on {rule.target}"
 
 
 def _told(found: Broken) -> str:

@@ -60,8 +60,8 @@ FlowGraph = Mapping[str, Mapping[str, tuple[Hop, ...]]]
 
 def flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
     """Between the enclaves of ``plan``; every enclave is a key. ``built_in``: count what every node has, too."""
-    grants = {path: _flowing(plan, path, built_in) for path in sorted(plan.enclaves)}
-    return _graph(grants)
+    left_out = {path: frozenset() if built_in else plan.built_in(path) for path in plan.enclaves}
+    return _graph({path: plan.enclaves[path] - left_out[path] for path in sorted(plan.enclaves)})
 
 
 def shortest_paths(graph: FlowGraph, source: str, target: str) -> list[tuple[FlowStep, ...]]:
@@ -102,16 +102,6 @@ def opened_by_sharing(plan: PlanDocument) -> list[tuple[str, str, str]]:
             if one != two and two not in reach[one]
         ]
     return opened
-
-
-def _flowing(plan: PlanDocument, enclave: str, built_in: bool) -> frozenset[GrantedName]:
-    if built_in:
-        return plan.enclaves[enclave]
-    nodes = plan.nodes_of(enclave)
-    everywhere = frozenset[GrantedName]().union(*(node.built_in for node in nodes)) - frozenset[
-        GrantedName
-    ]().union(*(node.own for node in nodes))
-    return plan.enclaves[enclave] - everywhere
 
 
 def _graph(grants: Mapping[str, Iterable[GrantedName]]) -> FlowGraph:

@@ -38,7 +38,7 @@ class Split(NamedTuple):
 
 def merges(plan: PlanDocument, *, least_similarity: float = 0.5) -> list[Merge]:
     """Pairs of enclaves that are alike, cheapest first. What every node has is left out of the comparison."""
-    own = {path: _asked_for(plan, path) for path in plan.enclaves}
+    own = {path: plan.own(path) for path in plan.enclaves}
     found = [
         Merge(one, two, _similarity(own[one], own[two]), _excess(own, one, two))
         for one, two in combinations(sorted(own), 2)
@@ -52,16 +52,12 @@ def splits(plan: PlanDocument) -> list[Split]:
     """Enclaves in which nodes may do what only others ask for, those that save most first."""
     found = []
     for path in plan.enclaves:
-        asked = _asked_for(plan, path)
+        asked = plan.own(path)
         units = plan.units_of(path)
         saved = tuple((unit, tuple(sorted(asked - own))) for unit, own in units.items() if asked - own)
         if len(units) > 1 and saved:
             found.append(Split(path, saved))
     return sorted(found, key=lambda split: (-split.gain, split.enclave))
-
-
-def _asked_for(plan: PlanDocument, enclave: str) -> frozenset[GrantedName]:
-    return frozenset[GrantedName]().union(*(node.own for node in plan.nodes_of(enclave)))
 
 
 def _similarity(one: frozenset[GrantedName], two: frozenset[GrantedName]) -> float:

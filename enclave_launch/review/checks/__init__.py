@@ -1,6 +1,6 @@
 """Checks of a plan beyond what planning itself tells. Pure; each check is one function from a plan to findings.
 
-rules.py       what each code means
+rules.py       what each code means, and what to do about it
 meetings.py    names, types and QoS of which two ends should meet and do not
 enclaves.py    what an enclave holds: wildcards, sharing, permissions that nobody asks for, one name for two nodes
 launched.py    what the launch file gives to its processes: remap rules, parameters, secrets, security variables
@@ -15,10 +15,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from enclave_launch.review.checks import enclaves, launched, meetings
-from enclave_launch.review.checks.rules import RULES
+from enclave_launch.review.checks.rules import MEANINGS
 from enclave_launch.review.document import Told, plan_from_document
 
-__all__ = ["RULES", "check_plan"]
+__all__ = ["MEANINGS", "check_plan"]
 
 
 def check_plan(document: Mapping[str, Any]) -> list[Told]:
@@ -30,8 +30,4 @@ def check_plan(document: Mapping[str, Any]) -> list[Told]:
         for check in room.CHECKS
         for told in check(plan, document)
     )
-    return [*plan.told, *sorted(own, key=_order)]
-
-
-def _order(told: Told) -> tuple[str, str, str, str, int]:
-    return told.severity, told.code, told.subject, told.file or "", told.line
+    return [*plan.told, *sorted(own, key=lambda told: told._replace(file=told.file or "")[:5])]

@@ -19,8 +19,7 @@ def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Tol
     """Nodes with the same fully qualified name: ROS cannot tell them apart."""
     for name, count in sorted(Counter(node.fqn for node in plan.nodes).items()):
         if count > 1:
-            text = f"{count} nodes are called {name}"
-            yield finding("node-name-twice", name, text, "give each a name of its own")
+            yield finding("node-name-twice", name, f"{count} nodes are called {name}")
 
 
 def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
@@ -29,23 +28,16 @@ def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]
     for enclave, grants in sorted(plan.enclaves.items()):
         for grant in sorted(grants):
             if has_wildcard(grant.name) and f" {grant.name}:" not in told:
-                yield finding(
-                    "wildcard",
-                    grant.name,
-                    f"enclave {enclave} may {grant}",
-                    "name what is meant, or accept it with the reason why that is not possible",
-                )
+                yield finding("wildcard", grant.name, f"enclave {enclave} may {grant}")
 
 
 def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
     """Enclaves in which nodes gain permissions of others."""
     for split in splits(plan):
         gains = "; ".join(f"{node} gains {some_of(grants, _NAMED)}" for node, grants in split.saved)
+        nodes = len(plan.units_of(split.enclave))
         yield finding(
-            "enclave-shared",
-            split.enclave,
-            f"{len(plan.units_of(split.enclave))} nodes share enclave {split.enclave}: {gains}",
-            "give them enclaves of their own (enclave=, --enclave-scope node); secure-plan suggest shows all",
+            "enclave-shared", split.enclave, f"{nodes} nodes share enclave {split.enclave}: {gains}"
         )
 
 
@@ -56,12 +48,8 @@ def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
         if not nodes or document["enclaves"][enclave].get("permissions_unknown"):
             continue
         for grant in sorted(grants - frozenset[GrantedName]().union(*(node.grants for node in nodes))):
-            yield finding(
-                "permission-unasked",
-                enclave,
-                f"enclave {enclave} may {grant}, and no node of it asks for that",
-                "take it out of the policy file, or describe who needs it",
-            )
+            text = f"enclave {enclave} may {grant}, and no node of it asks for that"
+            yield finding("permission-unasked", enclave, text)
 
 
 CHECKS = (names_twice, wildcards, shared, unasked)

@@ -12,7 +12,6 @@ from enclave_launch.review.signed import as_signed
 from keystore.verification.finding import Finding
 
 _NAMED = 4
-_PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
 
 
 class Ending(NamedTuple):
@@ -29,9 +28,7 @@ def against_keystore(
     plan: PlanDocument, signed: Mapping[str, frozenset[GrantedName]], endings: Iterable[Ending]
 ) -> list[Told]:
     """``endings``: what is due, of the whole keystore; what belongs to enclaves of other plans is left out."""
-    found = [
-        told for enclave in sorted(plan.enclaves) for told in _enclave(plan, enclave, signed, "keystore")
-    ]
+    found = [told for path in sorted(plan.enclaves) for told in _enclave(plan, path, signed, "keystore")]
     return [*found, *_expiring(plan, endings)]
 
 
@@ -46,8 +43,8 @@ def against_router(
         for told in _enclave(plan, enclave, enforced, "keystore's Zenoh router")
     ]
     for one in findings:
-        told = finding("keystore-zenoh", one.place, f"{one.place}: {one.message}", one.repair)
-        found.append(told._replace(severity="error") if one.severity.fails else told)
+        told = finding("keystore-zenoh", one.place, f"{one.place}: {one.message}")
+        found.append(told._replace(remedy=one.repair, severity="error" if one.severity.fails else "warning"))
     return found
 
 
@@ -56,7 +53,7 @@ def _enclave(
 ) -> Iterator[Told]:
     if enclave not in signed:
         text = f"the {who} has no permissions for enclave {enclave}"
-        yield finding("keystore-enclave-missing", enclave, text, _PROVISION)
+        yield finding("keystore-enclave-missing", enclave, text)
         return
     wanted = as_signed(plan.enclaves[enclave])
     for code, grants, words in (
@@ -65,21 +62,13 @@ def _enclave(
     ):
         if grants:
             text = f"{words} enclave {enclave} {some_of(sorted(grants), _NAMED)}"
-            yield finding(code, enclave, text, f"{_PROVISION}; secure-plan diff KEYSTORE ... shows all")
+            yield finding(code, enclave, text)
 
 
 def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[Told]:
     for one in endings:
         if one.enclave is None or one.enclave in plan.enclaves:
-            when = (
-                f"ended on {one.ends}"
-                if one.days_left < 0
-                else f"ends on {one.ends}, in {one.days_left} days"
-            )
-            told = finding(
-                "keystore-expires",
-                one.enclave or one.subject,
-                f"{one.subject} {when}",
-                "secure-keystore renew",
-            )
-            yield told._replace(severity="error") if one.days_left < 0 else told
+            over = one.days_left < 0
+            when = f"ended on {one.ends}" if over else f"ends on {one.ends}, in {one.days_left} days"
+            told = finding("keystore-expires", one.enclave or one.subject, f"{one.subject} {when}")
+            yield told._replace(severity="error") if over else told

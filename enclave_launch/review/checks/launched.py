@@ -39,13 +39,8 @@ def remaps(plan: PlanDocument, document: Document) -> Iterator[Told]:
             dead.setdefault(rule, item)
     for rule, item in sorted(dead.items(), key=lambda each: each[0]):
         if rule not in alive:
-            yield finding(
-                "remap-dead",
-                _subject(item),
-                f"the rule {rule[0]} -> {rule[1]} changes no name of {_subject(item)}",
-                "look for a slip in the name, or remove the rule",
-                _place(item),
-            )
+            text = f"the rule {rule[0]} -> {rule[1]} changes no name of {_subject(item)}"
+            yield _about(item, "remap-dead", text)
 
 
 def _used_rules(document: Document) -> dict[tuple[str, str | None], set[str]]:
@@ -80,13 +75,8 @@ def parameters(plan: PlanDocument, document: Document) -> Iterator[Told]:
         names = {name for some in known for name in some or ()}
         for parameter in sorted(item["parameters"]):
             if parameter not in names and not _OF_EVERY_NODE.match(parameter):
-                yield finding(
-                    "parameter-unknown",
-                    _subject(item),
-                    f"{_subject(item)} is given parameter {parameter}, which it does not declare",
-                    "look for a slip in the name; rcl passes over what is not declared",
-                    _place(item),
-                )
+                text = f"{_subject(item)} is given parameter {parameter}, which it does not declare"
+                yield _about(item, "parameter-unknown", text)
 
 
 def security_variables(plan: PlanDocument, document: Document) -> Iterator[Told]:
@@ -94,13 +84,7 @@ def security_variables(plan: PlanDocument, document: Document) -> Iterator[Told]
     for process in document["processes"]:
         for name, value in sorted(process["environment"].items()):
             if name.startswith("ROS_SECURITY_"):
-                yield finding(
-                    "security-variable-set",
-                    _subject(process),
-                    f"the launch file sets {name}={value}",
-                    "leave it to --secure",
-                    _place(process),
-                )
+                yield _about(process, "security-variable-set", f"the launch file sets {name}={value}")
 
 
 def secrets(plan: PlanDocument, document: Document) -> Iterator[Told]:
@@ -108,13 +92,7 @@ def secrets(plan: PlanDocument, document: Document) -> Iterator[Told]:
     for item in launched(document):
         for name, value in sorted(item["parameters"].items()):
             if _SECRET.search(_CAMEL.sub("_", name)) and isinstance(value, str) and value:
-                yield finding(
-                    "secret-in-parameters",
-                    _subject(item),
-                    f"parameter {name} holds what looks like a secret",
-                    "let the node read it from a file or variable that only it can read",
-                    _place(item),
-                )
+                yield _about(item, "secret-in-parameters", f"parameter {name} holds what looks like a secret")
 
 
 def launched(document: Document) -> tuple[Item, ...]:
@@ -130,8 +108,8 @@ def _subject(item: Item) -> str:
     return str(item["fqn"] or item.get("executable", "")).replace(UNSPECIFIED_NODE_NAMESPACE, "")
 
 
-def _place(item: Item) -> tuple[str | None, int]:
-    return item["launch_file"], item["line"]
+def _about(item: Item, code: str, text: str) -> Told:
+    return finding(code, _subject(item), text, (item["launch_file"], item["line"]))
 
 
 CHECKS = (remaps, parameters, security_variables, secrets)

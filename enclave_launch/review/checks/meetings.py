@@ -47,13 +47,9 @@ def missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
         yield from found
         return
     names = sorted({told.subject for told in found})
-    yield finding(
-        "ends-not-judged",
-        names[0],
-        f"{some_of(names, _NAMED)} have one end only among what is known, "
-        f"but not all is known of {some_of(gaps, _NAMED)}",
-        "close the gaps, and check again",
-    )
+    lonely, open_ones = some_of(names, _NAMED), some_of(gaps, _NAMED)
+    text = f"{lonely} have one end only among what is known, but not all is known of {open_ones}"
+    yield finding("ends-not-judged", names[0], text)
 
 
 _NAMED = 5
@@ -76,13 +72,9 @@ def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
             candidates = others if has_wildcard(name) else patterns
             if name not in others and not any(can_meet(name, other) for other in candidates):
                 who = sorted({user.node for user in users.get((here, name), ())})
-                yield finding(
-                    code,
-                    name,
-                    f"nothing in this plan {verb} {name}, which {' and '.join(who)} use{'' if len(who) > 1 else 's'}",
-                    "look for a slip in the name, or accept it if the other end runs elsewhere",
-                    _first_place(users.get((here, name), ())),
-                )
+                use = f"{' and '.join(who)} use{'' if len(who) > 1 else 's'}"
+                text = f"nothing in this plan {verb} {name}, which {use}"
+                yield finding(code, name, text, _first_place(users.get((here, name), ())))
 
 
 def near_names(plan: PlanDocument, document: Document) -> Iterator[Told]:
@@ -93,14 +85,10 @@ def near_names(plan: PlanDocument, document: Document) -> Iterator[Told]:
         lonely_there = asked.get(there, set()) - asked.get(here, set())
         for one, two in product(sorted(lonely_here), sorted(lonely_there)):
             if _nearly(one, two):
-                yield finding(
-                    "nearly-the-same-name",
-                    one,
-                    f"{one} ({here.replace('_', ' ')}) and {two} ({there.replace('_', ' ')}) never meet and "
-                    "are nearly the same",
-                    "if they are meant to be one, write or remap both alike",
-                    _first_place(users.get((here, one), ())),
-                )
+                uses = f"{one} ({here.replace('_', ' ')}) and {two} ({there.replace('_', ' ')})"
+                text = f"{uses} never meet and are nearly the same"
+                place = _first_place(users.get((here, one), ()))
+                yield finding("nearly-the-same-name", one, text, place)
 
 
 def _nearly(one: str, two: str) -> bool:
@@ -136,13 +124,9 @@ def types(plan: PlanDocument, document: Document) -> Iterator[Told]:
                 by_type.setdefault(user.interface["type"], []).append(user)
     for (kind, name), by_type in sorted(found.items()):
         for one, two in combinations(sorted(by_type), 2):
-            yield finding(
-                "types-differ",
-                name,
-                f"{kind} {name} is {one} for {_nodes(by_type[one])} and {two} for {_nodes(by_type[two])}",
-                "they never match: correct one of them",
-                _first_place(by_type[two]),
-            )
+            who, other = _nodes(by_type[one]), _nodes(by_type[two])
+            text = f"{kind} {name} is {one} for {who} and {two} for {other}"
+            yield finding("types-differ", name, text, _first_place(by_type[two]))
 
 
 def qos(plan: PlanDocument, document: Document) -> Iterator[Told]:
@@ -152,19 +136,11 @@ def qos(plan: PlanDocument, document: Document) -> Iterator[Told]:
         if operation != "publish":
             continue
         for publisher, subscriber in product(publishers, users.get(("subscribe", name), ())):
-            why = _unmet(publisher.interface.get("qos", {}), subscriber.interface.get("qos", {}))
+            offered, requested = publisher.interface.get("qos", {}), subscriber.interface.get("qos", {})
+            why = unmet(_quality(offered, requested), _quality(requested, offered))
             if why:
-                yield finding(
-                    "qos-differs",
-                    name,
-                    f"{subscriber.node} gets nothing of {name} from {publisher.node}: {'; '.join(why)}",
-                    "let the publisher offer it, or the subscription ask for less",
-                    _place(subscriber.interface["place"]),
-                )
-
-
-def _unmet(offered: Mapping[str, Any], requested: Mapping[str, Any]) -> tuple[str, ...]:
-    return unmet(_quality(offered, requested), _quality(requested, offered))
+                text = f"{subscriber.node} gets nothing of {name} from {publisher.node}: {'; '.join(why)}"
+                yield finding("qos-differs", name, text, _place(subscriber.interface["place"]))
 
 
 def _quality(qos: Mapping[str, Any], other: Mapping[str, Any]) -> Quality:

@@ -1,39 +1,62 @@
-"""What each code of a finding means, and how a check words one."""
+"""What each code of a finding means and what to do about it; how a check words a finding."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
+from enclave_launch.diagnostics import Code
 from enclave_launch.review.document import Told
 
-RULES: Mapping[str, str] = {
-    "no-publisher": "A topic is subscribed and nothing in this plan publishes it.",
-    "no-subscriber": "A topic is published and nothing in this plan subscribes it.",
-    "no-server": "A service or action is called and nothing in this plan serves it.",
-    "ends-not-judged": "Names have one end only among what is known of this plan, which has gaps.",
-    "nearly-the-same-name": "Two names that never meet differ by one slash, letter or capital only.",
-    "types-differ": "Both ends of a topic, service or action have different types: they never match.",
-    "qos-differs": "A publisher offers less QoS than a subscription of the topic asks for: they never match.",
-    "node-name-twice": "Two nodes have the same full name: rcl warns, tools confuse them.",
-    "wildcard": "A permission holds a wildcard: it covers names that nobody may have thought of.",
-    "enclave-shared": "Nodes of one enclave may do what only others of it ask for.",
-    "permission-unasked": "An enclave has a permission that no node of it asks for.",
-    "remap-dead": "A remap rule changes no name of any node that it is given to.",
-    "parameter-unknown": "A parameter is set that its node does not declare.",
-    "security-variable-set": "The launch file itself sets a ROS_SECURITY_ variable of a process.",
-    "secret-in-parameters": "A parameter looks like a secret: parameters are readable over the network and in files.",
-    "flow-forbidden": "An influence that the repository's rules forbid is possible.",
-    "rule-idle": "A rule of the repository names nothing in this plan.",
-    "keystore-enclave-missing": "The keystore lacks an enclave of the plan.",
-    "keystore-grants-more": "The keystore permits an enclave more than the plan asks for.",
-    "keystore-grants-less": "The keystore permits an enclave less than the plan asks for.",
-    "keystore-zenoh": "A file for Zenoh in the keystore is not what follows from what is signed.",
-    "keystore-expires": "Something that this plan needs of the keystore ends soon, or has ended.",
+_OTHER_END = "look for a slip in the name, or accept it if the other end runs elsewhere"
+_PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
+_SHOWS_ALL = f"{_PROVISION}; secure-plan diff KEYSTORE ... shows all"
+_RULES: Mapping[str, tuple[str, str]] = {
+    "no-publisher": ("A topic is subscribed and nothing in this plan publishes it.", _OTHER_END),
+    "no-subscriber": ("A topic is published and nothing in this plan subscribes it.", _OTHER_END),
+    "no-server": ("A service or action is called and nothing in this plan serves it.", _OTHER_END),
+    "ends-not-judged": ("Names have one end only among what is known of this plan, which has gaps.",
+                        "close the gaps, and check again"),
+    "nearly-the-same-name": ("Two names that never meet differ by one slash, letter or capital only.",
+                             "if they are meant to be one, write or remap both alike"),
+    "types-differ": ("Both ends of a topic, service or action have different types: they never match.",
+                     "they never match: correct one of them"),
+    "qos-differs": ("A publisher offers less QoS than a subscription of the topic asks for: they never match.",
+                    "let the publisher offer it, or the subscription ask for less"),
+    "node-name-twice": ("Two nodes have the same full name: rcl warns, tools confuse them.",
+                        "give each a name of its own"),
+    "wildcard": ("A permission holds a wildcard: it covers names that nobody may have thought of.",
+                 "name what is meant, or accept it with the reason why that is not possible"),
+    "enclave-shared": ("Nodes of one enclave may do what only others of it ask for.",
+                       "give them enclaves of their own (enclave=, --enclave-scope node); secure-plan suggest "
+                       "shows all"),
+    "permission-unasked": ("An enclave has a permission that no node of it asks for.",
+                           "take it out of the policy file, or describe who needs it"),
+    "remap-dead": ("A remap rule changes no name of any node that it is given to.",
+                   "look for a slip in the name, or remove the rule"),
+    "parameter-unknown": ("A parameter is set that its node does not declare.",
+                          "look for a slip in the name; rcl passes over what is not declared"),
+    "security-variable-set": ("The launch file itself sets a ROS_SECURITY_ variable of a process.",
+                              "leave it to --secure"),
+    "secret-in-parameters": (
+        "A parameter looks like a secret: parameters are readable over the network and in files.",
+        "let the node read it from a file or variable that only it can read"),
+    "flow-forbidden": ("An influence that the repository's rules forbid is possible.",
+                       "remove one of these steps, or the rule"),
+    "rule-idle": ("A rule of the repository names nothing in this plan.", "correct its names, or remove it"),
+    "keystore-enclave-missing": ("The keystore lacks an enclave of the plan.", _PROVISION),
+    "keystore-grants-more": ("The keystore permits an enclave more than the plan asks for.", _SHOWS_ALL),
+    "keystore-grants-less": ("The keystore permits an enclave less than the plan asks for.", _SHOWS_ALL),
+    "keystore-zenoh": ("A file for Zenoh in the keystore is not what follows from what is signed.", ""),
+    "keystore-expires": ("Something that this plan needs of the keystore ends soon, or has ended.",
+                         "secure-keystore renew"),
+}  # fmt: skip
+MEANINGS: Mapping[str, str] = {
+    **{code.value: code.meaning for code in Code},
+    **{code: meaning for code, (meaning, _) in _RULES.items()},
 }
+"""Of every code that planning or a check can give."""
 
 
-def finding(
-    code: str, subject: str, text: str, remedy: str, place: tuple[str | None, int] = (None, 0)
-) -> Told:
+def finding(code: str, subject: str, text: str, place: tuple[str | None, int] = (None, 0)) -> Told:
     """A warning of a check."""
-    return Told("warning", code, subject, *place, text, remedy)
+    return Told("warning", code, subject, *place, text, _RULES[code][1])

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 from enclave_launch import __version__
 from enclave_launch.boundary.terminal import json_text
-from enclave_launch.diagnostics import Code
 from enclave_launch.verb.options import FLAG, PATH, one_of
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.plans import read_plan
@@ -48,10 +47,9 @@ def _text(found: list[tuple[Told, str | None]], form: str) -> str:
 
     if form == "sarif":
         from enclave_launch.report.sarif import sarif_document
-        from enclave_launch.review.checks import RULES
+        from enclave_launch.review.checks import MEANINGS
 
-        rules = {**{code.value: code.meaning for code in Code}, **RULES}
-        return json_text(sarif_document(found, rules, __version__, os.getcwd()), indent=2) + "\n"
+        return json_text(sarif_document(found, MEANINGS, __version__, os.getcwd()), indent=2) + "\n"
     if form == "json":
         return json_text(findings_document(found), indent=2) + "\n"
     return findings_text(found)

@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.files import read_bytes
-from enclave_launch.diagnostics import Code
 from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.verb.options import PATH, TEXT
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
@@ -76,7 +75,7 @@ def _new_folder(folder: Path) -> Path:
 def _examine(options: argparse.Namespace) -> Examined:
     from enclave_launch.report.contents import report_contents
     from enclave_launch.report.evidence.documents import Examined
-    from enclave_launch.review.checks import RULES
+    from enclave_launch.review.checks import MEANINGS
     from keystore.formats.validity import iso
 
     now, keystore = _moment(options.at), options.keystore
@@ -86,8 +85,7 @@ def _examine(options: argparse.Namespace) -> Examined:
     ends = endings(keystore, now=now) if keystore is not None else None
     root = os.getcwd()
     contents = report_contents(document, found, title=" ".join(options.words), root=root, endings=ends)
-    rules = {**{code.value: code.meaning for code in Code}, **RULES}
-    examined = Examined(document, contents, rules, iso(now), root, components=components)
+    examined = Examined(document, contents, MEANINGS, iso(now), root, components=components)
     if keystore is None:
         return examined
     return examined._replace(keys=_keys(keystore), defaults=_defaults(keystore, now))
