@@ -152,13 +152,15 @@ class _Observer:
 
     def __init__(self, domain: int, enclave_directory: Path | None) -> None:
         directory = [f"--enclave-directory={enclave_directory}"] if enclave_directory else []
+        # It is told its enclave by its arguments: no override may reach it.
+        environment = {key: text for key, text in os.environ.items() if not key.startswith("ROS_SECURITY_")}
         self._process = subprocess.Popen(
             [sys.executable, "-m", "nodl.graph.follow", str(domain), *directory],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
             start_new_session=True,  # Ctrl-C is for the launch; it ends when we close its input
-            env=_environment(),
+            env=environment,
         )
         self.latest: tuple[Graph, tuple[str, ...]] = (Graph(), ())
         self.ended = False
@@ -197,11 +199,6 @@ class _Observer:
         assert self._process.stderr is not None
         for line in self._process.stderr:
             self._errors = [*self._errors[-20:], line]
-
-
-def _environment() -> dict[str, str]:
-    """Of the observer, which is told its enclave by its arguments: no override may reach it."""
-    return {name: value for name, value in os.environ.items() if not name.startswith("ROS_SECURITY_")}
 
 
 def _strangers(graph: Graph, started: set[int]) -> frozenset[int]:

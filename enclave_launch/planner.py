@@ -53,7 +53,9 @@ class Planner(NamedTuple):
             nodes_of(processes, components, launcher),
             distro=evaluation.distro,
             options=self.options.policy,
-            also=_bare_enclaves(processes),
+            # Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
+            # without a manifest, which must not be missing from what a person looks at.
+            also=tuple(item.enclave.path for item in processes if item.enclave and not item.nodes),
         )
         return LaunchPlan(
             evaluation=evaluation,
@@ -146,9 +148,3 @@ def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess
         if planned.fqn and not planned.nodes:
             containers.setdefault("/" + planned.fqn.rpartition(">/")[2].lstrip("/"), planned)
     return containers
-
-
-def _bare_enclaves(processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
-    """Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
-    without a manifest, which must not be missing from what a person looks at."""
-    return tuple(p.enclave.path for p in processes if p.enclave and not p.nodes)

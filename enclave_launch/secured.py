@@ -204,10 +204,6 @@ class PlanProvider:
         self._policies = {enclave.path: enclave for enclave in plan.derived.policy.enclaves}
         self._on_zenoh = on_zenoh(plan, os.environ)
 
-    def _follow_domains(self) -> None:
-        """What came late may be in another domain."""
-        self._options = with_domains(self._plan, self._launch.asked, os.environ)
-
     def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         """The grant, if the plan has the process and its enclave is the one provisioned (a few file reads)."""
         if self._find(process) is None:
@@ -249,7 +245,8 @@ class PlanProvider:
             policy = self._policies[planned.enclave.path]
             if policy.path in before:  # to extend is not to repair
                 self._check(before[policy.path])
-            self._follow_domains()
+            # What came late may be in another domain.
+            self._options = with_domains(self._plan, self._launch.asked, os.environ)
             if on_zenoh(self._plan, os.environ):
                 self._extend_zenoh(process)
             else:

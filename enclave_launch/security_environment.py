@@ -10,14 +10,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.admission.variables import ZENOH_CLEARED, ZENOH_SESSION
 from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.enclave import AssignmentReason
 from enclave_launch.plan import PlannedProcess
 from keystore.disk import layout
-from keystore.formats.domains import Domains
 
 ENABLE = "ROS_SECURITY_ENABLE"
 KEYSTORE = "ROS_SECURITY_KEYSTORE"
@@ -25,12 +23,6 @@ STRATEGY = "ROS_SECURITY_STRATEGY"
 OVERRIDE = "ROS_SECURITY_ENCLAVE_OVERRIDE"
 NO_KEYSTORE = "/dev/null/an_executable_without_an_enclave"
 """Below a file, so that nothing can ever be there."""
-
-
-def environment_domains(environment: Mapping[str, str]) -> Domains:
-    """The one domain of a process with this environment. Raises ``UsageError``; ranges are for ``--domain-id``,
-    where somebody asks for them."""
-    return Domains.single(domain_of(environment))
 
 
 class SecuritySettings(NamedTuple):

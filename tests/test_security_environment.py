@@ -6,26 +6,25 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch.admission.domains import domain_of
 from enclave_launch.enclave import AssignmentReason, EnclaveAssignment
 from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlannedProcess
 from enclave_launch.process import EnclaveRequest, ProcessKind, ResolvedProcess
 from enclave_launch.security_environment import (
     SecuritySettings,
-    environment_domains,
     secured_environment,
 )
 from enclave_launch.source_location import SourceLocation
-from keystore.formats.domains import Domains
 
 
 @pytest.mark.parametrize(("text", "domain"), [("", 0), ("0", 0), ("42", 42), ("007", 7), ("230", 230)])
 def test_the_domain_of_the_environment(text: str, domain: int) -> None:
-    assert environment_domains({"ROS_DOMAIN_ID": text}) == Domains.single(domain)
+    assert domain_of({"ROS_DOMAIN_ID": text}) == domain
 
 
 def test_without_one_it_is_zero() -> None:
-    assert environment_domains({}) == Domains.single(0)
+    assert domain_of({}) == 0
 
 
 @pytest.mark.parametrize(
@@ -34,7 +33,7 @@ def test_without_one_it_is_zero() -> None:
 def test_what_no_process_would_take_signs_nothing(text: str) -> None:
     """Permissions for more domains than one are somebody's decision, never a slip of a variable."""
     with pytest.raises(UsageError, match="ROS_DOMAIN_ID"):
-        environment_domains({"ROS_DOMAIN_ID": text})
+        domain_of({"ROS_DOMAIN_ID": text})
 
 
 def planned(kind: ProcessKind, enclave: str | None) -> PlannedProcess:

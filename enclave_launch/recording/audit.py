@@ -65,7 +65,6 @@ class Audit(Listener):
     def added(self, line: Line) -> None:
         if not isinstance(line, EndpointMade) or line.rc not in (0, 1):
             return
-        assert self._recording is not None
         process, node = self._recording.record.node_of(line)
         found = self._grants.need(process, node, line)
         if found is None:
@@ -78,10 +77,10 @@ class Audit(Listener):
                 described = self._grants.described(process, node)
                 short = described.text if described.missing is None else "nobody"
                 who, by = _by(described.text, line), _by(short, line)
-                self._refuse(Refusal(need, asked.written, asked.type, who, by))
+                self._refusals[need] = refusal = Refusal(need, asked.written, asked.type, who, by)
+                self._launch.say("WARNING", f"audit: {refusal.text}")
 
     def report(self) -> AuditReport:
-        assert self._recording is not None
         used = {(need.enclave, need.operation, need.name) for need in self._asked}
         never = {
             enclave: tuple(
@@ -96,11 +95,6 @@ class Audit(Listener):
             tuple(self._recording.unrecorded),
             tuple(complaint.why for complaint in self._recording.record.complaints),
         )
-
-    def _refuse(self, refusal: Refusal) -> None:
-        self._refusals[refusal.need] = refusal
-        if self._launch is not None:
-            self._launch.say("WARNING", f"audit: {refusal.text}")
 
 
 def _by(who: str, line: EndpointMade) -> str:

@@ -104,12 +104,12 @@ class Explainer(Listener):
         self._middlewares: set[str] = set()
 
     def added(self, line: Line) -> None:
-        assert self._recording is not None
         if isinstance(line, EndpointMade) and (line.rc == REFUSED or (line.rc == 0 and self._on_zenoh)):
             self._endpoint(line, *self._recording.record.node_of(line))
         elif isinstance(line, NodeMade) and line.rc == REFUSED:
             process, _ = self._recording.record.node_of(line)
-            if not self._endpoint_was_refused(process, line):
+            # One that fails because one of its own endpoints was refused has been explained by that.
+            if not any(endpoint.rc == REFUSED for endpoint in process.node(line.node).endpoints):
                 self._waiting.append((time.monotonic() + _PATIENCE, process, line.name, line.error))
         elif isinstance(line, Initialised) and line.rc == 0:
             self._middleware(line)
@@ -135,8 +135,7 @@ class Explainer(Listener):
         self._middlewares.add(line.middleware)
         if line.middleware and known and line.middleware not in known and len(self._middlewares) == 2:
             said, why = " and ".join(sorted(self._middlewares)), MIXED_MIDDLEWARES
-            if self._launch is not None:
-                self._launch.say("WARNING", f"processes of this launch use {said}: {why.what}; {why.remedy}")
+            self._launch.say("WARNING", f"processes of this launch use {said}: {why.what}; {why.remedy}")
 
     def _endpoint(self, line: EndpointMade, process: RecordedProcess, node: RecordedNode) -> None:
         """Refused, or made all the same (``rc`` 0) by a Zenoh router that refuses without a word to the node."""
@@ -155,10 +154,6 @@ class Explainer(Listener):
         cause = cause_of((*asked.error, *self._printed.get(name, ()))) if granted else None
         self._tell(Denial(name, need, asked, described, granted, patch, cause, silent))
 
-    def _endpoint_was_refused(self, process: RecordedProcess, line: NodeMade) -> bool:
-        """A node that fails because one of its own endpoints was refused has been explained by that."""
-        return any(endpoint.rc == REFUSED for endpoint in process.node(line.node).endpoints)
-
     def _tell_waiting(self, now: float) -> None:
         due = [each for each in self._waiting if each[0] <= now]
         self._waiting = [each for each in self._waiting if each[0] > now]
@@ -172,8 +167,7 @@ class Explainer(Listener):
             self.denials.append(what)
         else:
             self.not_joined.append(what)
-        if self._launch is not None:
-            self._launch.say("ERROR", what.text)
+        self._launch.say("ERROR", what.text)
 
 
 def _name(process: RecordedProcess) -> str:

@@ -53,19 +53,17 @@ class QuietWatch(Listener):
             self._last = time.monotonic()
 
     def looked(self) -> None:
-        if self._patience is None or self._launch is None or self._recording is None or self._over:
+        if self._patience is None or self._over:
             return
         now = time.monotonic()
         if self._recording.running and not self._starting(now) and now - self._last >= self._patience:
             self._over = True
-            self._launch.say(
-                "INFO", f"no new endpoint for {self._patience:g} s: what was to be seen was seen"
-            )
+            quiet = f"no new endpoint for {self._patience:g} s: what was to be seen was seen"
+            self._launch.say("INFO", quiet)
             self._launch.shut_down("learnt")
 
     def _starting(self, now: float) -> bool:
         """Whether a process that began a short while ago has said nothing to rcl yet."""
-        assert self._recording is not None
         record = self._recording.record
         speaking = {p.started.pid for p in record.attributed() if p.started is not None}
         return any(
@@ -79,7 +77,7 @@ class QuietWatch(Listener):
             return (line.kind, line.fqn, line.written)
         if isinstance(line, NodeMade):
             return (line.fqn,)
-        if isinstance(line, StateEntered) and self._recording is not None:
+        if isinstance(line, StateEntered):
             process = self._recording.record.process_of(line.pid)
             return (process.node(line.node).fqn, line.state) if process else None
         return None

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
 
 
 class Listener:
-    """Told in the event loop, and does nothing of it: each listener overrides what it is interested in."""
+    """Told in the event loop, ``opened`` first, and does nothing of it: each overrides what it is interested in."""
 
-    _launch: LaunchControl | None = None
-    _recording: Recording | None = None
+    _launch: LaunchControl
+    _recording: Recording
 
     def opened(self, launch: LaunchControl, recording: Recording) -> None:
         self._launch, self._recording = launch, recording
@@ -46,7 +46,7 @@ class EndpointEvents(Listener):
     """
 
     def added(self, line: Line) -> None:
-        if not isinstance(line, EndpointMade) or self._launch is None or self._recording is None:
+        if not isinstance(line, EndpointMade):
             return
         process, node = self._recording.record.node_of(line)
         asked = asked_endpoint(process, node, line)

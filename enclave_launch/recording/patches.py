@@ -98,7 +98,7 @@ def _into_v2(text: str, asked: Asked) -> str | None:
 
 
 def _v2_entry(asked: Asked) -> str:
-    fields = f"name: {_scalar(asked.name)}, type: {asked.type}"
+    fields = f"name: '{asked.name}', type: {asked.type}"  # ~, y or no are something else without quotes
     if asked.kind not in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION):
         return f"{{{fields}}}"
     history, depth, reliability, durability = asked.qos if len(asked.qos) == 4 else (1, 10, 1, 2)
@@ -107,10 +107,6 @@ def _v2_entry(asked: Asked) -> str:
     qos += f", reliability: {'BEST_EFFORT' if reliability == 2 else 'RELIABLE'}"
     qos += f", durability: {'TRANSIENT_LOCAL' if durability == 1 else 'VOLATILE'}"
     return f"{{{fields}, qos: {{{qos}}}}}"
-
-
-def _scalar(name: str) -> str:
-    return f"'{name}'"  # such as ~, y or no, which are something else without quotes
 
 
 def _into_v1(text: str, line: int, asked: Asked) -> str | None:

@@ -81,7 +81,7 @@ class Recording:
         self._untold: list[tuple[float, Line]] = []
         self._folder: Path | None = None
         self._task: asyncio.Task[None] | None = None
-        self._launch: LaunchControl | None = None
+        self._launch: LaunchControl
 
     # LaunchCompanion
 
@@ -170,8 +170,7 @@ class Recording:
     # what listeners ask for
 
     def say_warning(self, text: str) -> None:
-        if self._launch is not None:
-            self._launch.say("WARNING", text)
+        self._launch.say("WARNING", text)
 
     @property
     def _library(self) -> Path:
@@ -313,8 +312,5 @@ def _component(component: ResolvedComponent) -> LoadedComponent:
 
 def _plain(parameters: Mapping[str, object]) -> dict[str, object]:
     """As JSON has them; byte strings, which are not names, are left out."""
-    return {name: value for name, value in parameters.items() if not _has_bytes(value)}
-
-
-def _has_bytes(value: object) -> bool:
-    return isinstance(value, bytes) or (isinstance(value, tuple) and any(isinstance(v, bytes) for v in value))
+    values = {name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()}
+    return {name: parameters[name] for name in values if not any(isinstance(v, bytes) for v in values[name])}

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, plan_graph, short_path
 from enclave_launch.report.review_text import Judged
 from enclave_launch.review.checks.keystore import Ending
-from enclave_launch.review.document import PlanDocument, Told, plan_from_document
+from enclave_launch.review.document import PlanDocument, plan_from_document
 from enclave_launch.review.information_flow import FlowStep, flow_graph, opened_by_sharing, reached_from
 
 
@@ -61,16 +61,12 @@ def report_contents(
     return ReportContents(
         title,
         plan_graph(document, root),
-        [(_short(told, root), accepted) for told, accepted in judged],
+        [(told._replace(file=told.file and short_path(told.file, root)), why) for told, why in judged],
         tuple(_influences(plan)),
         tuple(opened_by_sharing(plan)),
         counts(plan),
         None if endings is None else tuple(endings),
     )
-
-
-def _short(told: Told, root: str) -> Told:
-    return told._replace(file=told.file and short_path(told.file, root))
 
 
 def _influences(plan: PlanDocument) -> Iterator[Influence]:

@@ -43,10 +43,9 @@ def _compared(
     if not alike:
         return _NOT_FORESEEN
     nearest = min(alike, key=lambda other: len(_different(came, facts(other))))
-    names = _different(came, facts(nearest))
-    told = "; ".join(
-        f"planned {name} {_shown(facts(nearest)[name])}, came {_shown(came[name])}" for name in names
-    )
+    was = facts(nearest)
+    names = _different(came, was)
+    told = "; ".join(f"planned {name} {_shown(was[name])}, came {_shown(came[name])}" for name in names)
     return f"{told} ({_why(nearest)})" if told else _NOT_FORESEEN
 
 
@@ -90,11 +89,7 @@ def _component_facts(component: ResolvedComponent) -> _Facts:
 
 def _same_program(process: ResolvedProcess, other: ResolvedProcess) -> bool:
     """The same program, started at the same place in the launch files."""
-    return (process.package, process.executable, process.location) == (
-        other.package,
-        other.executable,
-        other.location,
-    )
+    return process.program == other.program and process.location == other.location
 
 
 def _same_node(process: ResolvedProcess, other: ResolvedProcess) -> bool:

@@ -117,17 +117,12 @@ class PlannedGate:
             return self._provider.ensure(process)
         if process.kind == "executable" and process.enclave.attribute is process.enclave.argument is None:
             return self._provider.ensure_late(process)  # no ROS process by the launch file: nothing to sign
+        named = f"{process.program} ({process.fqn})" if process.fqn else process.program
+        what = f"{named} at {process.location}"
         if not self._allow_late:
-            raise LateProcess(
-                _refusal(
-                    f"{_named(process)} at {process.location}",
-                    compared(process, self._planned),
-                    "--allow-late provisions it when it appears",
-                )
-            )
-        self._say_late(
-            f"{_named(process)} at {process.location} was not foreseen: provisioned now (--allow-late)"
-        )
+            remedy = "--allow-late provisions it when it appears"
+            raise _late(what, compared(process, self._planned), remedy)
+        self._say_late(f"{what} was not foreseen: provisioned now (--allow-late)")
         grant = self._provider.ensure_late(process)
         self._processes.add(identity(process))
         return grant
@@ -136,25 +131,17 @@ class PlannedGate:
         """A container reads its permissions once, at its start: what comes late cannot be granted any
         more.
         """
-        late = (item for item in components if component_identity(item) not in self._components)
-        for component in late:
-            what = f"component {component.program} for {component.container}"
-            raise LateProcess(
-                _refusal(
-                    f"{what} at {component.location}",
-                    compared_component(component, self._planned_components),
-                    "its container has read its permissions already",
-                )
-            )
+        for component in components:
+            if component_identity(component) not in self._components:
+                what = f"component {component.program} for {component.container} at {component.location}"
+                difference = compared_component(component, self._planned_components)
+                raise _late(what, difference, "its container has read its permissions already")
 
     def launcher(self) -> StartAdditions | None:
         return self._provider.launcher()
 
 
-def _named(process: ResolvedProcess) -> str:
-    what = process.program
-    return f"{what} ({process.fqn})" if process.fqn else what
-
-
-def _refusal(what: str, difference: str, remedy: str) -> str:
-    return f"refused: {what} goes beyond the permissions that were signed: {difference}; {remedy}"
+def _late(what: str, difference: str, remedy: str) -> LateProcess:
+    return LateProcess(
+        f"refused: {what} goes beyond the permissions that were signed: {difference}; {remedy}"
+    )

@@ -157,8 +157,8 @@ class LiveLaunch:
         self._enter_shutdown()
 
     def say(self, level: Level, message: str) -> None:
-        """A line of the launch log, for a companion."""
-        self._say(level, message)
+        """A line of the launch log."""
+        self._log.log(level, "launch", message)
 
     def tell(self, event: RunEvent) -> None:
         """An event that a companion has seen."""
@@ -166,23 +166,21 @@ class LiveLaunch:
 
     def on_signal(self, number: Signals) -> None:
         if number is not SIGINT:
-            self._say("ERROR", f"received {number.name}, shutting down")
+            self.say("ERROR", f"received {number.name}, shutting down")
             self._failed = True
             self.shut_down(f"signal {number.name}")
         elif self._interrupted:
-            self._say("WARNING", "user interrupted with ctrl-c (SIGINT) again, passing it on...")
+            self.say("WARNING", "user interrupted with ctrl-c (SIGINT) again, passing it on...")
             for process in self._host.processes:
                 process.interrupt_again()
         else:
             self._interrupted = True
-            self._say("WARNING", "user interrupted with ctrl-c (SIGINT)")
+            self.say("WARNING", "user interrupted with ctrl-c (SIGINT)")
             self.shut_down("ctrl-c (SIGINT)", due_to_sigint=True)
 
     async def _run_until_over(self, tree: ProcessTree) -> int:
-        self._say("INFO", f"All log files can be found below {self._log.directory}")
-        self._say(
-            "INFO", f"Default logging verbosity is set to {'DEBUG' if self._settings.debug else 'INFO'}"
-        )
+        self.say("INFO", f"All log files can be found below {self._log.directory}")
+        self.say("INFO", f"Default logging verbosity is set to {'DEBUG' if self._settings.debug else 'INFO'}")
         companion = self._settings.companion
         recorded = companion is not None and companion.records
         self._observe(LaunchStarted(str(self._log.directory), recorded))
@@ -218,7 +216,7 @@ class LiveLaunch:
             asyncio.get_running_loop().call_later(min(left, 60.0), self._look_at_clock)
             return
         deadline.reached = True
-        self._say("WARNING", deadline.reason)
+        self.say("WARNING", deadline.reason)
         self.shut_down(deadline.reason)
 
     def _begin(self) -> None:
@@ -229,7 +227,7 @@ class LiveLaunch:
         self._context.launch_configurations.update(self._source.launch_configurations)
         self._context._event_queue.wake = self._wake.set
         self._context.register_event_handler(OnIncludeLaunchDescription())
-        self._context.register_event_handler(OnShutdown(on_shutdown=self._on_shutdown_event))
+        self._context.register_event_handler(OnShutdown(on_shutdown=lambda *_: self._enter_shutdown()))
         self._context.emit_event_sync(IncludeLaunchDescription(self.description()))
 
     def description(self) -> Any:
@@ -257,7 +255,7 @@ class LiveLaunch:
     def _say_event(self, event: Event) -> None:
         """With --debug, as launch does: each event when its turn comes."""
         name = getattr(event, "process_name", None)
-        self._say("DEBUG", f"processing event: {event.name}{f' of {name}' if name else ''}")
+        self.say("DEBUG", f"processing event: {event.name}{f' of {name}' if name else ''}")
 
     def _pending(self) -> list[asyncio.Future[Any]]:
         self._futures += self._context._completion_futures
@@ -279,9 +277,6 @@ class LiveLaunch:
         finally:
             waker.cancel()
 
-    def _on_shutdown_event(self, event: Shutdown, context: LaunchContext) -> None:
-        self._enter_shutdown()
-
     def _enter_shutdown(self) -> None:
         self._shutting_down = True
         self._context._set_is_shutdown(True)
@@ -298,15 +293,15 @@ class LiveLaunch:
         )
         message = f"Caught exception in launch (see debug for traceback): {told}"
         if self._settings.debug:
-            self._say("DEBUG", "".join(traceback.format_exception(error)))
-        self._say("ERROR", message)
+            self.say("DEBUG", "".join(traceback.format_exception(error)))
+        self.say("ERROR", message)
         self._observe(LaunchFailed(message))
         self.shut_down(message)
 
     def _on_failure(self, error: EnclaveLaunchError) -> None:
         """A process could not be secured: nothing that depends on it is started, the launch ends."""
         self._failed = True
-        self._say("CRITICAL", str(error))
+        self.say("CRITICAL", str(error))
         self._observe(LaunchFailed(str(error)))
         self.shut_down(str(error))
 
@@ -315,7 +310,7 @@ class LiveLaunch:
 
     def _exit_status(self) -> int:
         if self._host.failed:
-            self._say("ERROR", f"ended badly on their own: {', '.join(self._host.failed)}")
+            self.say("ERROR", f"ended badly on their own: {', '.join(self._host.failed)}")
         return 1 if self._failed or self._host.failed else 0
 
     def services(self) -> RosServices | None:
@@ -346,9 +341,6 @@ class LiveLaunch:
         )
         pressure.attach(log)
         return log
-
-    def _say(self, level: Level, message: str) -> None:
-        self._log.log(level, "launch", message)
 
 
 class DescribedLaunch(LiveLaunch):

@@ -54,13 +54,13 @@ class RosServices:
         self._closing = threading.Event()
         self._closed = False
         grant = grant or StartAdditions()
+        words = [word for word in grant.arguments if word != "--ros-args"]
         with environment_with(grant.environment):
             try:
                 self._ros = rclpy.Context()
-                rclpy.init(args=["--ros-args", *_without_marker(grant.arguments)], context=self._ros)
-                self._node = rclpy.create_node(
-                    LAUNCHER_NODE, context=self._ros
-                )  # the name its permissions are for
+                rclpy.init(args=["--ros-args", *words], context=self._ros)
+                # By the name that its permissions are for.
+                self._node = rclpy.create_node(LAUNCHER_NODE, context=self._ros)
             except Exception as error:
                 # A half installed ROS, a middleware that refuses: rclpy has no common class.
                 raise RuntimeFailure(
@@ -116,9 +116,8 @@ class RosServices:
         from composition_interfaces.srv import LoadNode
 
         for component in components:
-            response = self._call(
-                LoadNode, f"{component.container}/_container/load_node", _load_request(component)
-            )
+            service = f"{component.container}/_container/load_node"
+            response = self._call(LoadNode, service, _load_request(component))
             if response is None:
                 return
             self._report_load(component, response)
@@ -148,22 +147,24 @@ class RosServices:
         """The response; None when the launch ended first."""
         client = self._node.create_client(kind, service)
         try:
-            while not client.wait_for_service(timeout_sec=0.2):
-                if self._closing.is_set():
-                    self._tell("WARNING", f"Abandoning wait for the '{service}' service, due to shutdown.")
-                    return None
+            if not self._wait(lambda: client.wait_for_service(timeout_sec=0.2), f"'{service}' service"):
+                return None
             answered = threading.Event()
             future = client.call_async(request)
             future.add_done_callback(lambda _: answered.set())
-            while not answered.wait(0.2):
-                if self._closing.is_set():
-                    self._tell(
-                        "WARNING", f"Abandoning wait for the '{service}' service response, due to shutdown."
-                    )
-                    return None
+            if not self._wait(lambda: answered.wait(0.2), f"'{service}' service response"):
+                return None
             return future.result()
         finally:
             self._node.destroy_client(client)
+
+    def _wait(self, come: Callable[[], bool], what: str) -> bool:
+        """False when the launch ended first."""
+        while not come():
+            if self._closing.is_set():
+                self._tell("WARNING", f"Abandoning wait for the {what}, due to shutdown.")
+                return False
+        return True
 
     def _tell(self, level: Level, message: str) -> None:
         self._loop.call_soon_threadsafe(self._say, level, message)
@@ -190,7 +191,3 @@ def _parameters(values: Mapping[str, ParameterValue]) -> list[Any]:
         Parameter(name, value=list(value) if isinstance(value, tuple) else value).to_parameter_msg()
         for name, value in values.items()
     ]
-
-
-def _without_marker(arguments: Sequence[str]) -> list[str]:
-    return [word for word in arguments if word != "--ros-args"]

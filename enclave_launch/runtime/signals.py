@@ -28,7 +28,8 @@ def require_signals() -> None:
 def signals_to(on_signal: Callable[[Signals], None]) -> Iterator[None]:
     """SIGHUP only where nobody (nohup) asked us to ignore it."""
     loop = asyncio.get_running_loop()
-    numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if _wanted(number)]
+    ignored = {SIGHUP} if getsignal(SIGHUP) is SIG_IGN else set()
+    numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if number not in ignored]
     for number in numbers:
         loop.add_signal_handler(number, on_signal, number)
     try:
@@ -36,7 +37,3 @@ def signals_to(on_signal: Callable[[Signals], None]) -> Iterator[None]:
     finally:
         for number in numbers:
             loop.remove_signal_handler(number)
-
-
-def _wanted(number: Signals) -> bool:
-    return number is not SIGHUP or getsignal(number) is not SIG_IGN

@@ -28,10 +28,10 @@ class WardenProcess:
         _occupy_standard_descriptors()
         self.connection, theirs = socket.socketpair()
         with theirs, _terminal(interactive) as terminal:
-            handed = [theirs.fileno(), *terminal]
+            script, handed = str(Path(__file__).with_name("warden.py")), [theirs.fileno(), *terminal]
             try:
                 self.process = subprocess.Popen(
-                    [sys.executable, "-I", "-S", _script(), *map(str, handed)],
+                    [sys.executable, "-I", "-S", script, *map(str, handed)],
                     pass_fds=handed,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
@@ -72,7 +72,3 @@ def _occupy_standard_descriptors() -> None:
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(descriptor)
-
-
-def _script() -> str:
-    return str(Path(__file__).with_name("warden.py"))

@@ -122,11 +122,8 @@ class ZenohRouter:
         end = time.monotonic() + _PATIENCE
         answer = self._look()
         while answer is not RouterAnswer.PRESENT:
-            if (
-                self._failed.is_set()
-                or time.monotonic() > end
-                or (answer is RouterAnswer.STRANGER and not self._thread)
-            ):
+            stranger = answer is RouterAnswer.STRANGER and not self._thread
+            if stranger or self._failed.is_set() or time.monotonic() > end:
                 self._stop.set()
                 raise RuntimeFailure(self._failure(answer))
             time.sleep(_LOOK)
@@ -157,14 +154,11 @@ class ZenohRouter:
 
     def _start(self) -> None:
         if self._program is None:
-            raise RuntimeFailure(self._missing())
+            raise RuntimeFailure(missing_router(self._place.address, self._place.configuration))
         if wrong := self._place.differences():
             raise RuntimeFailure(f"no Zenoh router is started: {'; '.join(wrong)}")
         self._thread = threading.Thread(target=self._supervise, name="zenoh router", daemon=True)
         self._thread.start()
-
-    def _missing(self) -> str:
-        return missing_router(self._place.address, self._place.configuration)
 
     def _supervise(self) -> None:
         """The only thread that starts it: with this thread the kernel ends it, too."""

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.words import counted
 from enclave_launch.errors import UsageError
-from enclave_launch.recording.isolation import DEVICES_STAY_REAL, Isolation, isolate
+from enclave_launch.recording.isolation import DEVICES_STAY_REAL, isolate
 from enclave_launch.recording.learning import (
     LearntFolder,
     QuietWatch,
@@ -35,10 +35,8 @@ Start = Callable[["LaunchCompanion"], int]
 
 def seconds(text: str | None) -> float | None:
     """``10s``, ``2m`` as seconds. Raises ``UsageError``."""
-    if text is None:
-        return None
     try:
-        return parse_duration(text).total_seconds()
+        return None if text is None else parse_duration(text).total_seconds()
     except KeystoreError as error:
         raise UsageError(f"--learn-for {text}: not a duration; write for example 10s or 2m") from error
 
@@ -50,39 +48,23 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
     folder = Path(options.learn).absolute()
     prepare_folder(folder)
     isolation = isolate(options.learn_isolation)
-    _say(
-        f"learning: every process runs as ever{'' if options.secure else ', unsecured'}; {DEVICES_STAY_REAL}"
-    )
+    unsecured = "" if options.secure else ", unsecured"
+    _say(f"learning: every process runs as ever{unsecured}; {DEVICES_STAY_REAL}")
     _say(f"kept apart by: {isolation.value}")
-    status = _record(target, options, folder, isolation, patience, start)
-    if options.learn_parameters:
-        asked = questions(folder)
-        if asked:
-            _say(f"a second run, with marker values for {asked.shown}")
-            marked = MarkerRun(asked)
-            status = max(status, _record(target, options, folder, isolation, patience or 5.0, start, marked))
+
+    def record(patience: float | None, markers: MarkerRun | None = None) -> int:
+        distro = options.distro or os.environ.get("ROS_DISTRO", "")
+        run = new_run(target.launch_file, distro, isolation.value, secured=options.secure)
+        recording = Recording(run, [QuietWatch(patience)], markers)
+        status = start(recording)
+        keep_record(folder, run, recording.data)
+        return status
+
+    status = record(patience)
+    if options.learn_parameters and (asked := questions(folder)):
+        _say(f"a second run, with marker values for {asked.shown}")
+        status = max(status, record(patience or 5.0, MarkerRun(asked)))
     _report(write_manifests(folder), folder)
-    return status
-
-
-def _record(
-    target: LaunchTarget,
-    options: argparse.Namespace,
-    folder: Path,
-    isolation: Isolation,
-    patience: float | None,
-    start: Start,
-    markers: MarkerRun | None = None,
-) -> int:
-    run = new_run(
-        target.launch_file,
-        options.distro or os.environ.get("ROS_DISTRO", ""),
-        isolation.value,
-        secured=options.secure,
-    )
-    recording = Recording(run, [QuietWatch(patience)], markers)
-    status = start(recording)
-    keep_record(folder, run, recording.data)
     return status
 
 

@@ -7,7 +7,7 @@ import gc
 import os
 import re
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 from enclave_launch.boundary.command_line import complete, guarded
 from enclave_launch.boundary.light import TYPE_CHECKING
@@ -31,8 +31,6 @@ from enclave_launch.verb.usage import (
 )
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from enclave_launch.options import ResolveOptions, RunSettings
     from enclave_launch.plan import LaunchPlan
     from enclave_launch.runtime.companion import LaunchCompanion
@@ -47,19 +45,15 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv`` (default: the program's own). Gives the exit status, never a traceback
     for what a user can cause."""
     with safe_output():
-        return _guarded_main(argv)
-
-
-def _guarded_main(argv: Sequence[str] | None) -> int:
-    parser = build_parser()
-    complete(parser, _offer)
-    line = read_command_line(parser, argv)
-    before = gc.get_threshold()
-    gc.set_threshold(_ALLOCATIONS)
-    try:
-        return guarded("secure-launch", lambda: _checked_main(line, parser), EnclaveLaunchError)
-    finally:
-        gc.set_threshold(*before)
+        parser = build_parser()
+        complete(parser, _offer)
+        line = read_command_line(parser, argv)
+        before = gc.get_threshold()
+        gc.set_threshold(_ALLOCATIONS)
+        try:
+            return guarded("secure-launch", lambda: _main(line, parser), EnclaveLaunchError)
+        finally:
+            gc.set_threshold(*before)
 
 
 def _offer(parser: argparse.ArgumentParser) -> None:
@@ -68,17 +62,16 @@ def _offer(parser: argparse.ArgumentParser) -> None:
     offer_launches(parser)
 
 
-def _checked_main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
-    check_options(line, parser)
-    return _main(line.options)
-
-
-def _main(options: argparse.Namespace) -> int:
+def _main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
     from enclave_launch.prefixes import ament_prefixes
     from enclave_launch.verb.target import find_target
     from nodl.ament_index import search_prefixes
 
-    _check_prefixes(options.prefix)
+    check_options(line, parser)
+    options = line.options
+    for prefix in options.prefix:  # absent folders on AMENT_PREFIX_PATH are passed over, as by ament
+        if not prefix.is_dir():
+            raise UsageError(f"--prefix {prefix}: no such directory")
     if options.show_all_subprocesses_output:
         os.environ["OVERRIDE_LAUNCH_PROCESS_OUTPUT"] = "both"  # as ros2 launch says it to launch
     target = find_target(options.words, search_prefixes(options.prefix))
@@ -132,13 +125,6 @@ def _planned(target: LaunchTarget, options: argparse.Namespace, keystore: str | 
     return told_of_shares(plan, keystore)
 
 
-def _check_prefixes(prefixes: Iterable[Path]) -> None:
-    """Absent folders on ``AMENT_PREFIX_PATH`` are passed over, as by ament; one named here is a slip."""
-    for prefix in prefixes:
-        if not prefix.is_dir():
-            raise UsageError(f"--prefix {prefix}: no such directory")
-
-
 def _keystore(options: argparse.Namespace) -> str | None:
     """The keystore that ``--secure`` is to use. Raises ``UsageError`` when there is none."""
     if not options.secure:
@@ -152,14 +138,13 @@ def _resolve(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
     from enclave_launch.boundary.terminal import ProgressLine, wanted
     from enclave_launch.flow import resolve
 
-    chosen = resolve_options(options)
-    if not wanted(options.quiet):
-        return resolve(target.launch_file, target.arguments, options=chosen)
-    line = ProgressLine("analysing")
+    line = ProgressLine("analysing") if wanted(options.quiet) else None
     try:
-        return resolve(target.launch_file, target.arguments, options=chosen._replace(progress=line))
+        chosen = resolve_options(options)._replace(progress=line)
+        return resolve(target.launch_file, target.arguments, options=chosen)
     finally:
-        line.clear()
+        if line is not None:
+            line.clear()
 
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:
@@ -277,9 +262,8 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
         enclaves = [enclave.path for enclave in plan.derived.policy.enclaves]
         what = "enclave, node, process, topic, service or action"
         meant = did_you_mean(subject, explainable(plan))
-        raise UsageError(
-            f"{subject!r} is not an {what} of this launch{meant or '; enclaves: ' + ' '.join(enclaves)}"
-        )
+        others = meant or f"; enclaves: {' '.join(enclaves)}"
+        raise UsageError(f"{subject!r} is not an {what} of this launch{others}")
     return "\n".join(map(printable, lines)) + "\n"
 
 

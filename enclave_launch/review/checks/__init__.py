@@ -15,10 +15,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from enclave_launch.review.checks import enclaves, launched, meetings
-from enclave_launch.review.checks.rules import MEANINGS
+from enclave_launch.review.checks.rules import MEANINGS, RULES
 from enclave_launch.review.document import Told, plan_from_document
 
-__all__ = ["MEANINGS", "check_plan"]
+__all__ = ["MEANINGS", "RULES", "check_plan"]
 
 
 def check_plan(document: Mapping[str, Any]) -> list[Told]:

@@ -10,7 +10,7 @@ from enclave_launch.review.document import Told
 _OTHER_END = "look for a slip in the name, or accept it if the other end runs elsewhere"
 _PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
 _SHOWS_ALL = f"{_PROVISION}; secure-plan diff KEYSTORE ... shows all"
-_RULES: Mapping[str, tuple[str, str]] = {
+_TABLE: Mapping[str, tuple[str, str]] = {
     "no-publisher": ("A topic is subscribed and nothing in this plan publishes it.", _OTHER_END),
     "no-subscriber": ("A topic is published and nothing in this plan subscribes it.", _OTHER_END),
     "no-server": ("A service or action is called and nothing in this plan serves it.", _OTHER_END),
@@ -50,13 +50,11 @@ _RULES: Mapping[str, tuple[str, str]] = {
     "keystore-expires": ("Something that this plan needs of the keystore ends soon, or has ended.",
                          "secure-keystore renew"),
 }  # fmt: skip
-MEANINGS: Mapping[str, str] = {
-    **{code.value: code.meaning for code in Code},
-    **{code: meaning for code, (meaning, _) in _RULES.items()},
-}
+RULES: Mapping[str, str] = {code: meaning for code, (meaning, _) in _TABLE.items()}
+MEANINGS: Mapping[str, str] = {**{code.value: code.meaning for code in Code}, **RULES}
 """Of every code that planning or a check can give."""
 
 
 def finding(code: str, subject: str, text: str, place: tuple[str | None, int] = (None, 0)) -> Told:
     """A warning of a check."""
-    return Told("warning", code, subject, *place, text, _RULES[code][1])
+    return Told("warning", code, subject, *place, text, _TABLE[code][1])

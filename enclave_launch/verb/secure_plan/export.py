@@ -27,6 +27,7 @@ from enclave_launch.verb.secure_plan.plans import read_plan
 if TYPE_CHECKING:
     from enclave_launch.deployment.deployment import Deployment, File
     from enclave_launch.deployment.placement import Placement
+    from enclave_launch.deployment.processes import DeployedProcess
     from enclave_launch.deployment.semantics import Engine, Unexpressed
 
 ENGINES = ("systemd", "compose", "kubernetes")
@@ -71,18 +72,13 @@ def run(options: argparse.Namespace) -> int:
     _refuse_lost(lost, engine, options.accept_unexpressed)
     _refuse_nowhere(placement)
     several = list(placement.hosts) != [ONLY_HOST]
-    changed: list[str] = []
-    made = {
-        host: _files(
-            engine, _deployment(document, placement, host if several else None, host, lost, options), options
-        )
-        for host in placement.hosts
-        if placement.hosts[host]
-    }
-    for host, files in made.items():
-        folder = options.output / host if several else options.output
-        names = write_folder(folder, files)
-        changed += [str(folder / name) for name in names]
+    made = {}
+    for host, own in placement.hosts.items():
+        if own:
+            folder = options.output / host if several else options.output
+            deployment = _deployment(document, own, host if several else None, lost, options)
+            made[folder] = _files(deployment, options)
+    changed = [str(folder / name) for folder, files in made.items() for name in write_folder(folder, files)]
     sys.stdout.write("".join(f"{printable(name)}\n" for name in changed) or "nothing changed\n")
     return 0
 
@@ -135,9 +131,8 @@ def _refuse_nowhere(placement: Placement) -> None:
 
 def _deployment(
     document: Mapping[str, Any],
-    placement: Placement,
+    processes: tuple[DeployedProcess, ...],
     host: str | None,
-    key: str,
     lost: tuple[Unexpressed, ...],
     options: argparse.Namespace,
 ) -> Deployment:
@@ -149,7 +144,6 @@ def _deployment(
     from enclave_launch.review.document import plan_from_document
     from enclave_launch.review.information_flow import flow_graph
 
-    processes = placement.hosts[key]
     graph = flow_graph(plan_from_document(document))
     notes = differences(document, Engine(options.format))
     for note in notes:
@@ -175,22 +169,17 @@ def _stem(words: list[str]) -> str:
     return Path(files[-1]).name.partition(".")[0]
 
 
-def _files(engine: Engine, deployment: Deployment, options: argparse.Namespace) -> dict[str, File]:
-    from enclave_launch.deployment.semantics import Engine
-
-    if engine is Engine.SYSTEMD:
+def _files(deployment: Deployment, options: argparse.Namespace) -> dict[str, File]:
+    keystore = options.host_keystore
+    if options.format == "systemd":
         from enclave_launch.deployment.systemd import systemd_files
 
         parameters = f"/etc/ros/{deployment.name}/parameters"
-        return systemd_files(
-            deployment, keystore=options.host_keystore, parameters=parameters, setup=tuple(options.setup)
-        )
-    if engine is Engine.COMPOSE:
+        return systemd_files(deployment, keystore=keystore, parameters=parameters, setup=tuple(options.setup))
+    if options.format == "compose":
         from enclave_launch.deployment.compose import compose_files
 
-        return compose_files(
-            deployment, image=options.image, user=options.user, keystore=options.host_keystore
-        )
+        return compose_files(deployment, image=options.image, user=options.user, keystore=keystore)
     from enclave_launch.deployment.kubernetes import kubernetes_files
 
     return kubernetes_files(deployment, image=options.image)
