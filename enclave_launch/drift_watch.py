@@ -15,7 +15,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -26,14 +26,13 @@ from enclave_launch.drift.finding import DriftFinding, Level
 from enclave_launch.drift.steady import SettlingTimes, Steady
 from enclave_launch.drift.text import finding_document, finding_text
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.run_events import ProcessStarted
 from nodl.graph.json_form import graph_from_document
 from nodl.graph.model import Graph
 
 if TYPE_CHECKING:
-    from enclave_launch.process import ResolvedComponent, ResolvedProcess
     from enclave_launch.runtime.companion import LaunchControl
-    from enclave_launch.runtime.process_tree import ProcessSpec
     from enclave_launch.runtime.run_events import RunEvent
 
 _INTERVAL = 1.0  # seconds between two comparisons
@@ -51,8 +50,8 @@ class WatchOptions(NamedTuple):
     patience: SettlingTimes = SettlingTimes()
 
 
-class DriftWatch:
-    """A ``LaunchCompanion``. ``alarms``: how many there were."""
+class DriftWatch(LaunchCompanion):
+    """``alarms``: how many there were."""
 
     def __init__(self, document: Mapping[str, Any], options: WatchOptions) -> None:
         self._options = options
@@ -64,11 +63,6 @@ class DriftWatch:
         self._task: asyncio.Task[None] | None = None
         self._started: set[int] = set()
         self.alarms = 0
-
-    @property
-    def records(self) -> bool:
-        """What it sees are graphs, later than endpoints are made."""
-        return False
 
     def status(self, of_launch: int) -> int:
         """The exit status of the whole: the launch's, or 1 where that is 0 and there were alarms."""
@@ -85,15 +79,9 @@ class DriftWatch:
             raise
         self._task = asyncio.get_running_loop().create_task(self._watch())
 
-    def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
-        return spec
-
     def happened(self, event: RunEvent) -> None:
         if isinstance(event, ProcessStarted):
             self._started.add(event.pid)
-
-    def loading(self, components: Sequence[ResolvedComponent]) -> None:
-        """What is loaded was planned."""
 
     async def closed(self) -> None:
         if self._task is not None:

@@ -9,8 +9,8 @@ from collections.abc import Iterable, Mapping
 
 import enclave_launch.plan_remarks as plan_remarks
 from enclave_launch.admission import prefix_refusals, refusals, remarks
-from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.middleware import middleware_of
+from enclave_launch.admission.variables import domain_of
 from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.diagnostics import Code
 from enclave_launch.diagnostics.evaluation import not_foreseeable

@@ -70,12 +70,13 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
 def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
     """What is to run, but for who watches it and its warden."""
     own = frozenset[str]() if isinstance(launch, _UNSECURED) else launch.secret_variables
+    needed = None if isinstance(launch, LaunchSource) else bool(_evaluated(launch).evaluation.launcher_calls)
     return partial(
         LiveLaunch,
         _source(launch),
         settings._replace(secrets=settings.secrets | own, companion=_companion(launch, settings)),
         gate=_gate(launch, settings),
-        needs_ros_services=_needs_ros_services(launch),
+        needs_ros_services=needed,
     )
 
 
@@ -104,19 +105,13 @@ def _check_programs(launch: Launch) -> None:
 
 
 def _source(launch: Launch) -> LaunchSource:
-    if isinstance(launch, LaunchSource):
-        return launch
+    return launch if isinstance(launch, LaunchSource) else _evaluated(launch).source
+
+
+def _evaluated(launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch) -> EvaluatedLaunch:
     if isinstance(launch, EvaluatedLaunch):
-        return launch.source
-    return (launch if isinstance(launch, LaunchPlan) else launch.plan).planner.source
-
-
-def _needs_ros_services(launch: Launch) -> bool | None:
-    """``None``: nobody knows before it is visited."""
-    if isinstance(launch, LaunchSource):
-        return None
-    evaluated = launch if isinstance(launch, (EvaluatedLaunch, LaunchPlan)) else launch.plan
-    return bool(evaluated.evaluation.launcher_calls)
+        return launch
+    return (launch if isinstance(launch, LaunchPlan) else launch.plan).evaluated
 
 
 def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:

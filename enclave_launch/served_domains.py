@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from enclave_launch.admission.domains import domain_of
+from enclave_launch.admission.variables import domain_of
 from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import domain_not_served

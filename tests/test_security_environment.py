@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.admission.domains import domain_of
+from enclave_launch.admission.variables import domain_of
 from enclave_launch.enclave import AssignmentReason, EnclaveAssignment
 from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlannedProcess

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from enclave_launch.admission.domains import domain_of
 from enclave_launch.admission.middleware import VARIABLE, ZENOH, Vendor, middleware_of, vendor_of, why_not
-from enclave_launch.admission.variables import overridden, own_security, preloaded
+from enclave_launch.admission.variables import domain_of, overridden, own_security, preloaded
 from enclave_launch.admission.wrappers import obstacles
 from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.diagnostics import Diagnostic

@@ -1,4 +1,4 @@
-"""Variables of a process that decide whether its enclave is used: those we set, and those that could undo them.
+"""Variables of a process that decide whether its enclave is used: those we set, those that could undo them, its domain.
 
 The runtime lays its own values over ``ROS_SECURITY_*``, so a launch file cannot take the enclave away through them; it
 is told that they have no effect. Configurations of a DDS with security properties of their own are refused: which of
@@ -12,7 +12,11 @@ from collections.abc import Iterator, Mapping
 
 from enclave_launch.boundary.files import text_or_nothing
 from enclave_launch.boundary.light import NamedTuple, late_pattern
+from enclave_launch.errors import UsageError
+from keystore.errors import printable
+from keystore.formats.domains import HIGHEST_ID
 
+DOMAIN = "ROS_DOMAIN_ID"
 OURS = (
     "ROS_SECURITY_ENABLE",
     "ROS_SECURITY_KEYSTORE",
@@ -74,3 +78,13 @@ def _documents(value: str) -> Iterator[str]:
         yield value
     else:
         yield from (part for part in re.split("[,;]", value) if part)
+
+
+def domain_of(environment: Mapping[str, str]) -> int:
+    """The DDS domain of a process: a plain number, and no value for 0 (rcl ``domain_id.c``).
+
+    Raises ``UsageError`` for what rcl, or Cyclone DDS in a governance, would refuse."""
+    text = environment.get(DOMAIN) or "0"
+    if re.fullmatch("[0-9]{1,3}", text) is None or int(text) > HIGHEST_ID:
+        raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
+    return int(text)

@@ -1,8 +1,7 @@
 """What processes ask of librcl, recorded while they run: one recorder, used to learn, to audit and to explain.
 
     recorder.c       the library for LD_PRELOAD
-    build.py         its build, once for each machine and source                  runs the compiler
-    environment.py   the recorder in the environment of a process, at the very end
+    build.py         its build, once for each machine and source, and its way in  runs the compiler
     programs.py      programs that cannot be recorded, told before they start     reads their heads
     isolation.py     a launch for learning kept apart from other robots           changes our own process
     recording.py     the record of one launch, watched while it grows             reads and writes the record

@@ -2,6 +2,10 @@
 
 Touches the world: runs ``cc`` (or ``$CC``), writes one file. The name of the file holds the hash of the source, so
 that another version of this project builds its own.
+
+It gets into a process by the environment. A launch file may set ``LD_PRELOAD`` itself, and what it sets replaces what
+was inherited: so the recorder is added last, behind what is there. A program built with the dynamic runtime of
+AddressSanitizer ends at once unless that runtime is the first library of all.
 """
 
 from __future__ import annotations
@@ -9,14 +13,18 @@ from __future__ import annotations
 import hashlib
 import os
 import platform
+import re
 import shutil
 import stat
 import subprocess
 import tempfile
+from collections.abc import Mapping
 from pathlib import Path
 
 from enclave_launch.errors import RuntimeFailure
 
+RECORD_VARIABLE = "ENCLAVE_LAUNCH_RECORD"
+PRELOAD = "LD_PRELOAD"
 SOURCE = Path(__file__).with_name("recorder.c")
 _FLAGS = ("-std=gnu11", "-shared", "-fPIC", "-O2", "-Wl,-z,now")
 
@@ -75,3 +83,13 @@ def _build(wanted: Path) -> None:
             built.rename(wanted)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise RuntimeFailure(f"the recorder cannot be built in {wanted.parent}: {error}") from error
+
+
+def with_recorder(
+    environment: Mapping[str, str], library: str, record: str, sanitizer: str | None = None
+) -> dict[str, str]:
+    """``environment`` with the recorder; ``sanitizer`` is the runtime that must come first, if the program has one."""
+    present = [name for name in re.split(r"[ :]+", environment.get(PRELOAD, "")) if name]
+    first = [sanitizer] if sanitizer and not any("libasan" in name for name in present) else []
+    others = [name for name in present if name != library]
+    return {**environment, PRELOAD: ":".join([*first, *others, library]), RECORD_VARIABLE: record}

@@ -20,8 +20,7 @@ from typing import NamedTuple
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from enclave_launch.recording.build import recorder_library
-from enclave_launch.recording.environment import RECORD_VARIABLE, with_recorder
+from enclave_launch.recording.build import RECORD_VARIABLE, recorder_library, with_recorder
 from enclave_launch.recording.listeners import EndpointEvents, Listener
 from enclave_launch.recording.markers import Marked, MarkerRun
 from enclave_launch.recording.programs import look_at_command

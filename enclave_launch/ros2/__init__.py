@@ -4,7 +4,6 @@
     attributes      ``enclave`` on nodes, executables and namespaces, ``push_ros_enclave``   (launch.frontend)
     secured         a ``launch.LaunchDescription`` in a program of your own, under upstream's engine
     session         the enclaves of such a description
-    context         where that session is kept
     observation     what upstream's actions are about to start, as our ``ResolvedProcess``
     node_action     ``launch_ros.node_action``: the enclave of each node before its process
 

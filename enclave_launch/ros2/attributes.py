@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import launch_ros.actions
 from launch import Action
@@ -24,9 +24,13 @@ from launch.descriptions import Executable
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
-from enclave_launch.ros2.context import session_of
 from enclave_launch.ros_rules.namespaces import enclave_scope, push_enclave_scope
 
+if TYPE_CHECKING:
+    from enclave_launch.ros2.session import EnclaveSession
+
+KEY = "enclave_launch_session"
+"""Where a secured launch is kept: in launch's own context, so that several launches in one program stay apart."""
 ATTRIBUTE = "_enclave_launch_enclave"
 GRANT = "_enclave_launch_grant"
 WRAPPED = "_enclave_launch_wrapped"
@@ -51,6 +55,12 @@ class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
 
     def execute(self, context: Any) -> None:
         push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.enclave))
+
+
+def session_of(context: Any) -> EnclaveSession | None:
+    """None in a launch that is not secured by us."""
+    session: EnclaveSession | None = context.get_locals_as_dict().get(KEY)
+    return session
 
 
 def enclave_attribute(action: Any, context: Any) -> str | None:

@@ -9,7 +9,6 @@ from typing import Any
 from launch_ros.actions.node import NodeActionExtension
 
 from enclave_launch.ros2 import attributes  # accepted by the time a node is executed, too
-from enclave_launch.ros2.context import session_of
 
 
 class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # untyped without ROS
@@ -19,7 +18,7 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
         self, context: Any, ros_specific_arguments: dict[str, Any], node_action: Any
     ) -> tuple[list[Any], dict[str, Any]]:
         """:raises EnclaveLaunchError: the node cannot be secured; launch reports it and shuts down."""
-        session = session_of(context)
+        session = attributes.session_of(context)
         if session is None:
             return [], ros_specific_arguments
         from launch.substitutions import TextSubstitution

@@ -29,22 +29,26 @@ class LaunchControl(Protocol):
 
 class LaunchCompanion(Protocol):
     """``opened`` comes before the first process, ``closed`` after the last one has ended. It hears of an event before
-    others do: what it tells when ``LaunchOver`` comes is still heard before that."""
+    others do: what it tells when ``LaunchOver`` comes is still heard before that. Who inherits from this does nothing
+    where it does not say what."""
 
     @property
     def records(self) -> bool:
         """Once opened: will it tell endpoints as they are made?"""
+        return False
 
     def opened(self, launch: LaunchControl) -> None:
         """:raises EnclaveLaunchError: it cannot go along, so nothing is started."""
 
     def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
         """What to start, when everything else has been decided; asked before each start."""
+        return spec
 
     def happened(self, event: RunEvent) -> None: ...
 
     def loading(self, components: Sequence[ResolvedComponent]) -> None:
         """Components are about to be loaded into a container that runs."""
+        return
 
     async def closed(self) -> None: ...
 

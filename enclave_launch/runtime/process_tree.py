@@ -50,19 +50,14 @@ class ProcessSpec(NamedTuple):
         :raises OSError: EINVAL, with the text that no process can be started with: a NUL character, an environment
             variable without a name or with ``=`` in it, a character that the locale's encoding does not have.
         """
-        for name in self.environment:
+        environment = {}
+        for name, value in self.environment.items():
             if not name or "=" in name:
                 raise OSError(errno.EINVAL, "the name of an environment variable is empty or holds '='", name)
-        return (
-            [_encoded(word, f"argument {number}") for number, word in enumerate(self.argv)],
-            {
-                _encoded(name, "an environment variable's name"): _encoded(
-                    value, f"environment variable {name}"
-                )
-                for name, value in self.environment.items()
-            },
-            _encoded(self.cwd or os.getcwd(), "the working directory"),
-        )
+            encoded = _encoded(name, "an environment variable's name")
+            environment[encoded] = _encoded(value, f"environment variable {name}")
+        words = [_encoded(word, f"argument {number}") for number, word in enumerate(self.argv)]
+        return words, environment, _encoded(self.cwd or os.getcwd(), "the working directory")
 
 
 def _encoded(text: str, what: str) -> bytes:

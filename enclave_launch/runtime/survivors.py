@@ -19,11 +19,11 @@ from pathlib import Path
 from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.warden import (
     PR_SET_CHILD_SUBREAPER,
+    asked,
     children_by_parent,
     descendants,
     kill_all,
     load_libc,
-    session_of,
 )
 
 PR_GET_CHILD_SUBREAPER = 37  # linux/prctl.h
@@ -70,7 +70,7 @@ class Survivors:
 
     def _adopted(self) -> set[int]:
         children = children_by_parent().get(os.getpid(), set()) - self._own - _wardens
-        return {pid for pid in children if session_of(pid) not in (os.getsid(0), -1)}
+        return {pid for pid in children if asked(os.getsid, pid) not in (os.getsid(0), -1)}
 
 
 def _has_ended(child: int) -> bool:

@@ -47,7 +47,7 @@ import time
 
 TYPE_CHECKING = False  # ``typing`` costs start-up time and is not needed to run
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
     from typing import Any
 
 HEADER = struct.Struct("!I")
@@ -178,11 +178,10 @@ class Warden:
         kind, identifier, *rest = message
         if kind == "spawn":
             streams, self.descriptors = self.descriptors[:3], self.descriptors[3:]
-            argv, env, cwd = rest
             try:
-                self.spawn(identifier, argv, env, cwd, streams)
+                self.spawn(identifier, rest, streams)
             except OSError as error:  # no more processes or descriptors
-                self.send("failed", identifier, error.errno or errno.EAGAIN, argv[0])
+                self.send("failed", identifier, error.errno or errno.EAGAIN, rest[0][0])
             finally:
                 for descriptor in streams:
                     os.close(descriptor)
@@ -198,16 +197,15 @@ class Warden:
         with contextlib.suppress(OSError):  # the launcher is gone: receive() will notice
             self.connection.sendall(HEADER.pack(len(data)) + data)
 
-    def spawn(
-        self, identifier: int, argv: list[bytes], env: dict[bytes, bytes], cwd: bytes, streams: list[int]
-    ) -> None:
+    def spawn(self, identifier: int, program: list[Any], streams: list[int]) -> None:
+        """``program``: argv, env, cwd."""
         parent = os.getpid()
         report, report_writer = os.pipe()  # close-on-exec: end of file means that exec succeeded
         with open(report, "rb") as reader:
             try:
                 pid = os.fork()
                 if pid == 0:
-                    become(argv, env, cwd, streams, report_writer, parent, own_session=self.terminal is None)
+                    become(program, streams, report_writer, parent, own_session=self.terminal is None)
             finally:
                 os.close(report_writer)
             failure = reader.read()
@@ -237,8 +235,9 @@ class Warden:
     def sweep(self, leader: int) -> None:
         """SIGKILL to what a child left running in its session, or group, when it ended."""
         if leader not in self.identifiers:
-            belongs = session_of if self.terminal is None else group_of
-            kill_all({pid for pid in descendants(os.getpid()) if belongs(pid) == leader}, signal.SIGKILL)
+            belongs = os.getsid if self.terminal is None else os.getpgid
+            left = {pid for pid in descendants(os.getpid()) if asked(belongs, pid) == leader}
+            kill_all(left, signal.SIGKILL)
 
     def reap(self) -> bool:
         """Collect all that ended. False when nothing is left to wait for."""
@@ -287,17 +286,9 @@ class Warden:
                     os.killpg(pid, number)
 
 
-def become(
-    argv: list[bytes],
-    env: dict[bytes, bytes],
-    cwd: bytes,
-    streams: list[int],
-    report: int,
-    parent: int,
-    *,
-    own_session: bool,
-) -> None:
+def become(program: list[Any], streams: list[int], report: int, parent: int, *, own_session: bool) -> None:
     """In the forked child: turn into the program; on failure tell why through ``report`` and end."""
+    argv, env, cwd = program
     path = argv[0]
     try:
         if own_session:
@@ -334,18 +325,10 @@ def move_above(streams: list[int]) -> list[int]:
     ]
 
 
-def session_of(pid: int) -> int:
-    """The session of ``pid``; -1 when it is gone."""
+def asked(call: Callable[[int], int], pid: int) -> int:
+    """``os.getsid`` or ``os.getpgid`` of ``pid``; -1 when it is gone."""
     try:
-        return os.getsid(pid)
-    except ProcessLookupError:
-        return -1
-
-
-def group_of(pid: int) -> int:
-    """The process group of ``pid``; -1 when it is gone."""
-    try:
-        return os.getpgid(pid)
+        return call(pid)
     except ProcessLookupError:
         return -1
 

@@ -142,7 +142,7 @@ def test_without_the_variable_the_library_does_nothing(run_recorded: RunRecorded
 
 
 def test_a_library_that_the_launch_preloads_stays(run_recorded: RunRecorded) -> None:
-    from enclave_launch.recording.environment import with_recorder
+    from enclave_launch.recording.build import with_recorder
 
     worn = with_recorder({"LD_PRELOAD": "/lib/a.so:/lib/b.so"}, "/r.so", "/record")
     assert worn["LD_PRELOAD"] == "/lib/a.so:/lib/b.so:/r.so"

@@ -15,9 +15,9 @@ import pytest
 
 from enclave_launch.flow import provision, resolve
 from enclave_launch.options import ResolveOptions
+from enclave_launch.report.evidence.documents import PAYLOAD_TYPE
 from enclave_launch.report.evidence.matrix import csv_text, rows
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS
-from enclave_launch.report.evidence.statement import PAYLOAD_TYPE
 from enclave_launch.report.evidence.surface import surface_document
 from enclave_launch.report.graph import plan_graph
 from enclave_launch.verb.secure_plan import main

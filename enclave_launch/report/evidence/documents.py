@@ -1,8 +1,13 @@
-"""All files of the evidence, from values: file name -> bytes. The same values give the same bytes. Pure."""
+"""All files of the evidence, from values: file name -> bytes. The same values give the same bytes. Pure.
+
+Source of the statement about them: in-toto attestation framework, spec v1 (statement.md, resource_descriptor.md) and
+its predicate ``test-result`` v0.1: the files are the subjects, the checks the tests.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import hashlib
+from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
 from enclave_launch import __version__
@@ -10,11 +15,15 @@ from enclave_launch.boundary.terminal import json_text
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.evidence import matrix
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS
-from enclave_launch.report.evidence.summary import summary
 from enclave_launch.report.evidence.surface import surface_document
 from enclave_launch.report.html.page import html_report
-from enclave_launch.report.review_text import findings_document
+from enclave_launch.report.markdown import code, escaped
+from enclave_launch.report.review_text import Judged, findings_document
 from enclave_launch.report.sarif import sarif_document
+
+PAYLOAD_TYPE = "application/vnd.in-toto+json"
+STATEMENT = "https://in-toto.io/Statement/v1"
+PREDICATE = "https://in-toto.io/attestation/test-result/v0.1"
 
 
 class Examined(NamedTuple):
@@ -114,3 +123,57 @@ def _not_checked(examined: Examined) -> list[str]:
         "the host: its users, its updates, its physical protection",
         "what runs outside of this launch file",
     ]
+
+
+def summary(contents: ReportContents, scope: Mapping[str, Any], at: str) -> str:
+    """``README.md`` of the folder: what it is, which part supports which requirement, what was checked and what not."""
+    return "\n".join(_lines(contents, scope, at)) + "\n"
+
+
+def _lines(contents: ReportContents, scope: Mapping[str, Any], at: str) -> Iterator[str]:
+    open_ones = [told for told, accepted in contents.judged if accepted is None]
+    yield from (f"# Evidence for {escaped(contents.title)}", "", DISCLAIMER, "")
+    yield f"Examined {escaped(at)} by {escaped(scope['tool'])}. Findings: {len(open_ones)} open,"
+    yield f"{len(contents.judged) - len(open_ones)} accepted. `report.html` shows all of it; it needs no network."
+    for part in PARTS:
+        yield from ("", f"## {part.name}", "", f"{part.shows[:1].upper()}{part.shows[1:]}.", "")
+        yield f"Files: {', '.join(f'`{name}`' for name in part.files)}. Supports:"
+        yield from ("", *(f"- {each}" for each in part.supports))
+    yield from ("", "## Not checked", "", *(f"- {escaped(each)}" for each in scope["not_checked"]))
+    if scope["gaps"]:
+        yield from ("", "Gaps of the plan:", "", *(f"- {escaped(each)}" for each in scope["gaps"]))
+    accepted = [(told, reason) for told, reason in contents.judged if reason is not None]
+    if accepted:
+        yield from ("", "## Accepted exceptions", "")
+        yield from (
+            f"- {code(told.code)} {escaped(told.text)}: {escaped(reason)}" for told, reason in accepted
+        )
+    yield from ("", "## Check it", "")
+    yield "`statement.json` is an in-toto statement that names every file by its SHA-256; `statement.dsse.json` is the "
+    yield "same, signed, where a key was given. Apart from a signature, the same input and time give the same bytes."
+
+
+def statement(files: Mapping[str, bytes], judged: Judged, checked: list[str]) -> bytes:
+    """``judged``: the findings; ``checked``: the code of every check that was made."""
+    failed, warned = _codes(judged, "error"), _codes(judged, "warning")
+    content: dict[str, Any] = {
+        "_type": STATEMENT,
+        "subject": [_resource(name, data) for name, data in sorted(files.items())],
+        "predicateType": PREDICATE,
+        "predicate": {
+            "result": "FAILED" if failed else "WARNED" if warned else "PASSED",
+            "configuration": [_resource("plan.json", files["plan.json"])],
+            "passedTests": sorted(set(checked) - failed - warned),
+            "warnedTests": sorted(warned - failed),
+            "failedTests": sorted(failed),
+        },
+    }
+    return f"{json_text(content, indent=2)}\n".encode()
+
+
+def _codes(judged: Judged, severity: str) -> set[str]:
+    return {told.code for told, accepted in judged if accepted is None and told.severity == severity}
+
+
+def _resource(name: str, data: bytes) -> dict[str, Any]:
+    return {"name": name, "digest": {"sha256": hashlib.sha256(data).hexdigest()}}

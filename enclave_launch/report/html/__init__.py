@@ -2,6 +2,5 @@
 
 page.py     values -> the page: everything that a launch file chose is text, never markup
 tables.py   the tables, readable without JavaScript and on paper
-data.py     what the page's script draws and searches, as JSON
 assets/     style sheet, script and the graph library
 """

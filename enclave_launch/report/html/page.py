@@ -8,13 +8,15 @@ import base64
 import hashlib
 import re
 from pathlib import Path
+from typing import Any
 
 from enclave_launch import __version__
+from enclave_launch.boundary.terminal import json_text, printable
 from enclave_launch.boundary.words import counted
 from enclave_launch.report.contents import ReportContents
+from enclave_launch.report.graph import OUTWARD, ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.html import tables
-from enclave_launch.report.html.data import graph_data
-from enclave_launch.report.html.markup import script_data, text
+from enclave_launch.report.html.tables import text
 
 ASSETS = Path(__file__).parent / "assets"
 _SOURCE_MAP = re.compile(r"^//# sourceMappingURL=.*$", re.MULTILINE)
@@ -40,6 +42,54 @@ def html_report(contents: ReportContents) -> str:
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}</head>\n<body>\n{_body(contents)}{data}{code}'
         "</body>\n</html>\n"
     )
+
+
+def script_data(content: object) -> str:
+    """JSON for a ``script`` element of a data type: no ``<`` in it can end the element or begin a comment (HTML
+    standard, "Restrictions for contents of script elements")."""
+    escaped = json_text(content, separators=(",", ":"))
+    return escaped.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+
+
+def graph_data(graph: EnclaveGraph) -> dict[str, Any]:
+    """What the script draws, searches and shows on a click: lists of the graph's elements, which refer to each other by
+    number. Names are made printable here, once, so that the script shows what the tables show."""
+    return {
+        "enclaves": [printable(path) for path in graph.enclaves],
+        "members": [
+            {
+                "name": printable(member.name),
+                "enclave": printable(member.enclave),
+                "namespace": printable(member.namespace),
+                "program": printable(member.program),
+                "place": printable(member.launched_at),
+                "known": member.known,
+            }
+            for member in graph.members
+        ],
+        "channels": [
+            {
+                "kind": channel.kind,
+                "name": printable(channel.name),
+                "types": [printable(one) for one in channel.types],
+                "pattern": channel.is_pattern,
+            }
+            for channel in graph.channels
+        ],
+        "uses": [_use(use) for use in graph.uses],
+    }
+
+
+def _use(use: ChannelUse) -> dict[str, Any]:
+    return {
+        "member": use.member,
+        "enclave": printable(use.enclave),
+        "channel": use.channel,
+        "operation": use.operation.replace("_", " "),
+        "out": use.operation in OUTWARD,
+        "builtIn": use.built_in,
+        "why": list(dict.fromkeys(printable(evidence_text(reason)) for reason in use.reasons)),
+    }
 
 
 def _policy(scripts: list[str], style: str) -> str:

@@ -1,19 +1,40 @@
-"""The tables of the report as HTML. Each function gives one section."""
+"""The tables of the report as HTML, a function for each section.
+
+Text that others chose becomes HTML by ``text``: everything that enters a page goes through it.
+"""
 
 from __future__ import annotations
 
+import html
 from collections.abc import Iterable, Iterator
 
+from enclave_launch.boundary.terminal import printable
 from enclave_launch.boundary.words import counted
 from enclave_launch.report.contents import Influence, ReportContents
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, evidence_text
-from enclave_launch.report.html.markup import row, table, text
 from enclave_launch.report.review_text import step_text
 from enclave_launch.review.checks.keystore import Ending
 from enclave_launch.review.document import Told
 
 SOON = 30
 """Days within which an end is marked."""
+
+
+def text(value: object) -> str:
+    """``value`` as text of an element or of a quoted attribute; what is not printable is shown as an escape."""
+    return html.escape(printable(str(value)))
+
+
+def row(cells: Iterable[str], *, attributes: str = "") -> str:
+    """A table row of cells that are HTML already."""
+    return f"<tr{attributes}>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
+
+
+def table(caption: str, headings: Iterable[str], rows: Iterable[str]) -> str:
+    """``caption`` and ``headings`` are our own words."""
+    head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
+    body = "\n".join(rows)
+    return f"<table><caption>{caption}</caption><thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>\n"
 
 
 def permissions(contents: ReportContents) -> str:

@@ -48,8 +48,7 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Write the files. Returns 1 when the checks find an error that nobody accepted."""
-    from enclave_launch.report.evidence.documents import evidence_files
-    from enclave_launch.report.evidence.statement import statement
+    from enclave_launch.report.evidence.documents import evidence_files, statement
 
     folder = _new_folder(options.output)
     examined = _examine(options)
@@ -155,7 +154,7 @@ def _bill_of_materials(file: Path) -> dict[str, Any]:
 
 
 def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
-    from enclave_launch.report.evidence.statement import PAYLOAD_TYPE
+    from enclave_launch.report.evidence.documents import PAYLOAD_TYPE
     from keystore.signing.ca_access import CaAccess, Secret
     from keystore.signing.dsse import envelope, envelope_text
     from keystore.signing.signer import open_signer
