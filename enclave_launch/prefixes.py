@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from contextlib import AbstractContextManager
 
+from enclave_launch.boundary.environment import environment_with
 from enclave_launch.boundary.light import TYPE_CHECKING
 from nodl.ament_index import PREFIX_VARIABLE
 
@@ -13,23 +14,17 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 
-@contextmanager
-def ament_prefixes(prefixes: Sequence[Path | str]) -> Iterator[None]:
+def ament_prefixes(prefixes: Sequence[Path | str]) -> AbstractContextManager[None]:
     """Within the block ``prefixes`` come before the rest of ``AMENT_PREFIX_PATH``, for us and for what we start."""
-    previous = os.environ.get(PREFIX_VARIABLE)
-    prepend_prefixes(prefixes)
-    try:
-        yield
-    finally:
-        if previous is not None:
-            os.environ[PREFIX_VARIABLE] = previous
-        elif prefixes:
-            del os.environ[PREFIX_VARIABLE]
+    return environment_with(_prepended(prefixes))
 
 
 def prepend_prefixes(prefixes: Sequence[Path | str]) -> None:
     """Put ``prefixes`` before the rest of ``AMENT_PREFIX_PATH``, for good."""
-    if prefixes:
-        previous = os.environ.get(PREFIX_VARIABLE)
-        listed = [os.path.abspath(prefix) for prefix in prefixes]
-        os.environ[PREFIX_VARIABLE] = os.pathsep.join([*listed, *([previous] if previous else [])])
+    os.environ.update(_prepended(prefixes))
+
+
+def _prepended(prefixes: Sequence[Path | str]) -> dict[str, str]:
+    present = os.environ.get(PREFIX_VARIABLE)
+    listed = [*map(os.path.abspath, prefixes), *([present] if present else [])]
+    return {PREFIX_VARIABLE: os.pathsep.join(listed)} if listed else {}

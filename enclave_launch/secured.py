@@ -128,12 +128,19 @@ def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> Zenoh
 
     zenoh = launch.zenoh
     assert zenoh is not None, "asked only where processes are on Zenoh"
+
+    def refusals() -> tuple[str, ...]:
+        try:
+            return router_differences(zenoh.keystore)
+        except KeystoreError as error:
+            return (str(error),)
+
     place = RouterPlace(
         (zenoh.router.host, zenoh.router.port),
         str(zenoh.keystore / layout.ZENOH_ROUTER),
         str(zenoh.keystore / layout.ZENOH_ROUTER_CERT),
         str(zenoh.keystore / layout.ca_cert(Role.IDENTITY)),
-        lambda: _told(router_differences, zenoh.keystore),
+        refusals,
     )
     program = (
         find_router(search_prefixes(launch.plan.planner.source.prefixes)) if zenoh.router.is_here else None
@@ -174,13 +181,6 @@ def check_router(plan: LaunchPlan, keystore: str) -> None:
     except OSError:
         file = os.path.join(keystore, layout.ZENOH_ROUTER)
         raise RuntimeFailure(missing_router((address.host, address.port), file)) from None
-
-
-def _told(differences: Callable[[Path], tuple[str, ...]], keystore: Path) -> tuple[str, ...]:
-    try:
-        return differences(keystore)
-    except KeystoreError as error:
-        return (str(error),)
 
 
 class PlanProvider:

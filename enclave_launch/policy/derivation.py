@@ -106,18 +106,11 @@ def derive_policy(
         collection.add(node_permissions(node, distro=distro, options=chosen), chosen.policy_file)
     derived = collection.result()
     if chosen.policy_file is not None:
-        derived = _merged(derived, chosen.policy_file)
+        from enclave_launch.policy.policy_file import merge_policy_file
+
+        derived = merge_policy_file(derived, chosen.policy_file)
     concerns = _size_warnings(derived.policy.enclaves)
     return derived._replace(warnings=_unique((*derived.warnings, *concerns)))
-
-
-def _merged(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
-    from enclave_launch.policy.policy_file import merge_policy_file
-
-    merged = merge_policy_file(derived.policy, derived.reasons, document)
-    return derived._replace(
-        policy=merged.policy, reasons=merged.reasons, warnings=_unique((*derived.warnings, *merged.warnings))
-    )
 
 
 class _Collection(NamedTuple):

@@ -7,10 +7,10 @@ them. Names become absolute, so that a name written ``chatter`` and a derived ``
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import policy_denies_need, policy_enclave_unused, policy_file
+from enclave_launch.policy.derivation import DerivedPolicy
 from enclave_launch.policy.node_permissions import Reason
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules
@@ -20,27 +20,18 @@ from keystore.formats.policy import EnclavePolicy, Policy, Profile, Qualifier, R
 from keystore.formats.policy_xml import PolicyDocument
 
 Added = Mapping[tuple[str, str], Mapping[Rule, Reason]]  # (namespace, node) -> rule with its full name ->
-ReasonsByEnclave = Mapping[str, Mapping[Rule, tuple[Reason, ...]]]
 
 
-@dataclass(frozen=True, slots=True)
-class MergedPolicy:
-    """The derived policy with the policy file merged over it, the reasons of both, and what is to be told."""
-
-    policy: Policy
-    reasons: ReasonsByEnclave
-    warnings: tuple[Diagnostic, ...]
-
-
-def merge_policy_file(derived: Policy, reasons: ReasonsByEnclave, document: PolicyDocument) -> MergedPolicy:
-    """Union by enclave and profile. Warnings: the document's own, unused enclaves, denials of needs."""
+def merge_policy_file(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
+    """Union by enclave and profile, with the reasons of both. Warnings: the document's own, unused enclaves, denials of
+    needs."""
     theirs = {enclave.path: enclave for enclave in document.policy.enclaves}
-    ours = {enclave.path for enclave in derived.enclaves}
+    ours = {enclave.path for enclave in derived.policy.enclaves}
     warnings = [policy_file("policy file", text) for text in (*document.warnings, *document.notes)]
     warnings += [policy_enclave_unused(path) for path in theirs if path not in ours]
     enclaves: list[EnclavePolicy] = []
-    merged_reasons = {path: dict(by_rule) for path, by_rule in reasons.items()}
-    for enclave in derived.enclaves:
+    merged_reasons = {path: dict(by_rule) for path, by_rule in derived.reasons.items()}
+    for enclave in derived.policy.enclaves:
         other = theirs.get(enclave.path)
         if other is None:
             enclaves.append(enclave)
@@ -55,7 +46,9 @@ def merge_policy_file(derived: Policy, reasons: ReasonsByEnclave, document: Poli
         warnings.extend(_denials(enclave.path, known))
         hazards = dds_rules(merged).hazards
         warnings.extend(policy_file(enclave.path, f"enclave {enclave.path}: {hazard}") for hazard in hazards)
-    return MergedPolicy(Policy(tuple(enclaves)), merged_reasons, tuple(warnings))
+    return derived._replace(
+        policy=Policy(tuple(enclaves)), reasons=merged_reasons, warnings=(*derived.warnings, *warnings)
+    )
 
 
 def _absolute(enclave: EnclavePolicy, document: PolicyDocument) -> Added:

@@ -35,10 +35,6 @@ def zenoh_enclaves(plan: LaunchPlan, environment: Mapping[str, str]) -> dict[str
     return {path: enclave_types(plan.derived, path) for path in sorted(on_zenoh(plan, environment))}
 
 
-def _on_zenoh(plan: LaunchPlan) -> list[PlannedProcess]:
-    return [item for item in plan.processes if item.middleware == ZENOH and item.enclave is not None]
-
-
 def middleware_problems(plan: LaunchPlan, environment: Mapping[str, str]) -> Iterator[Diagnostic]:
     """Calls of the launcher that cannot arrive: its node would wait for ever."""
     own = middleware_of(environment, plan.distro)
@@ -61,7 +57,8 @@ def _serving(service: str, by_node: Mapping[str, PlannedProcess]) -> PlannedProc
 
 def middleware_notes(plan: LaunchPlan) -> Iterator[Diagnostic]:
     """What a reader should know of processes on Zenoh, and of those that are apart; nothing where all are on DDS."""
-    zenoh = _on_zenoh(plan)
+    secured = [item for item in plan.processes if item.enclave is not None]
+    zenoh = [item for item in secured if item.middleware == ZENOH]
     if not zenoh:
         return
     yield zenoh_router_trusted([item.process.process_name for item in zenoh])
@@ -69,7 +66,7 @@ def middleware_notes(plan: LaunchPlan) -> Iterator[Diagnostic]:
     for policy in plan.derived.policy.enclaves:
         if policy.path in enclaves:
             yield from (zenoh_cannot_grant(policy.path, gap) for gap in grants_of_policy(policy).gaps)
-    others = [item for item in plan.processes if item.middleware != ZENOH and item.enclave is not None]
+    others = [item for item in secured if item.middleware != ZENOH]
     both = enclaves & {item.enclave.path for item in others if item.enclave is not None}
     yield from map(enclave_on_both, sorted(both))
     yield from _apart(plan, zenoh, others)

@@ -40,7 +40,7 @@ def merges(plan: PlanDocument, *, least_similarity: float = 0.5) -> list[Merge]:
     """Pairs of enclaves that are alike, cheapest first. What every node has is left out of the comparison."""
     own = {path: plan.own(path) for path in plan.enclaves}
     found = [
-        Merge(one, two, _similarity(own[one], own[two]), _excess(own, one, two))
+        Merge(one, two, len(own[one] & own[two]) / len(own[one] | own[two]), _excess(own, one, two))
         for one, two in combinations(sorted(own), 2)
         if own[one] and own[two]
     ]
@@ -58,10 +58,6 @@ def splits(plan: PlanDocument) -> list[Split]:
         if len(units) > 1 and saved:
             found.append(Split(path, saved))
     return sorted(found, key=lambda split: (-split.gain, split.enclave))
-
-
-def _similarity(one: frozenset[GrantedName], two: frozenset[GrantedName]) -> float:
-    return len(one & two) / len(one | two)
 
 
 def _excess(

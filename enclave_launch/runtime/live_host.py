@@ -11,6 +11,7 @@ import shutil
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -98,15 +99,8 @@ class LiveHost(BaseHost):
         self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext
     ) -> asyncio.Future[None]:
         base = dict((action.process_details or {}).get("env") or {})
-        live = LiveProcess(
-            action,
-            process,
-            context,
-            self._tree,
-            self._log,
-            lambda tty: self._prepare(process, base, tty),
-            self._observe,
-        )
+        prepare = partial(self._prepare, process, base)
+        live = LiveProcess(action, process, context, self._tree, self._log, prepare, self._observe)
         self._observe(ProcessPlanned(process))
         self._watch_state(action, process, context)
         self.processes.append(live)

@@ -10,11 +10,11 @@ import asyncio
 import marshal
 import os
 import socket
-import struct
 from collections import deque
 from collections.abc import Callable, Sequence
 
-HEADER = struct.Struct("!I")
+from enclave_launch.runtime.warden import HEADER
+
 CHUNK = 1 << 16
 Message = str | int | bytes | list[bytes] | dict[bytes, bytes]
 

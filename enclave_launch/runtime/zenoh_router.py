@@ -8,7 +8,6 @@ again when its file changes, and when it ends by itself; clients come back to it
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import signal
 import socket
@@ -24,13 +23,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_launch.errors import RuntimeFailure
+from enclave_launch.runtime.warden import PR_SET_PDEATHSIG, load_libc
 
 PROGRAM = "lib/rmw_zenoh_cpp/rmw_zenohd"
 CONFIGURATION = "ZENOH_ROUTER_CONFIG_URI"
 _PATIENCE = 30.0  # seconds until it answers
 _LOOK = 0.1
 _PAUSE = 1.0  # before one that ended is started again
-_PR_SET_PDEATHSIG = 1  # linux/prctl.h
 _LINES_KEPT = 20
 _PLAIN = {"ZENOH_CONFIG_OVERRIDE": "", "NO_COLOR": "1"}
 
@@ -252,10 +251,10 @@ def _end(process: subprocess.Popen[bytes]) -> None:
         process.wait()
 
 
-_libc = ctypes.CDLL(None, use_errno=True)
+_libc = load_libc()
 
 
 def _die_with_parent() -> None:
     """In the child: it must not outlive us, however we end."""
-    if hasattr(_libc, "prctl"):
-        _libc.prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if _libc is not None:
+        _libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

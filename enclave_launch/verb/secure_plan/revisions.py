@@ -17,10 +17,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from enclave_launch.boundary.environment import environment_with
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.secure_plan.plans import plan_of, read_saved
 from enclave_launch.verb.target import find_target
-from nodl.ament_index import search_prefixes
+from nodl.ament_index import PREFIX_VARIABLE, search_prefixes
 
 _REVISION_AND_PATH = re.compile(r"(?P<revision>[^:=]+):(?P<path>(?:[^=].*)?)")
 _OPTIONS_WITH_PATHS = ("prefix", "nodl", "library", "source", "policy")
@@ -79,7 +80,9 @@ def _in(old: Checkout, file: Path, revision: str) -> Path:
 
 def _plan(words: Sequence[str], options: argparse.Namespace, old: Checkout) -> Mapping[str, Any]:
     moved = {name: _moved(getattr(options, name), old) for name in _OPTIONS_WITH_PATHS}
-    with _prefixes_of(old):
+    present = os.environ.get(PREFIX_VARIABLE, "").split(os.pathsep)
+    prefixes = os.pathsep.join(str(old.then(each)) if each else each for each in present)
+    with environment_with({PREFIX_VARIABLE: prefixes} if prefixes else {}):
         return plan_of(words, argparse.Namespace(**{**vars(options), **moved}))
 
 
@@ -87,21 +90,6 @@ def _moved(value: Any, old: Checkout) -> Any:
     if isinstance(value, (list, tuple)):
         return [_moved(each, old) for each in value]
     return old.then(value) if isinstance(value, Path) else value
-
-
-@contextmanager
-def _prefixes_of(old: Checkout) -> Iterator[None]:
-    before = os.environ.get("AMENT_PREFIX_PATH")
-    if before is None:
-        yield
-        return
-    os.environ["AMENT_PREFIX_PATH"] = os.pathsep.join(
-        str(old.then(each)) if each else each for each in before.split(os.pathsep)
-    )
-    try:
-        yield
-    finally:
-        os.environ["AMENT_PREFIX_PATH"] = before
 
 
 @contextmanager
