@@ -22,9 +22,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
-from enclave_launch.drift.finding import DriftFinding, Level
+from enclave_launch.drift.finding import DriftFinding, Level, finding_document, finding_text
 from enclave_launch.drift.steady import SettlingTimes, Steady
-from enclave_launch.drift.text import finding_document, finding_text
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.run_events import ProcessStarted
@@ -197,14 +196,10 @@ def _strangers(graph: Graph, started: set[int]) -> frozenset[int]:
         for each in graph.processes
         if each.participant.pid is not None and each.participant.host == host
     }
+    # One that has ended has no lineage and is nobody's.
+    lineages = {pid: set(_lineage(pid)) for pid in seen}
     ours = started | {os.getpid()}
-    return frozenset(pid for pid in seen if _is_foreign(pid, ours))
-
-
-def _is_foreign(pid: int, ours: set[int]) -> bool:
-    """One that has ended is nobody's; one of the launch has one of its processes as parent, or is in its session."""
-    lineage = list(_lineage(pid))
-    return bool(lineage) and not ours.intersection(lineage)
+    return frozenset(pid for pid, lineage in lineages.items() if lineage and not lineage & ours)
 
 
 def _lineage(pid: int) -> Iterator[int]:

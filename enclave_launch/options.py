@@ -85,7 +85,7 @@ class ResolveOptions(_ResolveOptions):
 def _check_also(names: tuple[str, ...]) -> None:
     if not names:
         return
-    from enclave_launch.policy.conditions import ALSO
+    from enclave_launch.policy.node_permissions import ALSO
 
     unknown = [name for name in names if name not in ALSO]
     if unknown:

@@ -53,7 +53,7 @@ ProfileKey = tuple[str, str]  # namespace and node name
 class PolicyOptions(NamedTuple):
     """``accept_patterns``: partly known names become wildcards, each with a warning.
 
-    ``also``: what every node gets beyond what it has by itself (``conditions.ALSO``).
+    ``also``: what every node gets beyond what it has by itself (``node_permissions.ALSO``).
     ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: rcl remaps action names, in
     any distribution.
     """

@@ -19,7 +19,6 @@ from enclave_launch.diagnostics.permissions import (
     node_name_impossible,
     pattern_accepted,
 )
-from enclave_launch.policy.conditions import conditions_of
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
 from enclave_launch.source_location import SourceLocation
@@ -27,7 +26,7 @@ from keystore.formats.policy import Operation
 from nodl.builtin_interfaces import BuiltinCondition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import MAX_NAME_LENGTH, InvalidNameError, join, validate_namespace, validate_node_name
-from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, NodeInterface
 from nodl.remap import ACTION_SERVICES, NodeNames, ParsedRule, Resolved
 
 if TYPE_CHECKING:
@@ -50,6 +49,15 @@ _PARTS = {
     Operation.EXECUTE: (Operation.REPLY, Operation.PUBLISH),
     Operation.CALL: (Operation.REQUEST, Operation.SUBSCRIBE),
 }
+
+
+ALSO: dict[str, frozenset[BuiltinCondition]] = {
+    "clock": frozenset({BuiltinCondition.SIM_TIME}),
+    "logger-services": frozenset({BuiltinCondition.LOGGER_SERVICES}),
+    "service-events": frozenset(),
+}
+"""What ``--also`` grants every node beyond what it has by itself: ``/clock``, which a node needs once somebody sets
+``use_sim_time`` while it runs; the logger services; ``<service>/_service_event`` of service introspection."""
 
 
 class Reason(NamedTuple):
@@ -297,3 +305,29 @@ def _expand_pattern(names: NodeNames, text: str) -> str:
     """Expand a name with ``*`` in it as if each were a letter; remap rules cannot be told to match."""
     stand_in = "STAR_OF_A_PATTERN"
     return names.expand(text.replace("*", stand_in)).replace(stand_in, "*")
+
+
+def conditions_of(node: RunningNode, also: Iterable[str] = ()) -> frozenset[BuiltinCondition]:
+    """Which rows of the built-in interfaces hold for ``node``; ``also``: keys of ``ALSO`` for what else runs
+    in it."""
+    met = {BuiltinCondition.ALWAYS}.union(*(ALSO[name] for name in also))
+    if node.interface.parameter_services:
+        met.add(BuiltinCondition.PARAMETERS)
+    if node.parameters.get("use_sim_time") is True:
+        met.add(BuiltinCondition.SIM_TIME)
+    if node.parameters.get("start_type_description_service") is not False:
+        met.add(BuiltinCondition.TYPE_DESCRIPTION)
+    if node.role == "lifecycle_node" or node.interface.lifecycle:
+        met.add(BuiltinCondition.LIFECYCLE)
+    if node.role == "container":
+        met.add(BuiltinCondition.CONTAINER)
+    if _listens_to_tf(node.interface):
+        met.add(BuiltinCondition.TF_LISTENER)
+    return frozenset(met)
+
+
+def _listens_to_tf(interface: NodeInterface) -> bool:
+    return any(
+        endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.parts == ("/tf",)
+        for endpoint in interface.endpoints
+    )

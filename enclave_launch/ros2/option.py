@@ -61,7 +61,8 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
             keystore = getattr(args, SECURE)
             if isinstance(keystore, str):
                 args.keystore = Path(keystore)
-            options = _with_our_defaults(args)
+            # What ros2 launch does not have, or has in its own way, is at its default.
+            options = argparse.Namespace(**{**vars(build_parser().parse_args([])), **vars(args)})
             given = vars(args).keys() & {action.dest for action in self._ours}
             looking = check_views(CommandLine(options, frozenset(given)), self._ours)
             if not keystore:
@@ -126,11 +127,6 @@ def _check_nothing_was_added(description: Any) -> None:
             f"another extension of ros2 launch added to this launch ({', '.join(added) or 'an include'}); a secured "
             "launch holds what its file says: include it in the launch file, or launch without that extension's option"
         )
-
-
-def _with_our_defaults(args: argparse.Namespace) -> argparse.Namespace:
-    """Options of ``secure-launch`` that ``ros2 launch`` does not have, or has in its own way, at their defaults."""
-    return argparse.Namespace(**{**vars(build_parser().parse_args([])), **vars(args)})
 
 
 def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...]]:

@@ -2,15 +2,18 @@
 launch.log.
 
 Formats as in launch/logging/__init__.py, ``OVERRIDE_LAUNCH_SCREEN_FORMAT`` and ``OVERRIDE_LAUNCH_LOG_FORMAT``
-included. Launch colours nothing by itself; escape codes in those two formats are interpreted.
+included. Launch colours nothing by itself; escape codes in those two formats are interpreted. Where the logs go is laid
+out as by launch, too (``_get_logging_directory``, ``_make_unique_log_dir``, ``_renew_latest_log_dir`` there).
 """
 
 from __future__ import annotations
 
 import logging
+import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from datetime import datetime
 from pathlib import Path
 from typing import Literal, NamedTuple
 
@@ -180,3 +183,42 @@ def _format_of_records(text: str) -> Format:
         return formatter.format(logging.LogRecord(name, LEVELS[level], "", 0, message, None, None))
 
     return render
+
+
+def log_base_directory(environment: Mapping[str, str]) -> Path:
+    """``$ROS_LOG_DIR``, else ``$ROS_HOME/log``, else ``~/.ros/log``; an empty variable counts as unset."""
+    chosen = environment.get("ROS_LOG_DIR")
+    if not chosen:
+        chosen = os.path.join(environment.get("ROS_HOME") or os.path.join("~", ".ros"), "log")
+    return Path(os.path.normpath(os.path.expanduser(chosen)))
+
+
+def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
+    """A new ``<date>-<host>-<pid>`` below ``base``, with the link ``latest`` beside it renewed.
+
+    :raises RuntimeFailure: it cannot be written.
+    """
+    directory = base / f"{now.strftime('%Y-%m-%d-%H-%M-%S-%f')}-{host}-{pid}"
+    try:
+        directory.mkdir(parents=True)
+    except OSError as error:
+        raise RuntimeFailure(
+            f"cannot create the log directory {directory}: {error.strerror}; "
+            "set ROS_LOG_DIR to a directory that can be written"
+        ) from error
+    _renew_latest(base / "latest", directory)
+    return directory
+
+
+def _renew_latest(link: Path, directory: Path) -> None:
+    """Atomically, since other launches do the same; what is not a link is left alone, a failure is
+    passed over.
+    """
+    if link.exists() and not link.is_symlink():
+        return
+    fresh = link.with_name(f".latest-{os.getpid()}")
+    try:
+        fresh.symlink_to(directory, target_is_directory=True)
+        fresh.replace(link)
+    except OSError:
+        fresh.unlink(missing_ok=True)

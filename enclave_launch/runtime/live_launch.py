@@ -22,7 +22,7 @@ from signal import SIGINT, Signals
 from typing import Any
 
 from enclave_launch.description.events.dispatch import handle_next
-from enclave_launch.description.events.event import Event, IncludeLaunchDescription, Shutdown
+from enclave_launch.description.events.event import IncludeLaunchDescription, Shutdown
 from enclave_launch.description.events.handlers import OnIncludeLaunchDescription, OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
@@ -39,9 +39,15 @@ from enclave_launch.prefixes import prepend_prefixes
 from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.companion import companion_first
 from enclave_launch.runtime.gate import EnclaveGate
-from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging
+from enclave_launch.runtime.launch_log import (
+    LaunchLog,
+    Level,
+    Writers,
+    captured_logging,
+    log_base_directory,
+    make_log_directory,
+)
 from enclave_launch.runtime.live_host import LiveHost
-from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
 from enclave_launch.runtime.overlap import many_descriptors
 from enclave_launch.runtime.process_tree import ProcessTree
 from enclave_launch.runtime.ros_services import RosServices
@@ -188,7 +194,8 @@ class LiveLaunch:
         with STAGE.turn(self._actor):
             self._begin()
         if tree.lost is not None:
-            tree.lost.add_done_callback(self._on_warden_lost)
+            lost = RuntimeFailure("the warden process was killed, and all processes with it")
+            tree.lost.add_done_callback(lambda _: self._on_failure(lost))
         cancelled: asyncio.CancelledError | None = None
         while True:
             try:
@@ -239,7 +246,8 @@ class LiveLaunch:
         queue = self._context._event_queue
         if not queue.empty():
             if self._settings.debug:
-                self._say_event(queue.next)
+                name = getattr(queue.next, "process_name", None)
+                self.say("DEBUG", f"processing event: {queue.next.name}{f' of {name}' if name else ''}")
             with STAGE.turn(self._actor):
                 self._futures += [future for _, future in handle_next(self._context, lambda *_: None)]
             await asyncio.sleep(0)
@@ -251,11 +259,6 @@ class LiveLaunch:
             self.shut_down("idle")
             return
         await self._wait_for(pending)
-
-    def _say_event(self, event: Event) -> None:
-        """With --debug, as launch does: each event when its turn comes."""
-        name = getattr(event, "process_name", None)
-        self.say("DEBUG", f"processing event: {event.name}{f' of {name}' if name else ''}")
 
     def _pending(self) -> list[asyncio.Future[Any]]:
         self._futures += self._context._completion_futures
@@ -304,9 +307,6 @@ class LiveLaunch:
         self.say("CRITICAL", str(error))
         self._observe(LaunchFailed(str(error)))
         self.shut_down(str(error))
-
-    def _on_warden_lost(self, _: object) -> None:
-        self._on_failure(RuntimeFailure("the warden process was killed, and all processes with it"))
 
     def _exit_status(self) -> int:
         if self._host.failed:

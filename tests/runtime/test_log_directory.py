@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.errors import RuntimeFailure
-from enclave_launch.runtime.log_directory import log_base_directory, make_log_directory
+from enclave_launch.runtime.launch_log import log_base_directory, make_log_directory
 
 NOW = datetime(2024, 2, 3, 4, 5, 6, 78)
 

@@ -61,8 +61,7 @@ def run(options: argparse.Namespace) -> int:
     """Print how the domain differs from the plan. Returns 1 for an alarm."""
     from enclave_launch.drift.compare import Circumstances, compare
     from enclave_launch.drift.expected import expected_in, out_of_sight
-    from enclave_launch.drift.finding import Level
-    from enclave_launch.drift.text import drift_document, drift_text
+    from enclave_launch.drift.finding import Level, drift_document, drift_text
 
     documents = [read_plan(options.words, options), *map(read_saved, options.also_planned)]
     if zenoh := out_of_sight(documents):
