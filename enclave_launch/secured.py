@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.admission.middleware import ZENOH, failing, middleware_of
+from enclave_launch.admission.middleware import failing, middleware_of
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import enclave_of_several_launches, handshake_fails
 from enclave_launch.errors import ProvisionError, RuntimeFailure, keystore_errors
@@ -24,9 +24,8 @@ from enclave_launch.security_environment import (
     OVERRIDE,
     SecuritySettings,
     enclave_arguments,
-    launcher_environment,
+    enclave_environment,
     secured_environment,
-    zenoh_environment,
 )
 from enclave_launch.served_domains import places, with_domains
 from keystore.disk import layout
@@ -267,9 +266,8 @@ class PlanProvider:
         if launcher is None:
             return None
         self._check(self._policies[launcher.enclave])
-        variables = dict(launcher_environment(settings))
-        if middleware_of(os.environ, self._plan.distro) == ZENOH:
-            variables |= zenoh_environment(launcher.enclave, settings)
+        middleware = middleware_of(os.environ, self._plan.distro)
+        variables = enclave_environment(launcher.enclave, middleware, settings)
         return StartAdditions(("--enclave", launcher.enclave), variables)
 
     def _check(self, policy: EnclavePolicy) -> None:

@@ -56,18 +56,18 @@ def secured_environment(planned: PlannedProcess, settings: SecuritySettings | No
     if planned.enclave is None:
         nowhere = {ENABLE: "true", KEYSTORE: NO_KEYSTORE, STRATEGY: "Enforce"}
         return {**nowhere, ZENOH_SESSION: NO_KEYSTORE} if planned.middleware == ZENOH else nowhere
-    variables = dict(launcher_environment(settings))
-    if planned.middleware == ZENOH:
-        variables |= zenoh_environment(planned.enclave.path, settings)
-    if planned.enclave is not None and planned.process.kind == "executable":
-        variables[OVERRIDE] = planned.enclave.path
-    return variables
+    path, process = planned.enclave.path, planned.process
+    override = {OVERRIDE: path} if process.kind == "executable" else {}
+    return {**enclave_environment(path, planned.middleware, settings), **override}
 
 
-def zenoh_environment(enclave: str, settings: SecuritySettings) -> Mapping[str, str]:
-    """What leads a process on Zenoh to the configuration of its enclave, and to no other."""
+def enclave_environment(enclave: str, middleware: str, settings: SecuritySettings) -> Mapping[str, str]:
+    """The security variables of a process in ``enclave``. On Zenoh they lead it to the configuration of its enclave,
+    and to no other."""
+    if middleware != ZENOH:
+        return launcher_environment(settings)
     file = f"{settings.keystore}/{layout.enclave_directory(enclave)}/{layout.ENCLAVE_ZENOH}"
-    return {ZENOH_SESSION: file, **dict.fromkeys(ZENOH_CLEARED, "")}
+    return {**launcher_environment(settings), ZENOH_SESSION: file, **dict.fromkeys(ZENOH_CLEARED, "")}
 
 
 def launcher_environment(settings: SecuritySettings) -> Mapping[str, str]:

@@ -75,12 +75,9 @@ def look_at_program(path: str, depth: int = 0) -> ProgramToRecord:
             head = file.read(256)
             if head[:2] == b"#!":
                 interpreter = head[2:].split(b"\n")[0].split()[:1]
-                deeper = depth < 4 and interpreter
-                return (
-                    look_at_program(os.fsdecode(interpreter[0]), depth + 1)
-                    if deeper
-                    else ProgramToRecord(path)
-                )
+                if depth < 4 and interpreter:
+                    return look_at_program(os.fsdecode(interpreter[0]), depth + 1)
+                return ProgramToRecord(path)
             gains = _gains_privileges(path, status)
             return ProgramToRecord(path, gains) if gains else _elf(path, head, file)
     except OSError:
@@ -104,19 +101,18 @@ def _gains_privileges(path: str, status: os.stat_result) -> str:
 def _elf(path: str, head: bytes, file: BinaryIO) -> ProgramToRecord:
     if head[:4] != b"\x7fELF":
         return ProgramToRecord(path)
-    wide, little = head[4] == 2, head[5] == 1
+    wide, order = head[4] == 2, "<" if head[5] == 1 else ">"
     if wide != (struct.calcsize("P") == 8):
         return ProgramToRecord(path, f"{path} is a program of another word size than the recorder")
     try:
-        segments = _segments(head, file, wide, "<" if little else ">")
+        segments = _segments(head, file, wide, order)
         if not any(kind == _INTERPRETER for kind, *_ in segments):
             return ProgramToRecord(path, f"{path} is linked statically: nothing can be loaded into it")
-        needed = _needed(file, segments, wide, "<" if little else ">")
+        needed = _needed(file, segments, wide, order)
     except (struct.error, ValueError):
         return ProgramToRecord(path)
-    return ProgramToRecord(
-        path, sanitizer=next((name for name in needed if name.startswith("libasan.so")), None)
-    )
+    sanitizer = next((name for name in needed if name.startswith("libasan.so")), None)
+    return ProgramToRecord(path, sanitizer=sanitizer)
 
 
 _Segment = tuple[int, int, int, int]  # type, offset in the file, address, size in the file
