@@ -7,7 +7,6 @@ The values: ``planner`` makes a ``LaunchPlan``, which the dry run prints, ``prov
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from enum import Enum
 from types import MappingProxyType
 
 from enclave_launch.admission import AdmissionOptions
@@ -20,7 +19,7 @@ from enclave_launch.admission.middleware import (
     mixed_pairs,
     vendor_of,
 )
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple, TextEnum
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope
 from enclave_launch.host.outcomes import Outcomes
@@ -35,7 +34,7 @@ if TYPE_CHECKING:
     from enclave_launch.planner import Planner
 
 
-class InterfaceOrigin(str, Enum):
+class InterfaceOrigin(TextEnum):
     """Where the interfaces of a node come from; the first that knows it decides, in this order. Manifests that were
     learnt from runs are ``RECORDED`` wherever they lie."""
 
@@ -44,9 +43,6 @@ class InterfaceOrigin(str, Enum):
     RECORDED = "recorded"
     ANALYSIS = "inferred"
     LIBRARY = "library"
-
-    def __str__(self) -> str:
-        return self.value
 
 
 class Found(NamedTuple):

@@ -7,9 +7,7 @@ whoever derives permissions from them no longer asks where they came from, but c
 
 from __future__ import annotations
 
-from enum import Enum
-
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple, TextEnum
 from nodl.name_template import NameTemplate
 from nodl.source_ref import SourceRef
 
@@ -17,7 +15,7 @@ if TYPE_CHECKING:
     from nodl.dependence import Dependence
 
 
-class EndpointKind(str, Enum):
+class EndpointKind(TextEnum):
     """The six ways in which a ROS 2 node takes part in communication."""
 
     PUBLISHER = "publisher"
@@ -47,7 +45,7 @@ class EndpointKind(str, Enum):
         return f"{self.value}s"
 
 
-class Certainty(str, Enum):
+class Certainty(TextEnum):
     """How far a name can be trusted."""
 
     EXACT = "exact"  # a manifest says so, or the source has one constant
@@ -85,7 +83,7 @@ class Gap(NamedTuple):
     why: str
 
 
-class ClientLibrary(str, Enum):
+class ClientLibrary(TextEnum):
     """Which ROS client library a node is written with; decides its built-in interfaces."""
 
     RCLCPP = "rclcpp"

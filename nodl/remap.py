@@ -11,9 +11,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
-from enum import Enum
 
-from enclave_launch.boundary.light import NamedTuple, late_pattern
+from enclave_launch.boundary.light import NamedTuple, TextEnum, late_pattern
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"  # that it holds no "__" is checked apart
@@ -27,7 +26,7 @@ ACTION_TOPICS = ("feedback", "status")
 _LONGEST_PART = "cancel_goal"
 
 
-class RemapKind(str, Enum):
+class RemapKind(TextEnum):
     """What a rule applies to; the value of a name rule is its written prefix."""
 
     ANY_NAME = ""

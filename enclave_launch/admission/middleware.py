@@ -14,9 +14,8 @@ known beforehand, and a subject that is chosen well avoids them.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from enum import Enum
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple, TextEnum
 
 if TYPE_CHECKING:
     from keystore.formats.subject import Half
@@ -26,7 +25,7 @@ DEFAULT = "rmw_fastrtps_cpp"
 _DEFAULT_OF = {"galactic": "rmw_cyclonedds_cpp"}
 
 
-class Vendor(Enum):
+class Vendor(TextEnum):
     """Whose DDS speaks; decides who can authenticate whom."""
 
     CYCLONE = "Cyclone DDS"

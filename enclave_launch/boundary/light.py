@@ -1,9 +1,10 @@
-"""What every dry run uses of ``typing`` and ``re``, at a fraction of what it costs to import and to define.
+"""What every dry run uses of ``typing``, ``enum`` and ``re``, at a fraction of what it costs to import and to define.
 
 * ``typing`` takes a twentieth of a small dry run to import. Our annotations stay text and nobody evaluates them, so
   that its names need to be there only, and a ``Protocol`` is a plain class.
 * ``typing.NamedTuple`` compiles each annotation and the constructor when a class is defined. Here the constructor is
   compiled for a class with many instances, which few of the hundred classes have.
+* An ``Enum`` takes as long to define as three modules of its size to import; members of ours are texts and no more.
 * A pattern takes as long to compile as a small module to import, and a launch meets the texts for a few only.
 
 Type checkers see the real things, whose interface these have. ``bench/resolve.py`` shows what start-up costs,
@@ -17,6 +18,7 @@ import re
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from enum import Enum
     from typing import Any as Any
     from typing import ClassVar as ClassVar
     from typing import Literal as Literal
@@ -28,6 +30,9 @@ if TYPE_CHECKING:
     from typing import TypeVar as TypeVar
     from typing import cast as cast
     from typing import overload as overload
+
+    class TextEnum(str, Enum):
+        """An enumeration of texts; a member is its text, also when written."""
 
     def late_pattern(text: str, flags: int = 0) -> re.Pattern[str]:
         """As ``re.compile`` when something is searched with it; errors of ``text`` come then."""
@@ -57,6 +62,38 @@ else:
     def overload(function):
         """``function``, which the last of its name replaces."""
         return function
+
+    class _Texts(type):
+        """Makes the texts that a class names its members, as ``enum.EnumType`` does."""
+
+        def __new__(mcs, name, bases, members):
+            texts = {key: text for key, text in members.items() if key.isupper()}
+            made = super().__new__(mcs, name, bases, {**members, "_member_of": {}})
+            for key, text in texts.items():
+                member = made.__new__(made, *(text if isinstance(text, tuple) else (text,)))
+                member.name, member.value = key, str.__str__(member)
+                setattr(made, key, made._member_of.setdefault(member.value, member))
+            return made
+
+        def __call__(cls, text):
+            if text not in cls._member_of:
+                raise ValueError(f"{text!r} is not a valid {cls.__qualname__}")
+            return cls._member_of[text]
+
+        def __iter__(cls):
+            return iter(cls._member_of.values())
+
+        def __len__(cls):
+            return len(cls._member_of)
+
+    class TextEnum(str, metaclass=_Texts):
+        """An enumeration of texts; a member is its text, also when written."""
+
+        def __repr__(self):
+            return f"<{type(self).__name__}.{self.name}: {self.value!r}>"
+
+        def __reduce_ex__(self, protocol):
+            return type(self), (self.value,)
 
     class late_pattern:
         """What ``re.compile`` gives, as soon as it is asked for anything."""

@@ -7,13 +7,11 @@ SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it s
 
 from __future__ import annotations
 
-from enum import Enum
-
-from enclave_launch.boundary.light import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, TextEnum
 from enclave_launch.source_location import SourceLocation
 
 
-class Code(str, Enum):
+class Code(TextEnum):
     """Stable names, for programs; ``meaning`` says what all diagnostics of a code have in common."""
 
     meaning: str
@@ -94,12 +92,8 @@ class Code(str, Enum):
 
     def __new__(cls, value: str, meaning: str = "") -> Code:
         code = str.__new__(cls, value)
-        code._value_ = value
         code.meaning = meaning
         return code
-
-    def __str__(self) -> str:
-        return str.__str__(self)
 
 
 class Diagnostic(NamedTuple):

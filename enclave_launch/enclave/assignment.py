@@ -16,9 +16,7 @@ Rules, from the design article "ROS 2 Security Enclaves" (section Runtime):
 
 from __future__ import annotations
 
-from enum import Enum
-
-from enclave_launch.boundary.light import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, TextEnum
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
@@ -30,7 +28,7 @@ from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError
 from keystore.formats.enclave_name import validate_enclave_name
 
 
-class EnclaveScope(str, Enum):
+class EnclaveScope(TextEnum):
     """``--enclave-scope``: the enclave of a process whose launch file names none."""
 
     NAMESPACE = "namespace"
@@ -39,7 +37,7 @@ class EnclaveScope(str, Enum):
     LAUNCH = "launch"
 
 
-class AssignmentReason(str, Enum):
+class AssignmentReason(TextEnum):
     """Why a process has its enclave; the value is the text shown in the tree."""
 
     ARGUMENT = "--enclave in its own ROS arguments"

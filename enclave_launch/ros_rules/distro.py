@@ -14,17 +14,16 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
-from enum import Enum
 from functools import lru_cache
 
 from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.light import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, TextEnum
 
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)
 
 
-class Distro(str, Enum):
+class Distro(TextEnum):
     """The distributions that are known, oldest first; the last is the default."""
 
     HUMBLE = "humble"

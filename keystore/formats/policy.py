@@ -7,9 +7,8 @@ sros2/policy/schemas/policy.xsd. Reading and writing the XML is ``keystore.forma
 from __future__ import annotations
 
 from collections.abc import Iterator
-from enum import Enum
 
-from enclave_launch.boundary.light import NamedTuple
+from enclave_launch.boundary.light import NamedTuple, TextEnum
 from keystore.errors import InvalidInputError
 from keystore.formats.permissions_patterns import has_wildcard
 
@@ -18,11 +17,9 @@ class PolicyError(InvalidInputError):
     """A policy, or a name in one, that must not become permissions. The text says what and where."""
 
 
-class Operation(str, Enum):
+class Operation(TextEnum):
     """What a rule is about; the value is the attribute of the policy XML, where ``call`` is said of actions alone.
     ``verb`` is what people are told: the same words for topics, services and actions everywhere."""
-
-    __hash__ = str.__hash__  # rules are sought by the thousand; that of Enum is Python
 
     PUBLISH = "publish"
     SUBSCRIBE = "subscribe"
@@ -45,10 +42,8 @@ _VERBS = {
 }
 
 
-class Qualifier(str, Enum):
+class Qualifier(TextEnum):
     """Whether a rule of an SROS2 policy grants or refuses."""
-
-    __hash__ = str.__hash__
 
     ALLOW = "ALLOW"
     DENY = "DENY"

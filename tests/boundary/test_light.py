@@ -1,9 +1,11 @@
-"""Our ``NamedTuple`` is ``typing``'s, but for what it costs to define."""
+"""Our ``NamedTuple`` is ``typing``'s and our enumerations are those of ``enum``, but for what they cost to define."""
 
 from __future__ import annotations
 
 import copy
+import enum
 import inspect
+import json
 import pickle
 import typing
 from collections.abc import Callable
@@ -109,3 +111,82 @@ def test_classes_of_equal_fields_stay_apart() -> None:
     assert Ours("a").target == "/chatter"
     with pytest.raises(TypeError):
         Other("a")  # type: ignore[call-arg]
+
+
+class OurWord(light.TextEnum):
+    """How sure we are."""
+
+    SURE = "sure"
+    NOT_SURE = "not sure"
+    NONE = ""
+
+    @property
+    def twice(self) -> str:
+        return self.value * 2
+
+
+class TheirWord(str, enum.Enum):
+    """How sure we are."""
+
+    SURE = "sure"
+    NOT_SURE = "not sure"
+    NONE = ""
+
+    @property
+    def twice(self) -> str:
+        return self.value * 2
+
+
+class Rated(light.TextEnum):
+    """Members with something beside their text."""
+
+    GOOD = "good", 1
+    BAD = "bad", -1
+
+    worth: int
+
+    def __new__(cls, value: str, worth: int = 0) -> Rated:
+        made = str.__new__(cls, value)
+        made.worth = worth
+        return made
+
+
+WORDS: dict[str, Callable[[type[OurWord] | type[TheirWord]], object]] = {
+    "all, in order": lambda kind: [(each.name, each.value, type(each.value)) for each in kind],
+    "how many": lambda kind: len(kind),
+    "by its text": lambda kind: kind("not sure") is kind.NOT_SURE,
+    "by itself": lambda kind: kind(kind.NOT_SURE) is kind.NOT_SURE,
+    "by a text that none has": lambda kind: kind("unsure"),
+    "equal to its text": lambda kind: kind.SURE == "sure" and kind.SURE != kind.NOT_SURE,
+    "found among texts": lambda kind: kind.SURE in {"sure": 1},
+    "an empty one is false": lambda kind: (bool(kind.NONE), bool(kind.SURE)),
+    "a property": lambda kind: kind.SURE.twice,
+    "a member and a text": lambda kind: isinstance(kind.SURE, kind) and isinstance(kind.SURE, str),
+    "shown": lambda kind: repr(kind.SURE).removeprefix(f"<{kind.__name__}"),
+    "in JSON": lambda kind: json.dumps({"word": kind.SURE}),
+    "copied": lambda kind: copy.deepcopy([kind.SURE])[0] is kind.SURE,
+    "pickled": lambda kind: pickle.loads(pickle.dumps(kind.SURE)) is kind.SURE,
+    "no such member": lambda kind: kind.UNSURE,  # type: ignore[union-attr]
+    "what it says of itself": lambda kind: kind.__doc__,
+}
+
+
+@pytest.mark.parametrize("use", WORDS)
+def test_a_member_is_used_as_one_of_enum(use: str) -> None:
+    try:
+        theirs = WORDS[use](TheirWord)
+    except (ValueError, AttributeError) as error:
+        with pytest.raises(type(error)):
+            WORDS[use](OurWord)
+    else:
+        assert WORDS[use](OurWord) == theirs
+
+
+def test_a_member_is_written_as_its_text() -> None:
+    assert f"{OurWord.NOT_SURE}, {OurWord.SURE!s}" == "not sure, sure"
+
+
+def test_a_member_may_have_more_than_its_text() -> None:
+    assert [(each.value, each.worth) for each in Rated] == [("good", 1), ("bad", -1)]
+    assert Rated("bad") is Rated.BAD
+    assert copy.copy(Rated.BAD).worth == -1

@@ -6,9 +6,9 @@ Not ``pickle``: what is read must never be able to run code.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from enum import Enum
 from typing import Any
 
+from enclave_launch.boundary.light import TextEnum
 from nodl.dependence import Dependence, Test, Variation, When
 from nodl.infer.cpp.entry import Entry, FixedMapping, Solved
 from nodl.infer.start import LaunchKey
@@ -23,14 +23,14 @@ _RECORDS: dict[str, Callable[..., Any]] = {
         Test, UnknownPart, Variation, When,
     )
 }  # fmt: skip
-_ENUMERATIONS: dict[str, type[Enum]] = {
+_ENUMERATIONS: dict[str, type[TextEnum]] = {
     each.__name__: each for each in (Certainty, ClientLibrary, EndpointKind)
 }
 
 
 def encoded(value: object) -> object:
     """``value`` as what JSON has. Raises ``TypeError`` for what is not on the list."""
-    if isinstance(value, Enum):
+    if isinstance(value, TextEnum):
         return {"enum": type(value).__name__, "value": value.value}
     if value is None or isinstance(value, str | bool | int | float):
         return value
