@@ -43,7 +43,7 @@ else:
     class _Name:
         """A name of annotations, also with something in brackets; or a type variable."""
 
-        def __init__(self, *described):
+        def __init__(self, *described, **more):
             pass
 
         def __getitem__(self, described):
