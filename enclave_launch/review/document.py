@@ -7,14 +7,19 @@ just resolved are the same thing.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
-from enclave_launch.policy.derivation import LIST_NAMES, ListName
+from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 
-Operation = ListName
 OPERATIONS = tuple(LIST_NAMES.values())
+if TYPE_CHECKING:
+    from enclave_launch.policy.derivation import ListName
+
+    Operation = ListName
+else:
+    Operation = Literal[OPERATIONS]  # pydantic looks into it
 Kind = Literal["topic", "service", "action"]
 KIND_OF: Mapping[str, Kind] = {
     "publish": "topic",
