@@ -53,11 +53,8 @@ def construct(
         made_object.data["members"] = members or {}
         twice = repeated_base(run.names, cls)
         if twice is not None:
-            run.gap(
-                node,
-                frame,
-                f"{cls.name} has the members of {twice.name} twice: which are meant is not followed",
-            )
+            why = f"{cls.name} has the members of {twice.name} twice: which are meant is not followed"
+            run.gap(node, frame, why)
         _start_fields(run, made_object, cls)
         construct_class(run, made_object, cls, kind, arguments, node, frame)
         return (made_object,)
@@ -98,17 +95,15 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
     if first in KNOWN_HEADERS and not (deliberate and first in ROS_LIBRARIES):
         return
     if first in ROS_LIBRARIES:
-        run.gap(
-            node, frame, f"the class {kind.name} is not in the table of {first}: it may be a node or make one"
-        )
+        why = f"the class {kind.name} is not in the table of {first}: it may be a node or make one"
+        run.gap(node, frame, why)
         return
     header = run.names.foreign_header(kind.name, frame.file)
     if not header and deliberate and "::" not in kind.name:
         header = "no header in reach defines it"
     if header:
-        run.gap(
-            node, frame, f"the class {kind.name} is not in reach ({header}): it may be a node or make one"
-        )
+        why = f"the class {kind.name} is not in reach ({header}): it may be a node or make one"
+        run.gap(node, frame, why)
 
 
 def _start_fields(run: Machine, made_object: Obj, cls: Class) -> None:
@@ -270,12 +265,8 @@ def foreign_base(
         model(run, Call(node, frame, list(values), this.type.arguments, receiver=this))
     elif not is_harmless_class(kind.name):
         place = frame if frame.file is not cls.file else Frame(cls.file, cls.scope)
-        run.gap(
-            node if frame.file is not cls.file else cls.node,
-            place,
-            f"the base class {kind} of {cls.name} is not known: it may be a node or make interfaces",
-            this.node,
-        )
+        why = f"the base class {kind} of {cls.name} is not known: it may be a node or make interfaces"
+        run.gap(node if frame.file is not cls.file else cls.node, place, why, this.node)
         handed_over(run, f"the constructor of {kind}", values, node, frame, ignore=this)
 
 

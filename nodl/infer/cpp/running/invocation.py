@@ -259,9 +259,8 @@ def _check_defaults(
     ]
     written = {tuple(text(p.default) for p in each.parameters[given:]) for each in named}
     if len(written - {("",) * (len(function.parameters) - given)}) > 1:
-        run.gap(
-            node, frame, f"which default arguments {function.name}() gets here is not known: classes differ"
-        )
+        why = f"which default arguments {function.name}() gets here is not known: classes differ"
+        run.gap(node, frame, why)
 
 
 def invoke(

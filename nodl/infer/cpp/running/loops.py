@@ -10,7 +10,6 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.hiding import element_type, seen_type
 from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
-from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import elements_written
 from nodl.infer.cpp.running.statements import bind_names, condition_value, in_a_block
 from nodl.infer.cpp.running.values import Value, join, unknown
@@ -24,37 +23,35 @@ MAX_ROUNDS = 3
 @in_a_block
 def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     """One turn for each item; each turn may also be left out where the items are not exactly known."""
-    right = field_of(node, "right")
-    subject = run.evaluate(right, frame)
-    items, exact = iterated(run, subject, node, frame)
-    body = field_of(node, "body")
-    declarator = field_of(node, "declarator")
-    written = type_text(node)
+    right, body = field_of(node, "right"), field_of(node, "body")
+    items, exact = iterated(run, run.evaluate(right, frame), node, frame)
+    declarator, written = field_of(node, "declarator"), type_text(node)
+    parts = list(walk(declarator)) if declarator is not None else []
+    names = [text(part) for part in parts if part.type == "identifier"]
+    structured = any(part.type == "structured_binding_declarator" for part in parts)
 
     def bind(item: Value) -> None:
-        names = [n for n in walk(declarator) if n.type == "identifier"] if declarator is not None else []
-        if declarator is not None and any(
-            n.type == "structured_binding_declarator" for n in walk(declarator)
-        ):
-            bind_names(run, [text(name) for name in names], item, frame)
+        if structured:
+            bind_names(run, names, item, frame)
         elif names:
             by_value = not set("&*") & set(text(declarator)) and not _points(run, right, frame)
-            kind = run.type_of(written, frame)
-            cls = run.held_class(kind, frame)
+            cls = run.held_class(run.type_of(written, frame), frame)
             own = copied(run, item, node, frame, cls) if by_value else item
-            run.local(frame, text(names[0]), own, written)
+            run.local(frame, names[0], own, written)
 
     outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame)
-    is_reference = (
-        declarator is not None and "&" in text(declarator) and "const" not in text(node).split(":")[0]
-    )
-    if is_reference and right is not None and _is_variable(right):
-        names = (
-            [text(n) for n in walk(declarator) if n.type == "identifier"] if declarator is not None else []
-        )
-        if body is not None and elements_written(run, body, names, frame):
-            assign(run, right, unknown("what a loop writes to the elements"), frame)
+    is_reference = "&" in text(declarator) and "const" not in text(node).split(":")[0]
+    if (
+        is_reference
+        and right is not None
+        and right.type in _VARIABLES
+        and elements_written(run, body, names, frame)
+    ):
+        assign(run, right, unknown("what a loop writes to the elements"), frame)
     return outcome
+
+
+_VARIABLES = ("identifier", "field_expression", "subscript_expression", "pointer_expression")
 
 
 def _points(run: Machine, right: Node | None, frame: Frame) -> bool:
@@ -64,27 +61,19 @@ def _points(run: Machine, right: Node | None, frame: Frame) -> bool:
     return element_type(seen_type(run, right, frame)).pointer
 
 
-def _is_variable(node: Node) -> bool:
-    return node.type in ("identifier", "field_expression", "subscript_expression", "pointer_expression")
-
-
 def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exact: bool, frame: Frame) -> int:
     """The body once for each step; any number of times each unless ``exact``."""
-    if body is None:
-        return NEXT
     if not steps and exact:
         run.kill(body, frame, "the loop runs over nothing")
         return NEXT
-    start = run.store.mark()
-    breaks: list[Changes] = []
-    returns = 0
-    outer_path = frame.path
+    loop = Loop(run.store.mark())
+    returns, outer_path = 0, frame.path
     for index, step in enumerate(steps):
         frame.path = (*outer_path, index)
 
         def once(step: Callable[[], None] = step) -> int:
             step()
-            return _iteration(run, body, frame, start, breaks)
+            return _iteration(run, body, frame, loop)
 
         outcome = once() if exact else run.branches([once, lambda: NEXT])
         returns |= outcome & RETURN
@@ -93,12 +82,17 @@ def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exac
     else:
         outcome = NEXT
     frame.path = outer_path
-    run.settle(start, breaks, bool(outcome & NEXT))
-    return returns | (NEXT if breaks or outcome & NEXT else 0)
+    return returns | _after(run, loop, outcome)
 
 
-def _iteration(run: Machine, body: Node, frame: Frame, start: int, breaks: list[Changes]) -> int:
-    loop = Loop(run.store.mark(), start, breaks)
+def _after(run: Machine, loop: Loop, outcome: int) -> int:
+    """What left the loop early joins what came to its end; whether anything goes on behind it."""
+    run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
+    return NEXT if loop.breaks else outcome & NEXT
+
+
+def _iteration(run: Machine, body: Node | None, frame: Frame, loop: Loop) -> int:
+    loop.mark, loop.continues = run.store.mark(), []
     frame.loops.append(loop)
     outcome = run.execute(body, frame)
     frame.loops.pop()
@@ -112,29 +106,29 @@ def _iteration(run: Machine, body: Node, frame: Frame, start: int, breaks: list[
 @in_a_block
 def for_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Runs like ``while``; with an iterator up to ``end()``, one turn for each element of the container."""
-    initializer = field_of(node, "initializer")
     iterator = _iterator(node)
     if iterator is not None:
         return _over_iterator(run, node, *iterator, frame)
-    if initializer is not None:
-        run.execute(initializer, frame)
-    return _counted(run, node, frame, field_of(node, "condition"), field_of(node, "update"))
+    run.execute(field_of(node, "initializer"), frame)
+    return _counted(run, node, frame)
 
 
 def _iterator(node: Node) -> tuple[str, Node] | None:
     """Variable and container of ``for (auto it = c.begin(); it != c.end(); ++it)``."""
     condition = unwrapped(field_of(node, "condition"))
-    if condition is None or condition.type != "binary_expression":
+    left, right = field_of(condition, "left"), field_of(condition, "right")
+    if (
+        condition is None
+        or condition.type != "binary_expression"
+        or left is None
+        or left.type != "identifier"
+    ):
         return None
-    right = field_of(condition, "right")
-    callee = field_of(right, "function") if right is not None and right.type == "call_expression" else None
-    if callee is None or callee.type != "field_expression" or text(field_of(callee, "field")) not in _ENDINGS:
-        return None
+    callee = field_of(right, "function")  # of a call
     container = field_of(callee, "argument")
-    left = field_of(condition, "left")
     return (
         (text(left), container)
-        if container is not None and left is not None and left.type == "identifier"
+        if container is not None and text(field_of(callee, "field")) in _ENDINGS
         else None
     )
 
@@ -154,51 +148,38 @@ def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: 
 @in_a_block
 def while_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Turn by turn while its condition is decided; else, as for ``while (true)``, to a fixpoint."""
-    return _counted(run, node, frame, field_of(node, "condition"), None)
+    return _counted(run, node, frame)
 
 
-def _counted(run: Machine, node: Node, frame: Frame, condition: Node | None, update: Node | None) -> int:
+def _counted(run: Machine, node: Node, frame: Frame) -> int:
     """As often as the condition is certainly true; after that any number of times."""
-    body = field_of(node, "body")
-    if body is None:
-        return NEXT
-    start = run.store.mark()
-    breaks: list[Changes] = []
-    returns = 0
-    outer_path = frame.path
+    condition, body, update = (field_of(node, name) for name in ("condition", "body", "update"))
+    loop = Loop(run.store.mark())
+    returns, outer_path = 0, frame.path
     for index in range(MAX_UNROLLED):
-        holds = condition_value(run, condition, frame) if condition is not None else None
+        holds = condition_value(run, condition, frame)
         if holds is False:
             if index == 0:
                 run.kill(body, frame, "the condition of the loop is never true")
             break
         if holds is None or text(condition) in ("true", "1", "(true)", "(1)"):
-            returns |= _repeated(run, body, update, condition, frame, start, breaks)
+            returns |= _repeated(run, body, update, condition, frame, loop)
             break
         frame.path = (*outer_path, index)
-        outcome = _iteration(run, body, frame, start, breaks)
+        outcome = _iteration(run, body, frame, loop)
         returns |= outcome & RETURN
         if not outcome & NEXT:
             frame.path = outer_path
-            run.settle(start, breaks, False)
-            return returns | (NEXT if breaks else 0)
-        if update is not None:
-            run.evaluate(update, frame)
+            return returns | _after(run, loop, 0)
+        run.evaluate(update, frame)
     else:
-        returns |= _repeated(run, body, update, condition, frame, start, breaks)
+        returns |= _repeated(run, body, update, condition, frame, loop)
     frame.path = outer_path
-    run.settle(start, breaks, True)
-    return returns | NEXT
+    return returns | _after(run, loop, NEXT)
 
 
 def _repeated(
-    run: Machine,
-    body: Node,
-    update: Node | None,
-    condition: Node | None,
-    frame: Frame,
-    start: int,
-    breaks: list[Changes],
+    run: Machine, body: Node | None, update: Node | None, condition: Node | None, frame: Frame, loop: Loop
 ) -> int:
     """Until nothing changes; what still does after some rounds is not known."""
     returns = 0
@@ -206,18 +187,16 @@ def _repeated(
         mark = run.store.mark()
 
         def once() -> int:
-            outcome = _iteration(run, body, frame, start, breaks)
-            if outcome & NEXT and update is not None:
+            outcome = _iteration(run, body, frame, loop)
+            if outcome & NEXT:
                 run.evaluate(update, frame)
-            if condition is not None:
-                condition_value(run, condition, frame)
+            condition_value(run, condition, frame)
             return outcome
 
-        outcome = run.branches([once, lambda: NEXT])
-        returns |= outcome & RETURN
-        changes = run.store.changes(mark)
+        returns |= run.branches([once, lambda: NEXT]) & RETURN
         before = run.store.before(mark)
-        moved = {cell: value for cell, value in changes.items() if set(before[cell]) != set(value)}
+        changes = run.store.changes(mark).items()
+        moved = {cell: value for cell, value in changes if set(before[cell]) != set(value)}
         if not moved:
             break
         if round_ >= MAX_ROUNDS - 1:
@@ -229,14 +208,9 @@ def _repeated(
 @statement("do_statement")
 def do_statement(run: Machine, node: Node, frame: Frame) -> int:
     """The body once, then any number of times unless it left or the condition is certainly false."""
-    body = field_of(node, "body")
-    start = run.store.mark()
-    breaks: list[Changes] = []
-    if body is None:
-        return NEXT
-    outcome = _iteration(run, body, frame, start, breaks)
-    condition = field_of(node, "condition")
-    if outcome & NEXT and condition_value(run, unwrapped(condition), frame) is not False:
-        outcome |= _repeated(run, body, None, unwrapped(condition), frame, start, breaks)
-    run.settle(start, breaks, bool(outcome & NEXT))
-    return (outcome & RETURN) | (NEXT if breaks or outcome & NEXT else 0)
+    body, condition = field_of(node, "body"), unwrapped(field_of(node, "condition"))
+    loop = Loop(run.store.mark())
+    outcome = _iteration(run, body, frame, loop)
+    if outcome & NEXT and condition_value(run, condition, frame) is not False:
+        outcome |= _repeated(run, body, None, condition, frame, loop)
+    return (outcome & RETURN) | _after(run, loop, outcome)

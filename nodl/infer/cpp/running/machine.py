@@ -148,7 +148,9 @@ class Machine:
         if self.steps > self.limit:
             raise StepLimitExceeded
 
-    def execute(self, node: Node, frame: Frame) -> int:
+    def execute(self, node: Node | None, frame: Frame) -> int:
+        if node is None:
+            return NEXT
         self.count(1)
         self.ran.setdefault(frame.file.file, set()).add(node.start_byte)
         handler = STATEMENTS.get(node.type)
@@ -267,8 +269,9 @@ class Machine:
         """This place has its result: an interface, a gap, or somebody who was followed."""
         self.handled.setdefault(frame.file.file, set()).add(node.start_byte)
 
-    def kill(self, node: Node, frame: Frame, why: str) -> None:
-        self.dead[(frame.file.file, node.start_byte, node.end_byte)] = why
+    def kill(self, node: Node | None, frame: Frame, why: str) -> None:
+        if node is not None:
+            self.dead[(frame.file.file, node.start_byte, node.end_byte)] = why
 
     def conditions(self, node: Node, frame: Frame) -> tuple[Condition, ...]:
         line = line_of(node)
@@ -352,8 +355,8 @@ _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expre
 class Loop:
     """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start``."""
 
-    mark: int
     start: int
+    mark: int = 0
     breaks: list[Changes] = field(default_factory=list)
     continues: list[Changes] = field(default_factory=list)
 

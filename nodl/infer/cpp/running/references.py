@@ -66,13 +66,13 @@ def forget_shadowed(run: Machine, name: str, frame: Frame) -> None:
             frame.aliases[alias] = None
 
 
-def elements_written(run: Machine, body: Node, names: Sequence[str], frame: Frame) -> bool:
+def elements_written(run: Machine, body: Node | None, names: Sequence[str], frame: Frame) -> bool:
     """Whether a loop writes to the plain elements that its references ``names`` stand for."""
     held = [atom for name in names for atom in run.store.get((frame, name)) or BOTTOM]
     held += [inner for atom in held if isinstance(atom, Group) for item in atom.items[1:] for inner in item]
     if not any(isinstance(atom, Text | Param | int | float) for atom in held):
         return False
-    return not writes_of(body).changed.isdisjoint(names)
+    return body is not None and not writes_of(body).changed.isdisjoint(names)
 
 
 def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Frame) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import partial
 
 from nodl.infer.cpp.reading.collect import declared_names
@@ -20,7 +20,7 @@ from nodl.infer.cpp.running.machine import (
 )
 from nodl.infer.cpp.running.objects import declared_value
 from nodl.infer.cpp.running.references import bind_reference
-from nodl.infer.cpp.running.values import BOTTOM, Group, Value, join, truth, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Value, join, truth, unknown
 from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
 
 
@@ -38,14 +38,10 @@ def in_a_block(handler: StatementHandler) -> StatementHandler:
             if not existed:
                 frame.names.discard(name)
                 continue
-            left = [
-                c
-                for loop, breaks, continues in loops
-                for c in (*loop.breaks[breaks:], *loop.continues[continues:])
-            ]
-            for changes in left:
-                if (frame, name) in changes:
-                    changes[(frame, name)] = value
+            for loop, breaks, continues in loops:
+                for changes in (*loop.breaks[breaks:], *loop.continues[continues:]):
+                    if (frame, name) in changes:
+                        changes[(frame, name)] = value
             run.store.set((frame, name), value)
             frame.types[name] = written or ""
         return outcome
@@ -157,32 +153,25 @@ def if_statement(run: Machine, node: Node, frame: Frame) -> int:
                 run.execute(inner, frame)
     value = condition_value(run, condition, frame)
     then, other = field_of(node, "consequence"), field_of(node, "alternative")
-    if value is True and other is not None:
-        run.kill(other, frame, f"the condition {text(condition)[:60]} is always true")
-    if value is False and then is not None:
-        run.kill(then, frame, f"the condition {text(condition)[:60]} is never true")
-    sides = [side for side, dead in ((then, value is False), (other, value is True)) if not dead]
-    if value is not None:
-        return run.execute(sides[0], frame) if sides and sides[0] is not None else NEXT
-    return run.branches([_running(run, side, frame) for side in sides])
+    if value is None:
+        return run.branches([partial(run.execute, side, frame) for side in (then, other)])
+    always = "always" if value else "never"
+    run.kill(other if value else then, frame, f"the condition {text(condition)[:60]} is {always} true")
+    return run.execute(then if value else other, frame)
 
 
 def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool | None:
-    """Runs a condition: certainly true or false, else ``None``, as for a condition that declares."""
-    inner = condition
-    if condition is not None and condition.type == "condition_clause":
-        inner = field_of(condition, "value")
+    """Runs a condition: certainly true or false, else ``None``, as for none, or one that declares."""
+    inner = (
+        field_of(condition, "value")
+        if condition is not None and condition.type == "condition_clause"
+        else condition
+    )
     if inner is not None and inner.type == "declaration":
         if run.names.has_conversions:
             run.evaluate(field_of(inner, "value"), frame)
         return None
-    if inner is None:
-        return None
     return truth(run.evaluate(inner, frame))
-
-
-def _running(run: Machine, node: Node | None, frame: Frame) -> Callable[[], int]:
-    return lambda: run.execute(node, frame) if node is not None else NEXT
 
 
 @statement("preproc_if", "preproc_ifdef", "preproc_elif")
@@ -191,35 +180,32 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
     alternative = field_of(node, "alternative")
     head = (field_of(node, "condition"), field_of(node, "name"), alternative)
     own = [child for child in children(node) if child not in head]
-    sides: list[Callable[[], int]] = [lambda: sequence(run, own, frame)]
-    sides.append(_running(run, alternative, frame))
-    return run.branches(sides)
+    return run.branches([partial(sequence, run, own, frame), partial(run.execute, alternative, frame)])
 
 
 @statement("switch_statement")
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     """The chosen case and those it falls through to; any of the cases where that is not decided."""
-    subject = condition_atoms(run, field_of(node, "condition"), frame)
+    condition = field_of(node, "condition")
+    subject = run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
     chosen, certain = _chosen_cases(run, cases, subject, frame)
     if certain and _has_inner_labels(node):
-        chosen, certain = list(range(len(cases))), False
+        chosen, certain = range(len(cases)), False
         run.gap(node, frame, "a switch jumps into another statement: what it makes is not followed")
-    mark = run.store.mark()
-    loop = _Switch(mark, mark)
+    loop = _Switch(run.store.mark())
     frame.loops.append(loop)
-    sides: list[Callable[[], int]] = [_falling(run, cases[index:], frame) for index in chosen]
-    if not certain:
+    sides: list[Callable[[], int]] = [partial(_falling, run, cases[index:], frame) for index in chosen]
+    if not certain or not sides:
         sides.append(lambda: NEXT)
-    outcome = run.branches(sides or [lambda: NEXT])
+    outcome = run.branches(sides)
     frame.loops.pop()
-    run.settle(loop.mark, loop.breaks, bool(outcome & NEXT))
+    run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
     if outcome & BREAK:
         outcome = (outcome & ~BREAK) | NEXT
-    for index, case in enumerate(cases):
-        if certain and chosen and index < min(chosen):
-            run.kill(case, frame, "the switch never takes this case")
+    for case in cases[: min(chosen, default=0)] if certain else ():
+        run.kill(case, frame, "the switch never takes this case")
     return outcome
 
 
@@ -235,64 +221,50 @@ def _has_inner_labels(switch: Node) -> bool:
     return False
 
 
-def condition_atoms(run: Machine, condition: Node | None, frame: Frame) -> Value:
-    """Everything that the condition of a switch may be."""
-    inner = field_of(condition, "value")
-    return run.evaluate(inner if inner is not None else unwrapped(condition), frame)
-
-
-def _chosen_cases(run: Machine, cases: list[Node], subject: Value, frame: Frame) -> tuple[list[int], bool]:
-    from nodl.infer.cpp.running.values import Const
-
-    known = len(subject) == 1 and isinstance(subject[0], Const | int)
+def _chosen_cases(
+    run: Machine, cases: list[Node], subject: Value, frame: Frame
+) -> tuple[Sequence[int], bool]:
     default = [index for index, case in enumerate(cases) if field_of(case, "value") is None]
-    if not known:
-        return list(range(len(cases))), bool(default)
+    every = range(len(cases)), bool(default)
+    if not _is_number(subject):
+        return every
     labels = [run.evaluate(field_of(case, "value"), frame) for case in cases]
-    if any(
-        len(label) != 1 or not isinstance(label[0], Const | int)
-        for i, label in enumerate(labels)
-        if i not in default
-    ):
-        return list(range(len(cases))), bool(default)
+    if not all(index in default or _is_number(label) for index, label in enumerate(labels)):
+        return every
     matching = [index for index, label in enumerate(labels) if label == subject]
     return (matching or default)[:1], True
 
 
-def _falling(run: Machine, cases: list[Node], frame: Frame) -> Callable[[], int]:
-    def go() -> int:
-        outcome = NEXT
-        for case in cases:
-            value = field_of(case, "value")
-            result = sequence(run, [child for child in children(case) if child != value], frame)
-            outcome = (outcome & ~NEXT) | result
-            if not result & NEXT:
-                break
-        return outcome
+def _is_number(value: Value) -> bool:
+    return len(value) == 1 and isinstance(value[0], Const | int)
 
-    return go
+
+def _falling(run: Machine, cases: list[Node], frame: Frame) -> int:
+    outcome = NEXT
+    for case in cases:
+        value = field_of(case, "value")
+        result = sequence(run, [child for child in children(case) if child != value], frame)
+        outcome = (outcome & ~NEXT) | result
+        if not result & NEXT:
+            break
+    return outcome
 
 
 @statement("try_statement")
 def try_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Runs the body, and after it none or any one of the catch clauses."""
-    body = field_of(node, "body")
-    outcome = run.execute(body, frame) if body is not None else NEXT
+    outcome = run.execute(field_of(node, "body"), frame)
     catches = [child for child in children(node) if child.type == "catch_clause"]
-
-    def caught(clause: Node) -> Callable[[], int]:
-        def go() -> int:
-            for name in (n for n in walk(clause) if n.type == "parameter_declaration"):
-                declared = field_of(name, "declarator")
-                if declared is not None:
-                    run.local(frame, text(declared).lstrip("&* "), unknown("an exception"))
-            inner = field_of(clause, "body")
-            return run.execute(inner, frame) if inner is not None else NEXT
-
-        return go
-
     after: list[Callable[[], int]] = [lambda: outcome]
-    return run.branches([*after, *(caught(clause) for clause in catches)])
+    return run.branches([*after, *(partial(_caught, run, clause, frame) for clause in catches)])
+
+
+def _caught(run: Machine, clause: Node, frame: Frame) -> int:
+    for each in (n for n in walk(clause) if n.type == "parameter_declaration"):
+        declared = field_of(each, "declarator")
+        if declared is not None:
+            run.local(frame, text(declared).lstrip("&* "), unknown("an exception"))
+    return run.execute(field_of(clause, "body"), frame)
 
 
 # --- declarations ---------------------------------------------------------------------------------------------
@@ -301,17 +273,16 @@ def try_statement(run: Machine, node: Node, frame: Frame) -> int:
 @statement("declaration")
 def declaration(run: Machine, node: Node, frame: Frame) -> int:
     """Sets the variables, also static ones, structured bindings and ``Foo f(a);`` read as a function."""
-    written = type_text(node)
-    for declarator in node.children_by_field_name("declarator"):
-        if declarator.type == "function_declarator":
-            _vexing(run, node, declarator, written, frame)
-    structured = _structured(node)
+    declarators = node.children_by_field_name("declarator")
+    functions = [declarator for declarator in declarators if declarator.type == "function_declarator"]
+    for declarator in functions:
+        _vexing(run, node, declarator, frame)
+    structured = _structured(declarators)
     if structured is not None:
         names = [text(each) for each in children(structured[0]) if each.type == "identifier"]
         bind_names(run, names, run.evaluate(structured[1], frame), frame)
         return NEXT
-    functions = [d for d in node.children_by_field_name("declarator") if d.type == "function_declarator"]
-    path, several = frame.path, len(node.children_by_field_name("declarator")) > 1
+    path = frame.path
     for name, value, pointer, written in declared_names(node):
         if any(text(each).startswith(name) for each in functions):
             continue
@@ -320,17 +291,21 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
         if _is_static(node):
             _static_local(run, node, name, kind, initial, frame)
         else:
-            frame.path = (*path, name) if several else path  # each variable is an object of its own
+            frame.path = (
+                (*path, name) if len(declarators) > 1 else path
+            )  # each variable is an object of its own
             run.local(frame, name, initial(), kind)
             frame.path = path
             bind_reference(run, name, kind, value, frame)
     return NEXT
 
 
-def _structured(node: Node) -> tuple[Node, Node | None] | None:
+def _structured(declarators: Sequence[Node]) -> tuple[Node, Node | None] | None:
     """The names of ``auto & [a, b] = value`` and the value."""
-    for declarator in node.children_by_field_name("declarator"):
-        inner = field_of(declarator, "declarator") if declarator.type == "init_declarator" else declarator
+    for declarator in declarators:
+        inner: Node | None = declarator
+        if declarator.type == "init_declarator":
+            inner = field_of(declarator, "declarator")
         while inner is not None and inner.type == "reference_declarator":
             inner = children(inner)[-1]
         if inner is not None and inner.type == "structured_binding_declarator":
@@ -361,18 +336,14 @@ def _static_local(
     frame.kept[name] = kept
 
 
-def _vexing(run: Machine, node: Node, declarator: Node, written: str, frame: Frame) -> None:
+def _vexing(run: Machine, node: Node, declarator: Node, frame: Frame) -> None:
     """``Listener l(buffer, this);`` reads as the declaration of a function."""
-    name = text(field_of(declarator, "declarator"))
-    listed = text(field_of(declarator, "parameters"))
-    arguments = parse_expression(f"f{listed}")
-    if arguments is None or arguments.type != "call_expression":
-        return
+    arguments = parse_expression(f"f{text(field_of(declarator, 'parameters'))}")
     given = field_of(arguments, "arguments")
-    if not children(given):
-        return
-    found = declared_value(run, node, written, given, False, frame)
-    run.local(frame, name, found, written)
+    if arguments is not None and arguments.type == "call_expression" and children(given):
+        written = type_text(node)
+        found = declared_value(run, node, written, given, False, frame)
+        run.local(frame, text(field_of(declarator, "declarator")), found, written)
 
 
 @statement("using_declaration", "alias_declaration", "type_definition", "static_assert_declaration", "comment",

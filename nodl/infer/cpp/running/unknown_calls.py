@@ -72,12 +72,8 @@ def unknown_call(
         harmless = True
     if CREATES.fullmatch(last) and not harmless:
         run.handle(node, frame)
-        run.gap(
-            node,
-            frame,
-            f"{name}() may make an interface; whose is not known",
-            receiver.node if receiver else None,
-        )
+        why = f"{name}() may make an interface; whose is not known"
+        run.gap(node, frame, why, receiver.node if receiver else None)
     if receiver is not None and last.startswith("emplace"):  # the element that it makes may be anything
         handed_over(run, f"an element that {last}() makes", values, node, frame)
     if not (harmless and (receiver is not None or name.startswith("rclcpp"))):  # a timer calls nobody at once
