@@ -28,11 +28,10 @@ CREATES = re.compile(
     r"rclc?_(?:publisher|subscription|service|client|action_server|action_client|node)_init(?:_(?!options)\w+)?"
 )
 MAKERS = frozenset({
-    "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond",
-    "ImageTransport", "Subscriber",
-    "SubscriberFilter", "BufferServer", "BufferClient", "AsyncParametersClient", "SyncParametersClient",
-    "ParameterEventHandler",
-    "InteractiveMarkerServer", "SimpleActionServer", "SimpleActionClient", "ServiceClient", "CameraInfoManager",
+    "TransformListener", "TransformBroadcaster", "StaticTransformBroadcaster", "Updater", "Bond", "ImageTransport",
+    "Subscriber", "SubscriberFilter", "BufferServer", "BufferClient", "AsyncParametersClient", "SyncParametersClient",
+    "ParameterEventHandler", "InteractiveMarkerServer", "SimpleActionServer", "SimpleActionClient", "ServiceClient",
+    "CameraInfoManager",
 })  # fmt: skip
 """Classes of libraries whose objects make interfaces."""
 _MADE = rf"(?:make_shared|make_unique)\s*<\s*(?:\w+::)*(?:{'|'.join(sorted(MAKERS))})\b"

@@ -35,7 +35,6 @@ MAX_FILE_SIZE = 2_000_000
 _REGISTERED = re.compile(
     r"(?:RCLCPP_COMPONENTS_REGISTER_NODE|CLASS_LOADER_REGISTER_CLASS)\s*\(\s*([\w:<>, ]+?)\s*[,)]"
 )
-_EXPORTED = re.compile(r"PLUGINLIB_EXPORT_CLASS\s*\(\s*([\w:<>, ]+?)\s*,\s*([\w:<> ]+?)\s*\)")
 
 
 @dataclass

@@ -4,24 +4,17 @@ from __future__ import annotations
 
 # Header folders whose classes make no node of their own: rclcpp's family is modelled, others know nothing of ROS.
 KNOWN_HEADERS = frozenset({
-    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcl_interfaces", "rcutils",
-    "rmw", "rcpputils",
-    "pluginlib", "class_loader", "message_filters", "tf2_ros", "tf2", "tf2_geometry_msgs", "tf2_eigen",
-    "tf2_sensor_msgs", "tf2_kdl",
-    "image_transport", "diagnostic_updater", "bondcpp", "bond", "cv_bridge", "ament_index_cpp",
-    "realtime_tools", "urdf", "kdl",
-    "laser_geometry", "interactive_markers", "camera_info_manager", "image_geometry", "angles",
-    "rosidl_runtime_cpp", "kdl_parser",
-    "rosidl_runtime_c", "rosidl_typesupport_cpp", "rosidl_typesupport_introspection_cpp", "Eigen", "opencv2",
-    "boost", "pcl", "yaml-cpp", "nlohmann",
-    "sys", "linux", "netinet", "arpa", "gtest", "gmock", "benchmark", "ompl", "ceres", "pcl_conversions",
-    "urdf_parser", "suitesparse",
-    "filters", "resource_retriever", "tracetools", "tinyxml2", "behaviortree_cpp", "behaviortree_cpp_v3",
-    "nanoflann", "geographic_msgs", "GeographicLib",
-    "eigen3_cmake_module", "rsl", "fmt", "parameter_traits", "control_toolbox", "urdf_model", "sdf",
-    "lifecycle_msgs", "OGRE", "tbb", "xtensor",
-    "Magick++", "GraphicsMagick", "console_bridge", "ruckig", "octomap", "fcl", "grid_map_core",
-    "libstatistics_collector",
+    "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcl_interfaces", "rcutils", "rmw",
+    "rcpputils", "pluginlib", "class_loader", "message_filters", "tf2_ros", "tf2", "tf2_geometry_msgs", "tf2_eigen",
+    "tf2_sensor_msgs", "tf2_kdl", "image_transport", "diagnostic_updater", "bondcpp", "bond", "cv_bridge",
+    "ament_index_cpp", "realtime_tools", "urdf", "kdl", "laser_geometry", "interactive_markers", "camera_info_manager",
+    "image_geometry", "angles", "rosidl_runtime_cpp", "kdl_parser", "rosidl_runtime_c", "rosidl_typesupport_cpp",
+    "rosidl_typesupport_introspection_cpp", "Eigen", "opencv2", "boost", "pcl", "yaml-cpp", "nlohmann", "sys", "linux",
+    "netinet", "arpa", "gtest", "gmock", "benchmark", "ompl", "ceres", "pcl_conversions", "urdf_parser", "suitesparse",
+    "filters", "resource_retriever", "tracetools", "tinyxml2", "behaviortree_cpp", "behaviortree_cpp_v3", "nanoflann",
+    "geographic_msgs", "GeographicLib", "eigen3_cmake_module", "rsl", "fmt", "parameter_traits", "control_toolbox",
+    "urdf_model", "sdf", "lifecycle_msgs", "OGRE", "tbb", "xtensor", "Magick++", "GraphicsMagick", "console_bridge",
+    "ruckig", "octomap", "fcl", "grid_map_core", "libstatistics_collector",
 })  # fmt: skip
 
 

@@ -15,8 +15,7 @@ from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 
 _WRAPPERS = frozenset({
     "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",
-    "std::reference_wrapper",
-    "std::atomic", "tl::optional", "boost::optional",
+    "std::reference_wrapper", "std::atomic", "tl::optional", "boost::optional",
 })  # fmt: skip
 
 
@@ -266,7 +265,8 @@ class Names:
             index = self.files.get(each)
             for header in index.source.foreign if index is not None else ():
                 folder = header.partition("/")[0]
-                if "/" in header and self.is_foreign(folder, each) and not _INTERFACES.search(header):
+                is_foreign = folder not in KNOWN_HEADERS and (not self.depends or folder in self.depends)
+                if "/" in header and is_foreign and not _INTERFACES.search(header):
                     if name.partition("::")[0] == folder:
                         return header
                     found = found or ("" if "::" in name else header)
@@ -280,10 +280,6 @@ class Names:
         """Whether a type that is not in reach comes from a header of C that ``file`` includes."""
         seen = (self.files[each].source.foreign for each in self.visible(file.file) if each in self.files)
         return is_of_c(name, [header for foreign in seen for header in foreign])
-
-    def is_foreign(self, folder: str, file: str) -> bool:
-        """Whether a folder of headers belongs to a package that the sources depend on and nobody has reviewed."""
-        return folder not in KNOWN_HEADERS and (not self.depends or folder in self.depends)
 
     # --- types ------------------------------------------------------------------------------------------
 
@@ -367,11 +363,11 @@ class Names:
                     if depth < 6
                     else Type(f"{prefix}::{last}", arguments, pointer)
                 )
-            if (found := self._used(head, scope, file)) is not None:
+            if (found := self._used(head, file)) is not None:
                 return Type(f"{found}::{last}", arguments, pointer)
         return Type(name, arguments, pointer)
 
-    def _used(self, head: str, scope: Scope, file: FileIndex) -> str | None:
+    def _used(self, head: str, file: FileIndex) -> str | None:
         """``msg`` under ``using namespace std_msgs``."""
         if head not in ("msg", "srv", "action"):
             return None

@@ -117,9 +117,9 @@ class _Pass:
             return ""
         word, rest = match[1], match[2].strip()
         if word in ("if", "ifdef", "ifndef"):
-            return self._open(word, rest, number, line)
+            return self._open(word, rest, number)
         if word in ("elif", "else", "endif"):
-            return self._next(word, rest, number, line) if self.stack else ""
+            return self._next(word, rest, number) if self.stack else ""
         if self._active():
             if word == "define":
                 self._define(rest)
@@ -129,7 +129,7 @@ class _Pass:
                 self._include(rest, number)
         return ""
 
-    def _open(self, word: str, rest: str, number: int, line: str) -> str:
+    def _open(self, word: str, rest: str, number: int) -> str:
         parent = self._active()
         condition = {"ifdef": f"defined({rest})", "ifndef": f"!defined({rest})"}.get(word, rest)
         state: bool | None = False
@@ -139,7 +139,7 @@ class _Pass:
         self.stack.append(_Conditional(number, parent, state is True, state, written, condition, number))
         return f"#if {_symbol(condition)}" if written else ""
 
-    def _next(self, word: str, rest: str, number: int, line: str) -> str:
+    def _next(self, word: str, rest: str, number: int) -> str:
         top = self.stack[-1]
         self._close(top, number)
         if word == "endif":

@@ -122,7 +122,9 @@ def construct_class(
         run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
     )
     path = (*frame.path[-24:], (frame.file.file, node.start_byte))
-    inner = run.frame((cls, this, path), class_frame(run, this, cls, frame))
+    inner = run.frame(
+        (cls, this, path), Frame(cls.file, cls.scope, None, this, this.bindings[cls], path=frame.path)
+    )
     if constructor is not None:
         if run.active.count(constructor) > MAX_RECURSION or frame.depth > MAX_DEPTH:
             run.gap(node, frame, f"the constructor of {cls.name} calls itself")
@@ -138,13 +140,13 @@ def construct_class(
         bind_parameters(run, constructor, arguments, inner)
     written = list(constructor.initialisers) if constructor else []
     given = {_member_name(name): value for name, value in written}
-    delegate = next((value for name, value in written if _is_delegate(run, cls, name, inner)), None)
+    delegate = next((value for name, value in written if _is_delegate(cls, name)), None)
     if delegate is not None:
         values = [run.evaluate(each, inner) for each in children(delegate)]
         construct_class(run, this, cls, kind, values, delegate, inner)
     else:
         _bases(run, this, cls, given, arguments, node, inner)
-        _members(run, this, cls, given, node, inner)
+        _members(run, this, cls, given, inner)
     this.building, outside = cls, this.building
     if constructor is not None and constructor.body is not None:
         outcome = run.execute(constructor.body, inner)
@@ -187,7 +189,7 @@ def is_written_back(parameter: FunctionParameter) -> bool:
     return marked and "const" not in parameter.type.split() and bool(parameter.name)
 
 
-def _is_delegate(run: Machine, cls: Class, written: str, inner: Frame) -> bool:
+def _is_delegate(cls: Class, written: str) -> bool:
     """Whether an initialiser names the class itself, not a base or member of the same last name."""
     plain = written.partition("<")[0]
     if plain.rpartition("::")[2] != cls.name or cls.name in cls.fields:
@@ -196,28 +198,17 @@ def _is_delegate(run: Machine, cls: Class, written: str, inner: Frame) -> bool:
     return not same or ("::" in plain and not any(base.partition("<")[0].endswith(plain) for base in same))
 
 
-def class_frame(run: Machine, this: Obj, cls: Class, frame: Frame) -> Frame:
-    """The frame of a constructor of ``cls`` before its parameters: scope, template arguments, ``this``."""
-    return Frame(cls.file, cls.scope, None, this, this.bindings.get(cls, {}), path=frame.path)
-
-
 def _member_name(name: str) -> str:
     return name.partition("<")[0].rpartition("::")[2]
 
 
 def _bases(
-    run: Machine,
-    this: Obj,
-    cls: Class,
-    given: dict[str, Node],
-    arguments: Sequence[Value],
-    node: Node,
-    inner: Frame,
-) -> None:
+    run: Machine, this: Obj, cls: Class, given: dict[str, Node], arguments: Sequence[Value], node: Node, inner: Frame
+) -> None:  # fmt: skip
     for written in _made_by(run, this, cls):
         kind = run.names.resolve(written, cls.scope, cls.file, this.bindings.get(cls))
-        name = _member_name(written)
-        where = given.get(name) or given.get(kind.last) or _alias_initialiser(run, cls, kind, given, inner)
+        where = given.get(_member_name(written)) or given.get(kind.last)
+        where = where or _alias_initialiser(run, cls, kind, given, inner)
         if where is not None:
             run.handle(where, inner)
             values = [run.evaluate(each, inner) for each in children(where)]
@@ -227,15 +218,8 @@ def _bases(
         if base is not None and base is not cls:
             construct_class(run, this, base, kind, values, where or node, inner)
         else:
-            foreign_base(
-                run,
-                this,
-                cls,
-                kind,
-                values,
-                where or node,
-                inner if where is not None else Frame(cls.file, cls.scope, path=inner.path),
-            )
+            frame = inner if where is not None else Frame(cls.file, cls.scope, path=inner.path)
+            _foreign_base(run, this, cls, kind, values, where or node, frame)
 
 
 def _made_by(run: Machine, this: Obj, cls: Class) -> list[str]:
@@ -255,7 +239,7 @@ def _alias_initialiser(
     return None
 
 
-def foreign_base(
+def _foreign_base(
     run: Machine, this: Obj, cls: Class, kind: Type, values: Sequence[Value], node: Node, frame: Frame
 ) -> None:
     """A base whose source is not in reach: of a node, of a library that is known, or a gap."""
@@ -264,13 +248,12 @@ def foreign_base(
     if model is not None:
         model(run, Call(node, frame, list(values), this.type.arguments, receiver=this))
     elif not is_harmless_class(kind.name):
-        place = frame if frame.file is not cls.file else Frame(cls.file, cls.scope)
         why = f"the base class {kind} of {cls.name} is not known: it may be a node or make interfaces"
-        run.gap(node if frame.file is not cls.file else cls.node, place, why, this.node)
+        run.gap(cls.node if frame.file is cls.file else node, frame, why, this.node)
         handed_over(run, f"the constructor of {kind}", values, node, frame, ignore=this)
 
 
-def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: Node, inner: Frame) -> None:
+def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], inner: Frame) -> None:
     known: Mapping[str, Value] = this.data.get("members", {})  # of an aggregate
     of_class = Frame(
         cls.file, cls.scope, None, this, inner.bindings, path=inner.path, conditions=inner.conditions, depth=inner.depth
@@ -278,31 +261,31 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], node: 
     for name, member in cls.fields.items():
         if member.static:
             continue
-        if name in known:
-            run.store.set(
-                (this, cell_of(run, this, name, cls)), _given(run, this, cls, member, known[name], inner)
-            )
-            continue
-        where = given.get(name)
-        frame = inner if where is not None else of_class
-        value = where if where is not None else member.default
-        if value is not None:
-            run.handle(value, frame)
-        at = value if value is not None else member.node
         kind = run.names.resolve(member.type, cls.scope, cls.file, this.bindings.get(cls))
-        pointer = member.pointer or kind.pointer
-        if value is not None and not pointer and value.type in ("argument_list", "initializer_list"):
-            found = made(run, at, kind, children(value), frame)
-        elif value is not None and (pointer or member.type == "auto"):
-            found = initial_value(run, value, frame, True)
-        elif value is not None:
-            found = converted(run, kind, run.evaluate(value, frame), at, frame)
-        elif pointer:
-            found = BOTTOM
+        where, kind = given.get(name), kind._replace(pointer=member.pointer or kind.pointer)
+        if name in known:
+            found = known[name]
+            if not kind.pointer:
+                found = copied(run, found, member.node, inner, run.class_of(kind, cls))
         else:
-            keyed = replace(of_class, path=(*inner.path, name))
-            found = default_value(run, member.node, kind, keyed)
+            found = _member(
+                run, member, kind, where or member.default, inner if where is not None else of_class
+            )
         run.store.set((this, cell_of(run, this, name, cls)), found)
+
+
+def _member(run: Machine, member: Field, kind: Type, value: Node | None, frame: Frame) -> Value:
+    """What a member holds at first: of its initialiser, else as it is declared."""
+    if value is None:
+        if kind.pointer:
+            return BOTTOM
+        return default_value(run, member.node, kind, replace(frame, path=(*frame.path, member.name)))
+    run.handle(value, frame)
+    if kind.pointer or (member.type == "auto" and value.type not in ("argument_list", "initializer_list")):
+        return initial_value(run, value, frame, True)
+    if value.type in ("argument_list", "initializer_list"):
+        return made(run, value, kind, children(value), frame)
+    return converted(run, kind, run.evaluate(value, frame), value, frame)
 
 
 def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value], inner: Frame) -> None:
@@ -323,14 +306,6 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
                 value = run.evaluate(parameter.default, place)
         if parameter.name:
             run.local(inner, parameter.name, value, parameter.type)
-
-
-def _given(run: Machine, this: Obj, cls: Class, member: Field, value: Value, inner: Frame) -> Value:
-    """A member that braces fill: an object of its class."""
-    kind = run.names.resolve(member.type, cls.scope, cls.file, this.bindings.get(cls))
-    if member.pointer or kind.pointer:
-        return value
-    return copied(run, value, member.node, inner, run.class_of(kind, cls))
 
 
 def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node: Node, inner: Frame) -> Value:

@@ -47,15 +47,12 @@ _COMMON = frozenset({
 })  # fmt: skip
 
 CONTAINER_METHODS = frozenset({
-    "push_back", "emplace_back", "emplace", "insert", "insert_or_assign", "try_emplace", "at", "front", "back",
-    "begin", "end", "find",
-    "size", "empty", "clear", "c_str", "str", "data", "append", "substr", "length", "erase", "push_front",
-    "emplace_front",
-    "resize", "reserve", "pop_back", "rbegin", "cbegin", "cend", "rfind", "compare", "string", "count",
-    "assign", "value_or",
-    "has_value", "starts_with", "ends_with", "replace", "contains", "find_first_of", "find_last_of", "first",
-    "second", "fill", "pop_front", "swap", "remove_prefix", "remove_suffix", "pop", "unique", "remove",
-    "sort", "reverse",
+    "push_back", "emplace_back", "emplace", "insert", "insert_or_assign", "try_emplace", "at", "front", "back", "begin",
+    "end", "find", "size", "empty", "clear", "c_str", "str", "data", "append", "substr", "length", "erase",
+    "push_front", "emplace_front", "resize", "reserve", "pop_back", "rbegin", "cbegin", "cend", "rfind", "compare",
+    "string", "count", "assign", "value_or", "has_value", "starts_with", "ends_with", "replace", "contains",
+    "find_first_of", "find_last_of", "first", "second", "fill", "pop_front", "swap", "remove_prefix", "remove_suffix",
+    "pop", "unique", "remove", "sort", "reverse",
 })  # fmt: skip
 
 
@@ -86,9 +83,8 @@ def container_call(run: Machine, atom: object, name: str, site: CallSite) -> Val
 _ADDING = frozenset({"emplace_back", "push_back", "push_front", "emplace_front", "insert", "push", "emplace"})
 _PARAMETER_VIEWS = frozenset({
     "as_string", "as_int", "as_bool", "as_double", "as_string_array", "get_value", "get", "value_to_string",
-    "get_parameter_value",
-    "as_integer_array", "as_double_array", "as_bool_array", "as_byte_array", "to_value_msg", "value", "c_str",
-    "str", "begin",
+    "get_parameter_value", "as_integer_array", "as_double_array", "as_bool_array", "as_byte_array", "to_value_msg",
+    "value", "c_str", "str", "begin",
 })  # fmt: skip
 
 

@@ -131,7 +131,7 @@ def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
                 run.store.set(cell, join(*before, *read))
 
 
-def iterated(run: Machine, subject: Value, node: Node, frame: Frame) -> tuple[list[Value], bool]:
+def iterated(run: Machine, subject: Value) -> tuple[list[Value], bool]:
     """What a loop over ``subject`` goes through; whether that is exactly known."""
     if len(subject) == 1:
         items, exact = items_of(run, subject[0])

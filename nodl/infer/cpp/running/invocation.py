@@ -187,7 +187,7 @@ def _of_class(
     run: Machine, methods: Sequence[Function], this_object: Obj | None, bindings: dict[str, Type] | None
 ) -> list[Type]:
     """The arguments of the class whose methods these are."""
-    bound = bindings or (_class_bindings(run, methods[0], this_object) if this_object is not None else {})
+    bound = bindings or (_class_bindings(methods[0], this_object) if this_object is not None else {})
     return list(bound.values())
 
 
@@ -283,8 +283,8 @@ def invoke(
     )  # fmt: skip
     inner = run.frame((function, this_object, inner.path), inner)
     if this_object is not None:
-        inner.bindings = {**_class_bindings(run, function, this_object), **(bindings or {})}
-    deduced = {**_element_types(run, function, node, frame), **_deduced(run, function, values, types)}
+        inner.bindings = {**_class_bindings(function, this_object), **(bindings or {})}
+    deduced = {**_element_types(run, function, node, frame), **_deduced(function, values, types)}
     inner.bindings = {**inner.bindings, **deduced}
     given = (tuple(values), inner.bindings, inner.conditions, len(run.nodes))
     key = (function, this_object, inner.path)
@@ -356,7 +356,7 @@ def _successes(inner: Frame) -> list[Changes]:
 _FAILED = re.compile(r"::(?:FAILURE|ERROR)$")
 
 
-def _class_bindings(run: Machine, function: Function, this_object: Obj) -> dict[str, Type]:
+def _class_bindings(function: Function, this_object: Obj) -> dict[str, Type]:
     for cls, bound in this_object.bindings.items():
         if (
             cls.qualified == function.owner
@@ -384,9 +384,7 @@ def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -
     return bound
 
 
-def _deduced(
-    run: Machine, function: Function, values: Sequence[Value], types: Sequence[Type]
-) -> dict[str, Type]:
+def _deduced(function: Function, values: Sequence[Value], types: Sequence[Type]) -> dict[str, Type]:
     """Template parameters: as given, else from the types of the arguments."""
     if not function.templates:
         return {}

@@ -24,7 +24,7 @@ MAX_ROUNDS = 3
 def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     """One turn for each item; each turn may also be left out where the items are not exactly known."""
     right, body = field_of(node, "right"), field_of(node, "body")
-    items, exact = iterated(run, run.evaluate(right, frame), node, frame)
+    items, exact = iterated(run, run.evaluate(right, frame))
     declarator, written = field_of(node, "declarator"), type_text(node)
     parts = list(walk(declarator)) if declarator is not None else []
     names = [text(part) for part in parts if part.type == "identifier"]
@@ -138,7 +138,7 @@ _ENDINGS = frozenset({"end", "cend", "rend", "crend"})
 
 def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: Frame) -> int:
     """The iterator stands for the element that it points to."""
-    items, exact = iterated(run, run.evaluate(container, frame), node, frame)
+    items, exact = iterated(run, run.evaluate(container, frame))
     exact = exact and field_of(node, "update") is not None
     body = field_of(node, "body")
     return _over(run, body, [partial(run.local, frame, name, item) for item in items], exact, frame)

@@ -33,9 +33,8 @@ Standard = Callable[[Machine, Sequence[Value], Node, Frame], Value]
 STANDARD: dict[str, Standard] = {}
 CASTS = frozenset({
     "static_cast", "dynamic_cast", "const_cast", "reinterpret_cast", "std::static_pointer_cast",
-    "std::dynamic_pointer_cast",
-    "std::const_pointer_cast", "std::move", "std::forward", "std::ref", "std::cref", "std::as_const", "move",
-    "dynamic_pointer_cast", "static_pointer_cast", "std::addressof", "std::any_cast",
+    "std::dynamic_pointer_cast", "std::const_pointer_cast", "std::move", "std::forward", "std::ref", "std::cref",
+    "std::as_const", "move", "dynamic_pointer_cast", "static_pointer_cast", "std::addressof", "std::any_cast",
 })  # fmt: skip
 
 
