@@ -14,8 +14,6 @@ from typing import Any, Literal, Optional, Union
 
 from pydantic import BaseModel, Field, StrictBool, StrictFloat, StrictInt, StrictStr
 
-from enclave_launch.review.document import Operation
-
 # Only what pydantic 1.8 and 2 have in common: no ``|``, strict types in unions, ``...`` for what is required.
 JsonScalar = Union[StrictBool, StrictInt, StrictFloat, StrictStr]
 JsonParameter = Union[JsonScalar, list[JsonScalar]]
@@ -117,6 +115,12 @@ class Enclave(_Strict, frozen=True):
     serve_services: list[str]
     call_actions: list[str]
     serve_actions: list[str]
+
+
+# Of its own: that of the policy is there for type checkers only.
+Operation = Literal[
+    "publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"
+]
 
 
 class Interface(_Strict, frozen=True):
