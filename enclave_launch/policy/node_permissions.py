@@ -297,7 +297,8 @@ def _parameter_note(template: NameTemplate, node: RunningNode) -> str:
         if isinstance(part, ParameterPart):
             given = part.name in node.parameters or part.name in node.inputs.values
             what = "input" if part.name[:1] in "-<$" else "parameter"
-            notes.append(f"{what} {part.name}, {'set by launch' if given else 'its default'}")
+            place = "in its environment" if part.name[0] == "$" else "by launch"
+            notes.append(f"{what} {part.name}, {f'set {place}' if given else 'its default'}")
     return "; ".join(notes)
 
 

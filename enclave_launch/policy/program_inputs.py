@@ -29,30 +29,34 @@ class ProgramInputs(NamedTuple):
 
     def doubtful(self, template: NameTemplate) -> NameTemplate:
         """``template`` with an unknown part for each input whose value the command line may set unseen."""
-        if not (self.bare_words or self.short_flags):
-            return template
         return NameTemplate(tuple(self._doubted(part) for part in template.parts))
 
     def _doubted(self, part: Part) -> Part:
         if not isinstance(part, ParameterPart) or part.name in self.values:
             return part
-        if (part.name[:1] == "<" and self.bare_words) or (part.name[:1] == "-" and self.short_flags):
+        shortened = any(len(name) > 2 and part.name.startswith(name) for name in self.values)  # argparse
+        if (part.name[:1] == "<" and self.bare_words) or (
+            part.name[:1] == "-" and (self.short_flags or shortened)
+        ):
             return UnknownPart(f"the command line may set {part.name}")
         return part
+
+
+def environment_inputs(process: ResolvedProcess) -> ProgramInputs:
+    """What each program in ``process`` finds in its environment, inherited variables included."""
+    return ProgramInputs({f"${name}": value for name, value in process.final_environment.items()})
 
 
 def program_inputs(process: ResolvedProcess) -> ProgramInputs:
     """The inputs of ``process``; an option's value follows ``=`` or is the next word without dash, and where there
     are not any options each word is also known by its place (``<1>``, as learnt manifests have it)."""
-    values = {f"${name}": value for name, value in process.environment.items()}
+    values = dict(environment_inputs(process).values)
     words = own_words(process)
     for word, following in zip(words, (*words[1:], ""), strict=False):
         if _is_flag(word):
             name, equals, value = word.partition("=")
             values[name] = value if equals or _is_flag(following) else following
-    if not any(
-        map(_is_flag, words)
-    ):  # an option may take the next word, so beside options places tell nothing
+    if not any(map(_is_flag, words)):  # an option may take the next word: beside options places tell nothing
         values.update((f"<{place}>", word) for place, word in enumerate(words, 1))
     return ProgramInputs(
         values,

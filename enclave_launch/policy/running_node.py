@@ -14,7 +14,7 @@ from collections.abc import Mapping
 
 from enclave_launch.boundary.light import Literal, NamedTuple
 from enclave_launch.errors import LaunchFileError
-from enclave_launch.policy.program_inputs import ProgramInputs, program_inputs
+from enclave_launch.policy.program_inputs import ProgramInputs, environment_inputs, program_inputs
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, remap_arguments
@@ -84,7 +84,7 @@ def node_of_component(
         forwarded = _rules_of_command(container)
     local = _own_rules(interface) or _rules_of_load_request(component)
     rules = RemapRules(local=local, process=forwarded)
-    inputs = ProgramInputs()
+    inputs = environment_inputs(container) if container is not None else ProgramInputs()
     node = _named(interface, rules, component.parameters, enclave, component.location, "component", inputs)
     return node._replace(process_namespace=_namespace(container)) if container is not None else node
 

@@ -15,6 +15,7 @@ from enclave_launch.plan import Found, LaunchPlan, LaunchSource, Missing, PlanOp
 from enclave_launch.planner import Planner
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from nodl.name_template import NameTemplate, ParameterPart
 
 from .conftest import make_node
 
@@ -223,3 +224,13 @@ def test_the_programs_own_namespace_holds_until_launch_gives_one(
     monkeypatch.setitem(globals(), "CAMERA", CAMERA._replace(namespace="/own"))
     assert {"publish /own/image", "reply /own/camera/get_parameters"} <= granted(box())
     assert not any("/own" in name for name in granted(box(attributes='namespace="/left"')))
+
+
+def test_a_component_finds_the_environment_of_its_container(
+    box: Box, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    topic = CAMERA.endpoints[0]._replace(name=NameTemplate((ParameterPart("$TOPIC", "image"),)))
+    monkeypatch.setitem(globals(), "CAMERA", CAMERA._replace(endpoints=(topic,)))
+    assert "publish /image" in granted(box())
+    monkeypatch.setenv("TOPIC", "picture")
+    assert "publish /picture" in granted(box()) and "publish /image" not in granted(box())

@@ -41,9 +41,10 @@ def process(*arguments: str, environment: Mapping[str, str] | None = None) -> Re
         ),
         remaps=(),
         parameters={},
-        environment=environment or {},
+        environment={},
         enclave=EnclaveRequest(),
         location=SourceLocation("demo.launch.xml", 3),
+        final_environment=environment or {},
     )
 
 
@@ -64,10 +65,16 @@ KNOWN = {
     "an option": ("--topic", process("--topic", "loud"), "/loud"),
     "an option with =": ("--topic", process("--topic=loud"), "/loud"),
     "an option with one dash": ("-t", process("-t", "loud"), "/loud"),
+    "the last of two equal options": ("--topic", process("--topic", "old", "--topic", "loud"), "/loud"),
+    "an option beside a flag without value": ("--topic", process("--verbose", "--topic", "loud"), "/loud"),
     "an option that launch leaves alone": ("--topic", process("--rate", "5"), "/chatter"),
     "no arguments at all": ("<topic>", process(), "/chatter"),
+    "another option that begins likewise": ("--topic", process("--topic-type", "x"), "/chatter"),
+    "a positional argument by its place": ("<1>", process("loud", "other"), "/loud"),
+    "the next by its place": ("<2>", process("other", "loud"), "/loud"),
+    "what follows ROS arguments": ("--topic", process("--ros-args", "--", "--topic", "loud"), "/loud"),
     "a variable": ("$TOPIC", process(environment={"TOPIC": "loud"}), "/loud"),
-    "a variable that launch leaves alone": ("$TOPIC", process(environment={"OTHER": "x"}), "/chatter"),
+    "a variable that nobody sets": ("$TOPIC", process(environment={"OTHER": "x"}), "/chatter"),
 }
 
 
@@ -82,6 +89,9 @@ def test_values_that_launch_passes(case: str) -> None:
 DOUBTFUL = {
     "a positional argument": ("<topic>", process("loud")),
     "a word after a flag that may take no value": ("<topic>", process("--verbose", "loud")),
+    "a place beside options, of which one may take the word": ("<1>", process("--verbose", "loud")),
+    "an option, shortened": ("--topic", process("--top", "loud")),
+    "an option, shortened, with =": ("--topic", process("--top=loud")),
     "an option that may have a short spelling": ("--topic", process("-t", "loud")),
 }
 

@@ -106,6 +106,19 @@ def test_a_component_in_a_container_that_is_not_here_has_no_namespace_of_a_proce
     assert (node.fqn, node.process_namespace) == ("/eye", "/")
 
 
+def test_rules_forwarded_from_a_container_that_is_not_here_are_not_known(tmp_path: Path) -> None:
+    forward = '<extra_arg name="forward_global_arguments" value="true"/>'
+    node = component_node(tmp_path, interface(), 'name="eye"', REMAP + forward, contained=False)
+    assert (node.fqn, names(node)) == ("/eye", ["picture"])
+
+
+def test_a_component_without_a_name_keeps_the_one_of_its_class(tmp_path: Path) -> None:
+    """As Python launch files may load it; an empty ``__node`` in its load request would be refused by rcl."""
+    box, (component,) = launched(tmp_path, BOX.format('name="eye" namespace="/left"', ""))
+    unnamed = component._replace(name="")
+    assert node_of_component(unnamed, box, interface(), "/").fqn == "/left/talker"
+
+
 def test_a_further_node_of_a_component_obeys_its_own_rules_and_the_container(tmp_path: Path) -> None:
     """One that the component makes itself, with options of its own: rcl gives it the process's arguments."""
     helper = interface(original="helper", own_rules=("__node:=helper",))
