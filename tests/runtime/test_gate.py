@@ -96,6 +96,9 @@ BEYOND = {
     "another remap rule": TALKER._replace(cmd=("talker", "--ros-args", "-r", "chatter:=secret")),
     "another enclave": TALKER._replace(enclave=EnclaveRequest(attribute="/root")),
     "its own enclave argument": TALKER._replace(enclave=EnclaveRequest(scope="/robot", argument="/root")),
+    "a prefix": TALKER._replace(prefix="other-program"),
+    "another domain": TALKER._replace(final_environment={"ROS_DOMAIN_ID": "7"}),
+    "another middleware": TALKER._replace(final_environment={"RMW_IMPLEMENTATION": "rmw_other"}),
     "simulated time": TALKER._replace(parameters={"use_sim_time": True}),
     "an executable with an enclave": TALKER._replace(
         kind="executable", package=None, fqn=None, enclave=EnclaveRequest(attribute="/root")
@@ -134,6 +137,24 @@ def test_a_component_that_was_not_planned_cannot_be_granted_any_more() -> None:
     guard.ensure_components([CAMERA])
     with pytest.raises(LateProcess, match=r"camera/camera::Spy for /robot/box"):
         guard.ensure_components([CAMERA._replace(plugin="camera::Spy")])
+
+
+@pytest.mark.parametrize(
+    "late",
+    [
+        CAMERA._replace(container="/robot/other"),
+        CAMERA._replace(package="evil"),
+        CAMERA._replace(name="eye"),
+        CAMERA._replace(namespace="/other"),
+        CAMERA._replace(parameters={"use_sim_time": True}),
+    ],
+    ids=["another container", "another package", "another name", "another namespace", "simulated time"],
+)
+def test_a_component_that_differs_from_the_plan_is_refused(late: ResolvedComponent) -> None:
+    guard, _, _ = gate()
+    guard.ensure_components([CAMERA._replace(on_event="OnProcessExit a-1")])
+    with pytest.raises(LateProcess, match="its container has read its permissions already"):
+        guard.ensure_components([CAMERA, late])
 
 
 def test_the_place_is_told_as_written(tmp_path: Path) -> None:
