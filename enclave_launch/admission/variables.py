@@ -81,10 +81,13 @@ def _documents(value: str) -> Iterator[str]:
 
 
 def domain_of(environment: Mapping[str, str]) -> int:
-    """The DDS domain of a process: a plain number, and no value for 0 (rcl ``domain_id.c``).
+    """The DDS domain of a process; no value is 0. Read by ``strtoul`` with base 0 (rcl ``domain_id.c``): ``010`` is 8.
 
     Raises ``UsageError`` for what rcl, or Cyclone DDS in a governance, would refuse."""
     text = environment.get(DOMAIN) or "0"
-    if re.fullmatch("[0-9]{1,3}", text) is None or int(text) > HIGHEST_ID:
-        raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
-    return int(text)
+    number = re.fullmatch("0(?P<octal>[0-7]*)|0[xX](?P<hex>[0-9a-fA-F]+)|[1-9][0-9]*", text)
+    if number is not None:
+        domain = int(text, 8 if number["octal"] else 16 if number["hex"] else 10)
+        if domain <= HIGHEST_ID:
+            return domain
+    raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")

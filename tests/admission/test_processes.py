@@ -120,7 +120,16 @@ def test_a_domain_that_was_not_asked_for_is_refused_with_both_places(plan: Plan,
     provision(found, tmp_path / "ks", options=both)
 
 
-@pytest.mark.parametrize("value", ["abc", "231", "-1", "1 2", "0x5"])
+@pytest.mark.parametrize(
+    ("value", "domain"), [("0", 0), ("7", 7), ("230", 230), ("010", 8), ("00", 0), ("0x1F", 31), ("", 0)]
+)
+def test_a_domain_is_read_as_rcl_reads_it(value: str, domain: int, plan: Plan) -> None:
+    """``strtoul`` with base 0 (rcl domain_id.c)."""
+    found = plan(TALKER.format(f'<env name="ROS_DOMAIN_ID" value="{value}"/>'))
+    assert (found.processes[0].domain, found.problems) == (domain, ())
+
+
+@pytest.mark.parametrize("value", ["abc", "231", "-1", "1 2", "08", "0o7", "0x", "0xE7"])
 def test_an_impossible_domain_is_a_problem_with_its_place(value: str, plan: Plan) -> None:
     found = plan(TALKER.format(f'<env name="ROS_DOMAIN_ID" value="{value}"/>'))
     assert codes(found) == [Code.DOMAIN_INVALID]

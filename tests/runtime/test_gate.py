@@ -96,7 +96,7 @@ BEYOND = {
     "another remap rule": TALKER._replace(cmd=("talker", "--ros-args", "-r", "chatter:=secret")),
     "another enclave": TALKER._replace(enclave=EnclaveRequest(attribute="/root")),
     "its own enclave argument": TALKER._replace(enclave=EnclaveRequest(scope="/robot", argument="/root")),
-    "a prefix": TALKER._replace(prefix="other-program"),
+    "a prefix": TALKER._replace(prefix=("other-program",)),
     "another domain": TALKER._replace(final_environment={"ROS_DOMAIN_ID": "7"}),
     "another middleware": TALKER._replace(final_environment={"RMW_IMPLEMENTATION": "rmw_other"}),
     "simulated time": TALKER._replace(parameters={"use_sim_time": True}),

@@ -16,6 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.admission.variables import domain_of
 from enclave_launch.boundary.terminal import json_text, message
 from enclave_launch.errors import EnclaveLaunchError, UsageError, translated
 from enclave_launch.verb.options import PATH, PATHS, TEXT, TEXTS, one_of
@@ -132,7 +133,7 @@ def _domain(options: argparse.Namespace, document: Any) -> int:
         raise UsageError(
             f"drift: the plan has processes in the domains {listed}: say with --domain-id which to look at"
         )
-    return domains[0] if domains else int(os.environ.get("ROS_DOMAIN_ID") or 0)
+    return domains[0] if domains else domain_of(os.environ)
 
 
 def _security(options: argparse.Namespace) -> Security | None:
