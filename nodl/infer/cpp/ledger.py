@@ -35,6 +35,7 @@ MAKERS = frozenset({
 })  # fmt: skip
 """Classes of libraries whose objects make interfaces."""
 _MADE = rf"(?:make_shared|make_unique)\s*<\s*(?:\w+::)*(?:{'|'.join(sorted(MAKERS))})\b"
+_DECLARES = ("function_declarator", "using_declaration", "template_parameter_list", "friend_declaration")
 _MAKING = ("call_expression", "field_initializer", "argument_list", "new_expression")
 _SITE = re.compile(
     rf"(?<![\w])({CREATES.pattern})(?=\s*[<(])|(?<![\w])({_MADE})|(?<![\w])(new\s+(?:\w+::)*(?:{'|'.join(sorted(MAKERS))}))\b"
@@ -182,16 +183,9 @@ def _is_handled(index: FileIndex, site: Site, handled: set[int]) -> bool:
 def _is_declaration(index: FileIndex, site: Site) -> bool:
     """``create_publisher`` as the name of a method that is only declared, or in a macro that nobody uses."""
     node = index.tree.root_node.descendant_for_byte_range(site.offset, site.offset + 1)
-    while node is not None:
-        if node.type in (
-            "function_declarator",
-            "using_declaration",
-            "template_parameter_list",
-            "friend_declaration",
-        ):
+    while node is not None and node.type not in ("call_expression", "ERROR", "init_declarator"):
+        if node.type in _DECLARES:
             return True
-        if node.type in ("call_expression", "ERROR", "init_declarator"):
-            return False
         node = node.parent
     return False
 

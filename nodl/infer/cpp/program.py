@@ -7,8 +7,6 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-import nodl.infer.cpp.models
-import nodl.infer.cpp.running.rules  # noqa: F401  (registers how statements and expressions run)
 from enclave_launch.boundary.files import read_bytes
 from nodl.infer.cpp.cache.folder import digest_of, digest_of_content
 from nodl.infer.cpp.entry import Entry
@@ -23,6 +21,7 @@ from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running import calls, expressions, loops, operators, statements  # noqa: F401 (how each runs)
 from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.machine import Frame, Machine, StepLimitExceeded

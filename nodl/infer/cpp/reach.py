@@ -16,8 +16,8 @@ from enclave_launch.boundary.light import TYPE_CHECKING, late_pattern
 from nodl.infer.cpp.entry import Answer
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.answering import Answering
     from nodl.infer.cpp.reading.project import SourcePackage, Workspace
+    from nodl.infer.cpp.system import Answering
     from nodl.infer.start import Start
 
 _HOME = late_pattern(r"^CMAKE_HOME_DIRECTORY:\w+=(.+)$", re.MULTILINE)
@@ -45,7 +45,7 @@ class SourcesInReach:
 
     @cached_property
     def _answering(self) -> Answering:
-        from nodl.infer.cpp.answering import Answering  # the whole analysis of C++ comes with it
+        from nodl.infer.cpp.system import Answering  # the whole analysis of C++ comes with it
 
         return Answering(self._workspace)
 

@@ -28,31 +28,15 @@ from nodl.infer.cpp.reading.cmake_language import (
 )
 
 _SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C")
-_EXECUTABLES = frozenset(
-    {
-        "add_executable",
-        "ament_auto_add_executable",
-        "rclcpp_add_executable",
-        "qt5_add_executable",
-        "qt6_add_executable",
-        "qt_add_executable",
-    }
-)
+_EXECUTABLES = frozenset({
+    "add_executable", "ament_auto_add_executable", "rclcpp_add_executable", "qt5_add_executable", "qt6_add_executable",
+    "qt_add_executable",
+})  # fmt: skip
 _LIBRARIES = frozenset({"add_library", "ament_auto_add_library"})
-_LIBRARY_WORDS = frozenset(
-    {
-        "SHARED",
-        "STATIC",
-        "MODULE",
-        "OBJECT",
-        "INTERFACE",
-        "EXCLUDE_FROM_ALL",
-        "IMPORTED",
-        "ALIAS",
-        "GLOBAL",
-        "UNKNOWN",
-    }
-)
+_GLOB_OPTIONS = frozenset({"CONFIGURE_DEPENDS", "RELATIVE", "LIST_DIRECTORIES", "true", "false"})
+_LIBRARY_WORDS = frozenset({
+    "SHARED", "STATIC", "MODULE", "OBJECT", "INTERFACE", "EXCLUDE_FROM_ALL", "IMPORTED", "ALIAS", "GLOBAL", "UNKNOWN",
+})  # fmt: skip
 
 
 @dataclass
@@ -71,22 +55,17 @@ class Target:
 class Build:
     """``plugins``: class -> executable that is made for it; ``plugin_files``: descriptions for pluginlib."""
 
-    folder: str = ""
     targets: dict[str, Target] = field(default_factory=dict)
     plugins: dict[str, str | None] = field(default_factory=dict)
     plugin_targets: dict[str, str] = field(default_factory=dict)  # class -> library target
     plugin_files: list[str] = field(default_factory=list)
     includes: list[str] = field(default_factory=list)
     renamed: dict[str, str] = field(default_factory=dict)  # target -> OUTPUT_NAME
-    parameter_files: dict[str, str] = field(
-        default_factory=dict
-    )  # library -> YAML of generate_parameter_library
-    questions: list[tuple[str, str]] = field(default_factory=list)
 
 
 def read_build(folder: str | None) -> Build:
     """The build of a package folder; an empty one without ``CMakeLists.txt``."""
-    build = Build(folder or "")
+    build = Build()
     if folder is not None:
         _Reader(build).read(folder, {})
     return build
@@ -161,40 +140,28 @@ class _Reader:
             return
         if not given:
             return
-        if name in _EXECUTABLES:
-            self._target(given, variables, executable=True, automatic=name.startswith("ament_auto"))
-        elif name in _LIBRARIES:
-            self._target(given, variables, executable=False, automatic=name.startswith("ament_auto"))
-        else:
-            handler = getattr(self, f"_do_{name}", None)
-            if handler is not None:
-                handler(given, variables)
+        if name in _EXECUTABLES | _LIBRARIES:
+            self._target(name, given, variables)
+        elif (handler := getattr(self, f"_do_{name}", None)) is not None:
+            handler(given, variables)
 
     def _call(self, name: str, given: list[str], variables: dict[str, str]) -> None:
         own, parameters, body = self.functions[name]
-        inner = {
-            **dict(zip(parameters, given, strict=False)),
-            "ARGN": ";".join(given[len(parameters) :]),
-            "ARGV": ";".join(given),
-        }
-        inner.update({f"ARGV{index}": word for index, word in enumerate(given)})
+        inner = dict(zip(parameters, given, strict=False))
+        inner |= {"ARGN": ";".join(given[len(parameters) :]), "ARGV": ";".join(given)}
+        inner |= {f"ARGV{index}": word for index, word in enumerate(given)}
         self.run(body, {**variables, **inner} if own else Layer(variables, inner))
 
-    def _target(
-        self, given: list[str], variables: dict[str, str], *, executable: bool, automatic: bool
-    ) -> None:
+    def _target(self, name: str, given: list[str], variables: dict[str, str]) -> None:
         if "IMPORTED" in given or "ALIAS" in given:
             return
-        target = self.build.targets.setdefault(given[0], Target(given[0], executable))
-        target.automatic = automatic
+        target = self.build.targets.setdefault(given[0], Target(given[0], name in _EXECUTABLES))
+        target.automatic = name.startswith("ament_auto")
         words = given[1:]
-        if automatic and "DIRECTORY" in words:
+        if target.automatic and "DIRECTORY" in words:
             folder = absolute(words[words.index("DIRECTORY") + 1], variables)
-            words = [
-                file
-                for suffix in _SOURCE_SUFFIXES
-                for file in sorted(glob.glob(f"{folder}/**/*{suffix}", recursive=True))
-            ]
+            found = [glob.glob(f"{folder}/**/*{suffix}", recursive=True) for suffix in _SOURCE_SUFFIXES]
+            words = [file for files in found for file in sorted(files)]
         self._sources(target, words, variables)
         target.definitions.update(self.definitions)
 
@@ -242,19 +209,9 @@ class _Reader:
 
     def _do_file(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in ("GLOB", "GLOB_RECURSE") and len(given) > 2:
-            patterns = [
-                word
-                for word in given[2:]
-                if word not in ("CONFIGURE_DEPENDS", "RELATIVE", "LIST_DIRECTORIES", "true", "false")
-            ]
-            found = [
-                f
-                for p in patterns
-                for f in sorted(
-                    glob.glob(recursive_pattern(absolute(p, variables), given[0]), recursive=True)
-                )
-            ]
-            variables[given[1]] = ";".join(found)
+            patterns = [absolute(word, variables) for word in given[2:] if word not in _GLOB_OPTIONS]
+            found = [glob.glob(recursive_pattern(each, given[0]), recursive=True) for each in patterns]
+            variables[given[1]] = ";".join(file for files in found for file in sorted(files))
 
     def _do_aux_source_directory(self, given: list[str], variables: dict[str, str]) -> None:
         folder = absolute(given[0], variables)
@@ -323,7 +280,3 @@ class _Reader:
     ) -> None:
         if len(given) > 1:
             self.build.plugin_files.append(absolute(given[1], variables))
-
-    def _do_generate_parameter_library(self, given: list[str], variables: dict[str, str]) -> None:
-        if len(given) > 1:
-            self.build.parameter_files[given[0]] = absolute(given[1], variables)

@@ -10,13 +10,7 @@ _ARGUMENT = re.compile(r'\[(=*)\[((?:.|\n)*?)\]\1\]|"((?:\\.|[^"\\])*)"|([^\s()"
 _COMMAND = re.compile(r"[ \t]*(\w+)\s*\(")
 _VARIABLE = re.compile(r"\$\{([\w.\-]+)\}")
 LINK_WORDS = frozenset({"PUBLIC", "PRIVATE", "INTERFACE", "SYSTEM"})
-BLOCK_ENDS = {
-    "if": "endif",
-    "foreach": "endforeach",
-    "function": "endfunction",
-    "macro": "endmacro",
-    "while": "endwhile",
-}
+BLOCK_ENDS = {name: f"end{name}" for name in ("if", "foreach", "function", "macro", "while")}
 
 Command = tuple[str, list[str]]
 
@@ -87,17 +81,10 @@ def expand(words: list[str], variables: dict[str, str]) -> list[str]:
 def condition_state(condition: list[str]) -> bool | None:
     """Whether a condition holds on Linux without tests; ``None`` for all but a few simple ones."""
     words = [word.lstrip('"') for word in condition if word not in ("(", ")")]
-    if words in (
-        ["BUILD_TESTING"],
-        ["CATKIN_ENABLE_TESTING"],
-        ["WIN32"],
-        ["APPLE"],
-        ["MSVC"],
-        ["ANDROID"],
-        ["FALSE"],
-    ):
+    written = " ".join(words)
+    if written in ("BUILD_TESTING", "CATKIN_ENABLE_TESTING", "WIN32", "APPLE", "MSVC", "ANDROID", "FALSE"):
         return False
-    if words in (["NOT", "WIN32"], ["UNIX"], ["TRUE"], ["NOT", "APPLE"]):
+    if written in ("NOT WIN32", "UNIX", "TRUE", "NOT APPLE"):
         return True
     return False if "BUILD_TESTING" in words and "NOT" not in words and "OR" not in words else None
 

@@ -16,10 +16,12 @@ from nodl.infer.cpp.reading.declarations import (
     Scope,
     conversion,
     function_declarator,
+    parameters_of,
+    template_defaults,
+    template_names,
     type_text,
     written_name,
 )
-from nodl.infer.cpp.reading.parameter_lists import parameters_of, template_defaults, template_names
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.type_names import split_type
 from nodl.infer.cpp.syntax import Node, children, field_of, line_of, parse, parse_expression, text, walk

@@ -7,9 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, update_wrapper
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
-from nodl.infer.cpp.reading.c_headers import is_of_c
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
-from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
+from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, is_of_c
 from nodl.infer.cpp.reading.specialisations import Specialisations
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 
@@ -83,20 +82,21 @@ class Names:
         self.methods: dict[Class, dict[str, list[Function]]] = {}
         for each in (c for found in self.classes.values() for c in found):
             self.methods[each] = {name: [*found] for name, found in each.methods.items()}
-        for name in list(self.functions):
-            for function in self.functions[name]:
-                if function.owner:
-                    cls = self.find_class(
-                        function.owner,
-                        function.scope[: len(function.scope) - len(function.owner.split("::"))],
-                        function.file,
-                    )
-                    if cls is not None:
-                        cls = self.specialisations.of_method(cls, function)
-                        self.methods[cls].setdefault(name, []).append(function)
-                        _complete(function, cls.declared.get(name, ()))
-                else:
-                    _complete(function, self.declared.get(name, ()))
+        for function in (each for found in self.functions.values() for each in found):
+            cls, name = self._class_of_method(function), function.name
+            if cls is not None:
+                cls = self.specialisations.of_method(cls, function)
+                self.methods[cls].setdefault(name, []).append(function)
+                _complete(function, cls.declared.get(name, ()))
+            elif not function.owner:
+                _complete(function, self.declared.get(name, ()))
+
+    def _class_of_method(self, function: Function) -> Class | None:
+        """The class that a function outside of it names as its owner."""
+        if not function.owner:
+            return None
+        outer = function.scope[: len(function.scope) - len(function.owner.split("::"))]
+        return self.find_class(function.owner, outer, function.file)
 
     @_once
     def visible(self, file: str) -> frozenset[str]:
@@ -184,7 +184,11 @@ class Names:
     @_once
     def find_functions(self, name: str, scope: Scope, file: FileIndex) -> list[Function]:
         """Free functions, the nearest namespace first; those of the same file before others."""
-        listed = [each for each in self.functions.get(name.rpartition("::")[2], ()) if self._is_free(each)]
+        listed = [
+            each
+            for each in self.functions.get(name.rpartition("::")[2], ())
+            if self._class_of_method(each) is None
+        ]
         if not listed:
             return []
         target = self._alias_prefix(name, scope, file)
@@ -194,12 +198,6 @@ class Names:
                 own = [each for each in matches if each.file.file == file.file]
                 return own or matches
         return []
-
-    def _is_free(self, function: Function) -> bool:
-        if not function.owner:
-            return True
-        outer = function.scope[: len(function.scope) - len(function.owner.split("::"))]
-        return self.find_class(function.owner, outer, function.file) is None
 
     def _alias_prefix(self, name: str, scope: Scope, file: FileIndex) -> str:
         first, separator, rest = name.partition("::")
@@ -351,18 +349,14 @@ class Names:
             return Type(cls.qualified, arguments, pointer)
         head, separator, last = name.rpartition("::")
         if separator and last in POINTER_MEMBERS:
-            inner = self.resolve(head, scope, file, bindings, depth + 1)
-            return inner._replace(pointer=True)
+            return self.resolve(head, scope, file, bindings, depth + 1)._replace(pointer=True)
         if separator:
             prefix = self.resolve(head, scope, file, bindings, depth + 1).name
+            if prefix != head and depth < 6:
+                inner = self.resolve(f"{prefix}::{last}", scope, file, None, depth + 1)
+                return inner._replace(arguments=arguments, pointer=pointer)
             if prefix != head:
-                return (
-                    self.resolve(f"{prefix}::{last}", scope, file, None, depth + 1)._replace(
-                        arguments=arguments, pointer=pointer
-                    )
-                    if depth < 6
-                    else Type(f"{prefix}::{last}", arguments, pointer)
-                )
+                return Type(f"{prefix}::{last}", arguments, pointer)
             if (found := self._used(head, file)) is not None:
                 return Type(f"{found}::{last}", arguments, pointer)
         return Type(name, arguments, pointer)

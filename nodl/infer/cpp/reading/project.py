@@ -30,7 +30,6 @@ class PluginClass:
     name: str
     type: str
     base: str
-    file: str
 
 
 @dataclass
@@ -182,9 +181,7 @@ def plugin_classes(file: str) -> list[PluginClass]:
         values = {m[1]: unescape(m[2] if m[2] is not None else m[3]) for m in _ATTRIBUTE.finditer(match[1])}
         if "type" in values:
             name = values.get("name") or values["type"]
-            found.append(
-                PluginClass(name, values["type"].lstrip(":"), values.get("base_class_type", ""), file)
-            )
+            found.append(PluginClass(name, values["type"].lstrip(":"), values.get("base_class_type", "")))
     return found
 
 

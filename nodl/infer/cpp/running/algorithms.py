@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from functools import partial
 
-from nodl.infer.cpp.reading.parameter_lists import parameters_of
+from nodl.infer.cpp.reading.declarations import parameters_of
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import is_written_back
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine

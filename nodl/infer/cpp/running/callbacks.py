@@ -208,7 +208,7 @@ def _settled(atom: object, before: Value) -> Value:
 
 def _find_overrides(run: Machine) -> None:
     """Destructors, and what a base in a library calls: overrides of classes whose base is not in reach."""
-    for obj in run.made_objects():
+    for obj in list(run.objects.values()):
         if obj.cls is None:
             continue
         hosted = bool(obj.foreign_base or obj.is_node)

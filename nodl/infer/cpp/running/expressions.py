@@ -97,18 +97,16 @@ def this(run: Machine, node: Node, frame: Frame) -> Value:
     return (owner.this,) if owner is not None and owner.this is not None else unknown("this")
 
 
-@expression(
-    "parenthesized_expression",
-    "condition_clause",
-    "dependent_name",
-    "init_statement",
-    "parameter_pack_expansion",
-)
+@expression("parenthesized_expression", "condition_clause", "dependent_name", "init_statement")
 def inside(run: Machine, node: Node, frame: Frame) -> Value:
-    """Parentheses, a condition, ``args...``: the value of the expression in them."""
-    return run.evaluate(
-        unwrapped(node) if node.type != "parameter_pack_expansion" else node.named_children[0], frame
-    )
+    """Parentheses, a condition: the value of the expression in them."""
+    return run.evaluate(unwrapped(node), frame)
+
+
+@expression("parameter_pack_expansion")
+def expansion(run: Machine, node: Node, frame: Frame) -> Value:
+    """``args...``: the value of the expression before the dots."""
+    return run.evaluate(node.named_children[0], frame)
 
 
 @expression("comma_expression")
@@ -164,12 +162,8 @@ def initializer_pair(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("argument_list")
 def argument_list(run: Machine, node: Node, frame: Frame) -> Value:
     """The value of a single argument; several, or none, make a ``Group``."""
-    inner = children(node)
-    return (
-        run.evaluate(inner[0], frame)
-        if len(inner) == 1
-        else (Group(tuple(run.evaluate(c, frame) for c in inner)),)
-    )
+    values = [run.evaluate(child, frame) for child in children(node)]
+    return values[0] if len(values) == 1 else (Group(tuple(values)),)
 
 
 @expression("compound_literal_expression")
@@ -199,12 +193,7 @@ def size_of(run: Machine, node: Node, frame: Frame) -> Value:
     return unknown("a size") if size is None else (size,)
 
 
-@expression(
-    "delete_expression",
-    "alignof_expression",
-    "offsetof_expression",
-    "requires_expression",
-)
+@expression("delete_expression", "alignof_expression", "offsetof_expression", "requires_expression")
 def nothing_known(run: Machine, node: Node, frame: Frame) -> Value:
     """Gives an unknown and leaves the operands unevaluated."""
     return unknown("a computed value")

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
-from nodl.infer.cpp.reading.declarations import Function, type_text
-from nodl.infer.cpp.reading.parameter_lists import parameters_of
+from nodl.infer.cpp.reading.declarations import Function, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import copied, handed_over

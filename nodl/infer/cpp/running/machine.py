@@ -131,7 +131,7 @@ class Machine:
         return self._converted(node, value, frame) if self.names.has_conversions else value
 
     def _converted(self, node: Node, value: Value, frame: Frame) -> Value:
-        from nodl.infer.cpp.running.conversions import converted_where_it_stands
+        from nodl.infer.cpp.running.own_operators import converted_where_it_stands
 
         return converted_where_it_stands(self, node, value, frame)
 
@@ -304,9 +304,6 @@ class Machine:
                 self.callbacks.setdefault((atom.node.id, atom.frame.path), (atom, frame))
             elif isinstance(atom, Bound):
                 self.callbacks.setdefault((atom.function, atom.this), (atom, frame))
-
-    def made_objects(self) -> list[Obj]:
-        return list(self.objects.values())
 
     def made_classes(self) -> set[Class]:
         return {each.cls for each in self.objects.values() if each.cls is not None}

@@ -37,16 +37,9 @@ SEQUENCES = frozenset({
 SETS = frozenset({"std::set", "std::unordered_set", "set"})
 ORDERED = frozenset({*SETS, "std::multiset", "std::priority_queue"})
 MAPS = frozenset({"std::map", "std::unordered_map", "std::multimap", "map"})
-_TEXTS = frozenset(
-    {
-        "std::string",
-        "string",
-        "std::string_view",
-        "std::stringstream",
-        "std::ostringstream",
-        "std::filesystem::path",
-    }
-)
+_TEXTS = frozenset({
+    "std::string", "string", "std::string_view", "std::stringstream", "std::ostringstream", "std::filesystem::path",
+})  # fmt: skip
 _SCALARS = frozenset({
     "bool", "int", "float", "double", "char", "size_t", "std::size_t", "unsigned", "long", "short", "auto",
     "uint8_t", "uint16_t", "uint32_t", "uint64_t", "int8_t", "int16_t", "int32_t", "int64_t", "unsigned int",

@@ -124,20 +124,8 @@ def _placeholder(value: Value) -> int:
     return next((int(match[1]) for match in found if match), 0)
 
 
-@_standard(
-    "std::thread",
-    "std::jthread",
-    "std::async",
-    "std::call_once",
-    "std::for_each",
-    "std::transform",
-    "std::sort",
-    "std::any_of",
-    "std::all_of",
-    "std::make_heap",
-    "std::generate",
-    "std::invoke",
-)
+@_standard("std::thread", "std::jthread", "std::async", "std::call_once", "std::for_each", "std::transform",
+           "std::sort", "std::any_of", "std::all_of", "std::make_heap", "std::generate", "std::invoke")  # fmt: skip
 def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     from nodl.infer.cpp.running.invocation import call_values
 

@@ -58,13 +58,7 @@ def braces(run: Machine, node: Node, frame: Frame) -> int:
     return _inner_block(run, node, frame)
 
 
-@statement(
-    "declaration_list",
-    "case_statement",
-    "labeled_statement",
-    "preproc_else",
-    "else_clause",
-)
+@statement("declaration_list", "case_statement", "labeled_statement", "preproc_else", "else_clause")
 def block(run: Machine, node: Node, frame: Frame) -> int:
     """The children in order, without a scope of their own."""
     return sequence(run, children(node), frame)

@@ -11,13 +11,9 @@ from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Value
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
-_WRITTEN_BACK = (
-    "identifier",
-    "field_expression",
-    "subscript_expression",
-    "call_expression",
-    "pointer_expression",
-)
+_WRITTEN_BACK = frozenset({
+    "identifier", "field_expression", "subscript_expression", "call_expression", "pointer_expression",
+})  # fmt: skip
 
 
 def _is_element(call: Node) -> bool:

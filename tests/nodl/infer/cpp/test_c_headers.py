@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from nodl.infer.cpp.reading.c_headers import is_of_c
+from nodl.infer.cpp.reading.known_headers import is_of_c
 from tests.nodl.infer.cpp.workspace import gaps, in_class, infer
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
