@@ -29,6 +29,8 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from keystore.disk.settings import KeystoreSettings
     from keystore.signing.authority import Authority
     from keystore.signing.ca_access import CaAccess
@@ -112,6 +114,14 @@ class KeystoreView:
             if not bundles[role]:
                 raise DamagedKeystoreError(f"{printable(self.root / name)} holds no certificate")
         return bundles
+
+    def refuse_ended(self, now: datetime, *roles: Role) -> None:
+        """Raises DamagedKeystoreError where one of these CAs is not valid now, so that what it signs would not be."""
+        if not all(self.ca(role).validity.covers(now) for role in roles):
+            raise DamagedKeystoreError(
+                "a CA of this keystore is expired, or not yet valid (is the clock right?); to replace it: "
+                f"secure-keystore renew {shlex.quote(str(self.root))} --ca start"
+            )
 
     @property
     def shares_one_ca(self) -> bool:

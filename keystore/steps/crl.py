@@ -6,7 +6,7 @@ issued. Its number only grows; one with another number than the register's was p
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from dataclasses import replace
 from datetime import datetime, timedelta
 
@@ -38,15 +38,6 @@ def can_revoke(view: KeystoreView) -> bool:
         return True
 
 
-def refuse_without_crl_sign(view: KeystoreView) -> None:
-    """Raises ``InvalidInputError`` when the identity CA may not sign a CRL."""
-    if not can_revoke(view):
-        raise InvalidInputError(
-            "the identity CA may not sign CRLs (key usage lacks cRLSign), participants would refuse one; "
-            "replace the CA (renew --ca start), or only delete with --no-revoke"
-        )
-
-
 def revocable(view: KeystoreView, register: Register, enclaves: Iterable[str]) -> list[IssuedCertificate]:
     """What these enclaves have or had of the identity CA in use, as far as it is not revoked yet."""
     issuer = fingerprint(view.ca(Role.IDENTITY).der)
@@ -58,18 +49,25 @@ def revocable(view: KeystoreView, register: Register, enclaves: Iterable[str]) -
     ]
 
 
-def publish_crl(opened: Store, access: CaAccess, now: datetime) -> None:
-    """Write ``public/crl.pem`` as the register has it and give it to every enclave.
+def publish_crl(opened: Store, register: Register, access: CaAccess, now: datetime) -> None:
+    """Record ``register``, write ``public/crl.pem`` as it has it and give it to every enclave.
 
-    Raises InvalidInputError when the CA may not sign CRLs, SigningUnavailableError without its key.
+    Before anything is recorded: raises InvalidInputError when the CA may not sign CRLs, DamagedKeystoreError when it is
+    not valid now, SigningUnavailableError without its key.
     """
     view = KeystoreView(opened.root)
-    refuse_without_crl_sign(view)
+    if not can_revoke(view):
+        raise InvalidInputError(
+            "the identity CA may not sign CRLs (key usage lacks cRLSign), participants would refuse one; "
+            "replace the CA (renew --ca start), or only delete with --no-revoke"
+        )
+    view.refuse_ended(now, Role.IDENTITY)
     issuer = view.authority(Role.IDENTITY, access)
     end = min(now + CRL_LIFETIME, issuer.validity.not_after)
-    revoked = opened.register.revoked(fingerprint(issuer.facts.der))
-    crl = IdentityIssuer(issuer).revocation_list(revoked, now - _BACKDATE, end, opened.register.crl_number)
+    revoked = register.revoked(fingerprint(issuer.facts.der))
+    crl = IdentityIssuer(issuer).revocation_list(revoked, now - _BACKDATE, end, register.crl_number)
     with opened.batch() as batch:
+        batch.record(register)
         batch.file(layout.CRL_UNLINKED, b"", PRIVATE_MODE)
         batch.file(layout.CRL, crl)
     _link_all(opened)
@@ -78,13 +76,6 @@ def publish_crl(opened: Store, access: CaAccess, now: datetime) -> None:
 def _link_all(opened: Store) -> None:
     link_crl(opened, KeystoreView(opened.root).enclaves())
     opened.remove(layout.CRL_UNLINKED)
-
-
-def revoke(opened: Store, serials: Collection[int], access: CaAccess, now: datetime) -> None:
-    """Record these certificates as revoked, then publish the CRL."""
-    with opened.batch() as batch:
-        batch.record(opened.register.with_revoked(serials, now))
-    publish_crl(opened, access, now)
 
 
 def link_crl(opened: Store, names: Iterable[str]) -> None:
@@ -117,9 +108,7 @@ def restore_crl(
             _link_all(opened)  # an interrupted run may have left some without
             return []
         problem = "the CRL ends soon" if within else "the CRL has ended"
-    with opened.batch() as batch:
-        batch.record(opened.register.with_next_crl(now))
-    publish_crl(opened, access, now)
+    publish_crl(opened, opened.register.with_next_crl(now), access, now)
     return [f"CRL published again: {problem}"]
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
 from datetime import datetime, timedelta
 from functools import cached_property
 from itertools import count
@@ -13,7 +12,7 @@ from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
 from keystore.disk.zenoh_files import has_router
-from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
+from keystore.errors import InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.register import IssuedCertificate, Register, SignedPermissions
@@ -79,13 +78,8 @@ class EnclaveWriter:
     @cached_property
     def _validity(self) -> Validity:
         """Of new certificates; permissions take over what their certificate got."""
+        self._view.refuse_ended(self._now, *Role)
         cas = [self._view.ca(role).validity for role in Role]
-        if not all(ca.covers(self._now) for ca in cas):
-            root = shlex.quote(str(self._view.root))
-            raise DamagedKeystoreError(
-                "a CA of this keystore is expired, or not yet valid (is the clock right?); to replace it: "
-                f"secure-keystore renew {root} --ca start"
-            )
         options = self._options
         lifetime = self._view.settings.lifetime if options.lifetime is None else options.lifetime
         asked = Validity.starting(self._now, lifetime, until=options.valid_until, backdate=options.backdate)

@@ -56,7 +56,7 @@ def reconcile(
         _record_shares(opened, wanted)
         reports = _write_all(opened, writer, states, wanted, options.progress)
         if writer.has_revoked:
-            publish_crl(opened, options.access, now)
+            publish_crl(opened, opened.register, options.access, now)
             warnings.append(
                 "certificates were revoked: deploy crl.pem to every host and restart what runs there; participants "
                 "read it when they start"

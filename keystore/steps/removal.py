@@ -25,7 +25,7 @@ from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
-from keystore.steps.crl import publish_crl, refuse_without_crl_sign, restore_crl, revocable, revoke
+from keystore.steps.crl import publish_crl, restore_crl, revocable
 from keystore.steps.opening import ChangeOptions, opened_for_change
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.zenoh_configuration import follow
@@ -90,16 +90,15 @@ def _strike(opened: Store, names: list[str], options: RemoveOptions, now: dateti
     """Take the enclaves off the register; with ``revoke`` everything they have and had onto the CRL."""
     view = KeystoreView(opened.root)
     found = revocable(view, opened.register, names) if options.revoke else []
+    struck = opened.register.without_enclaves(names)
     if found:
-        refuse_without_crl_sign(view)
-        view.authority(Role.IDENTITY, options.access)  # before anything is recorded
-    struck = opened.register.with_revoked((one.serial for one in found), now) if found else opened.register
-    with opened.batch() as batch:
-        batch.record(struck.without_enclaves(names))
-    if found:
-        publish_crl(opened, options.access, now)
-    elif options.revoke:
-        restore_crl(opened, options.access, now)
+        revoked = struck.with_revoked((one.serial for one in found), now)
+        publish_crl(opened, revoked, options.access, now)
+    else:
+        with opened.batch() as batch:
+            batch.record(struck)
+        if options.revoke:
+            restore_crl(opened, options.access, now)
     known = {one.enclave for one in opened.register.certificates.values() if one.revoked is not None}
     return [
         f"no certificate of {name} by the present identity CA is on record, nothing to revoke"
@@ -113,7 +112,7 @@ def revoke_replaced(opened: Store, names: Iterable[str], access: CaAccess, now: 
     found = revocable(KeystoreView(opened.root), opened.register, names)
     serials = {one.serial for one in found if not one.in_force}
     if serials:
-        revoke(opened, serials, access, now)
+        publish_crl(opened, opened.register.with_revoked(serials, now), access, now)
     return len(serials)
 
 

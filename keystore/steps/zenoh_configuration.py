@@ -184,6 +184,7 @@ def _issue(
     view: KeystoreView, address: RouterAddress, access: CaAccess, now: datetime
 ) -> tuple[IssuedCertificate, dict[str, bytes]]:
     """A certificate for the router's host; its key stays unless it is missing or others could read it."""
+    view.refuse_ended(now, Role.IDENTITY)
     authority = view.authority(Role.IDENTITY, access)
     key = router_key(view)
     fresh = None if key is not None else new_key(view.settings.curve)
