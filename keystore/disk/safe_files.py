@@ -115,7 +115,7 @@ def allowed_targets(relative: str) -> tuple[str, ...]:
     if relative in layout.CA_LINKS:
         return (layout.CA_LINKS[relative],)
     directory, _, name = relative.rpartition("/")
-    if not relative.startswith(layout.ENCLAVES + "/") or name not in layout.ENCLAVE_FILES:
+    if not relative.startswith(layout.ENCLAVES + "/"):
         return ()
     enclave = "/" + directory.removeprefix(layout.ENCLAVES).lstrip("/")
     target = layout.enclave_links(enclave, crl=True).get(name)

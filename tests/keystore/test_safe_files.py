@@ -9,6 +9,7 @@ import pytest
 
 from keystore.disk import layout, safe_files
 from keystore.errors import DamagedKeystoreError, NotAKeystoreError, StorageError, UnsafeKeystoreError
+from keystore.formats.role import Role
 
 FILE = "enclaves/a/cert.pem"
 KEY = "enclaves/a/key.pem"
@@ -109,6 +110,7 @@ class TestLinks:
             ("enclaves/crl.pem", "../public/crl.pem", True),
             ("enclaves/a/stranger.pem", "../../public/crl.pem", False),
             ("elsewhere/a/crl.pem", "../../public/crl.pem", False),
+            ("elsewhere/a/crl.pem", "../../../public/crl.pem", False),
             ("enclaves/a/permissions.p7s", "../../public/crl.pem", False),
         ],
     )
@@ -162,6 +164,20 @@ class TestPrivateFiles:
         assert f"belongs to user {somebody_else}, not to you ({somebody_else + 1})" in str(caught.value)
         assert str(caught.value).endswith(f"chown -R {somebody_else + 1} {root / 'enclaves/a'}")
 
+    def test_may_be_a_link_to_the_one_key_of_sros2(self, root: Path) -> None:
+        (root / layout.SHARED_CA_KEY).write_bytes(b"ca key")
+        (root / layout.SHARED_CA_KEY).chmod(0o600)
+        (root / layout.ca_key(Role.IDENTITY)).symlink_to("ca.key.pem")
+        assert safe_files.read_private(root, layout.ca_key(Role.IDENTITY)) == b"ca key"
+        (root / layout.SHARED_CA_KEY).chmod(0o620)
+        with pytest.raises(UnsafeKeystoreError, match="can be written by others"):
+            safe_files.read_private(root, layout.ca_key(Role.IDENTITY))
+
+    def test_are_not_read_through_a_directory_that_is_a_link(self, root: Path) -> None:
+        (root / "enclaves/b").symlink_to("a")
+        with pytest.raises(UnsafeKeystoreError, match=r"enclaves/b"):
+            safe_files.read_private(root, "enclaves/b/key.pem")
+
     def test_that_are_missing_are_told_as_missing(self, root: Path) -> None:
         with pytest.raises(DamagedKeystoreError, match="is missing"):
             safe_files.read_private(root, "private/none.pem")
@@ -188,6 +204,12 @@ class TestDirectories:
             with pytest.raises(UnsafeKeystoreError, match="chmod"):
                 safe_files.refuse_unsafe_private_directories(root)
         else:
+            safe_files.refuse_unsafe_private_directories(root)
+
+    def test_of_private_files_are_no_links(self, root: Path) -> None:
+        (root / "private/next").rmdir()
+        (root / "private/next").symlink_to(root / "enclaves/a")
+        with pytest.raises(UnsafeKeystoreError, match="is not a directory"):
             safe_files.refuse_unsafe_private_directories(root)
 
     def test_of_private_files_may_be_missing(self, tmp_path: Path) -> None:
