@@ -48,6 +48,12 @@ class Link:
     source: str
 
 
+def enclave_links(enclave: str, *, crl: bool) -> dict[str, Link]:
+    """As ``layout.enclave_links``, ready to be written."""
+    links = layout.enclave_links(enclave, crl=crl)
+    return {name: Link(target, layout.link_source(name)) for name, target in links.items()}
+
+
 class Store:
     """A keystore directory that this process may change; obtained from ``opened`` only, under the lock."""
 
@@ -159,22 +165,16 @@ class Batch:
 
     def file(self, target: str, data: bytes, mode: int = PUBLIC_MODE) -> None:
         """Replace or create one file."""
-        place = self._place()
-        self._write(place, Content(data, mode))
-        self._moves.append((place, target))
+        self._add(target, Content(data, mode))
 
     def link(self, target: str, link: Link) -> None:
-        place = self._place()
-        self._write(place, link)
-        self._moves.append((place, target))
+        self._add(target, link)
 
     def directory(self, target: str, entries: Mapping[str, Content | Link]) -> None:
         """A directory's files. A new directory appears at once; in an old one each is replaced."""
         if self._store.is_directory(target):
             for name, entry in entries.items():
-                place = self._place()
-                self._write(place, entry)
-                self._moves.append((place, f"{target}/{name}"))
+                self._add(f"{target}/{name}", entry)
             return
         place = self._place()
         mode = _directory_mode(target)
@@ -183,6 +183,11 @@ class Batch:
         for name, entry in entries.items():
             self._write(f"{place}/{name}", entry)
         self._staged_directories.append(place)
+        self._moves.append((place, target))
+
+    def _add(self, target: str, entry: Content | Link) -> None:
+        place = self._place()
+        self._write(place, entry)
         self._moves.append((place, target))
 
     def _place(self) -> str:

@@ -160,19 +160,13 @@ def _subject_key_id(extensions: bytes) -> bytes | None:
 
 
 def _by_oid(extensions: bytes) -> dict[bytes, bytes]:
-    """Unreadable extensions count as absent: the cautious reading, a certificate that may do anything."""
+    """OID -> content of the extension's OCTET STRING. Unreadable extensions count as absent: the cautious reading, a
+    certificate that may do anything."""
     try:
-        return _extensions(extensions)
+        entries = [entry.children() for entry in der.parse(extensions).children()] if extensions else []
+        return {entry[0].whole: entry[-1].expect(der.OCTET_STRING).content for entry in entries if entry}
     except der.DerError:
         return {}
-
-
-def _extensions(sequence: bytes) -> dict[bytes, bytes]:
-    """OID -> content of the extension's OCTET STRING; raises DerError."""
-    if not sequence:
-        return {}
-    entries = (entry.children() for entry in der.parse(sequence).children())
-    return {entry[0].whole: entry[-1].expect(der.OCTET_STRING).content for entry in entries if entry}
 
 
 def _common_name(names: list[der.Element]) -> str | None:

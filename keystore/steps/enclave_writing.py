@@ -117,9 +117,8 @@ class EnclaveWriter:
         if lost:
             state = self._end_rights(state, lost)
         facts = self._identity(state, bool(lost), entries, actions)
-        links = layout.enclave_links(state.enclave, crl=True)
-        for name in state.links:
-            entries[name] = Link(links[name], layout.link_source(name))
+        links = store.enclave_links(state.enclave, crl=True)
+        entries |= {name: links[name] for name in state.links}
         if state.permissions:
             self._permissions(state.enclave, facts, permissions, entries)
         if "created" not in actions:

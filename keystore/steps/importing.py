@@ -229,8 +229,8 @@ def _entries(found: _Bundle, keys: Mapping[str, HostKey]) -> dict[str, Content |
     }
     for enclave in found.manifest.names:
         directory = layout.enclave_directory(enclave)
-        for name, target in layout.enclave_links(enclave, crl=layout.CRL in found.files).items():
-            entries[f"{directory}/{name}"] = Link(target, layout.link_source(name))
+        links = store.enclave_links(enclave, crl=layout.CRL in found.files)
+        entries |= {f"{directory}/{name}": link for name, link in links.items()}
         if enclave in keys:
             entries[f"{directory}/{keys[enclave].name}"] = Content(keys[enclave].data, store.PRIVATE_MODE)
     return entries

@@ -11,7 +11,7 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout
-from keystore.disk.store import PRIVATE_MODE, Batch, Content, Link
+from keystore.disk.store import PRIVATE_MODE, Batch, Content, Link, enclave_links
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificates
@@ -136,9 +136,8 @@ def _accept(
         layout.CERT: Content(pem_certificate(facts.der)),
         layout.PERMISSIONS_XML: Content(document),
         layout.PERMISSIONS: Content(sign_document(document, signer, now)),
+        **enclave_links(one.enclave, crl=view.has_crl),
     }
-    for link, target in layout.enclave_links(one.enclave, crl=view.has_crl).items():
-        entries[link] = Link(target, layout.link_source(link))
     batch.file(layout.request(one.enclave), one.pem, PRIVATE_MODE)
     batch.directory(layout.enclave_directory(one.enclave), entries)
     record = certificate_record(one.enclave, facts, view.ca(Role.IDENTITY))

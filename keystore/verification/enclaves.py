@@ -7,6 +7,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
+from typing import TYPE_CHECKING, Any
 
 from keystore.disk import layout, safe_files
 from keystore.disk.signed_documents import signed_governance
@@ -46,9 +47,12 @@ from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_domains
 from keystore.verification.issued import check_certificate_issued, check_permissions_issued
-from keystore.verification.profile import check_leaf, check_shared_keys
+
+if TYPE_CHECKING:
+    from cryptography import x509
 
 _WILDCARD = re.compile(r"[*?\[]")
+_BROKEN_HASHES = frozenset({"md5", "sha1"})
 
 
 def check_enclaves(
@@ -57,7 +61,7 @@ def check_enclaves(
     """Findings about every enclave, and about what enclaves must not share."""
     names: dict[str, str] = {}
     serials: dict[int, str] = {}
-    holders: dict[str, CertificateFacts] = {}
+    owners = {facts.public_key: f"the {role.value}" for role in Role for facts in view.ca_bundle(role)}
     granted: dict[str, Domains] = {}
     for enclave in view.enclaves():
         check = _EnclaveCheck(view, register, enclave, revoked, now)
@@ -66,15 +70,17 @@ def check_enclaves(
             granted[enclave] = check.domains
         if check.facts is None:
             continue
-        holders[enclave] = check.facts
         names[enclave] = check.facts.common_name or ""
         other = serials.setdefault(check.facts.serial, enclave)
         if other != enclave:
             yield check.error(
                 "serial-reused", layout.CERT, f"same serial number as {other}; one CRL entry hits both"
             )
+        # One key, one enclave: who has the key of two is both, and who has a CA's is everybody.
+        holder = owners.setdefault(check.facts.public_key, f"enclave {enclave}")
+        if holder != f"enclave {enclave}":
+            yield check.leaf(Severity.ERROR, "shared-key", f"has the same key as {holder}")
     yield from _check_subjects(view, names)
-    yield from check_shared_keys(view, holders)
     with contextlib.suppress(KeystoreError):  # of the governance, which is reported where it is checked
         governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
         yield from check_domains(view.root, governance, granted)
@@ -161,7 +167,7 @@ class _EnclaveCheck:
             return
         yield from self._chain(self.facts)
         yield from self._subject(self.facts)
-        yield from check_leaf(self._view, self._enclave, self.facts)
+        yield from self._profile(self.facts)
         if self.facts.serial not in self._revoked:
             yield from check_certificate_issued(self._view, self._register, self._enclave, self.facts)
         key = self._read(layout.KEY)
@@ -200,6 +206,43 @@ class _EnclaveCheck:
                 "its key can sign permissions that older DDS versions accept (shared CA, no EKU)",
                 repair.run(self._view.root, "renew"),
             )  # fmt: skip
+
+    def _profile(self, facts: CertificateFacts) -> Iterator[Finding]:
+        """Basic constraints, key usage and signature (RFC 5280 sections 4.2.1.3, 4.2.1.9): what the certificate allows
+        beyond identifying one enclave."""
+        from cryptography import x509
+
+        try:
+            certificate = x509.load_der_x509_certificate(facts.der)
+            extensions = certificate.extensions
+            algorithm = certificate.signature_hash_algorithm
+        except Exception:  # the parser's own errors, which differ between releases: to us it is one thing
+            yield self.leaf(Severity.ERROR, "certificate", "its extensions cannot be read")
+            return
+        if algorithm is None or algorithm.name in _BROKEN_HASHES:
+            text = f"signed with {'no hash' if algorithm is None else algorithm.name}, which can be forged"
+            yield self.leaf(Severity.EXPOSURE, "weak-signature", text)
+        constraints = _extension(extensions, x509.BasicConstraints)
+        if constraints is not None and constraints.ca:
+            text = "a CA certificate: its key can certify enclaves of its own"
+            yield self.leaf(Severity.ERROR, "leaf-is-ca", text)
+        yield from self._key_usage(_extension(extensions, x509.KeyUsage))
+        if _extension(extensions, x509.ExtendedKeyUsage) is None:
+            text = "nothing says that its key may not sign documents: where it is certified by a permissions CA, it can"
+            yield self.leaf(Severity.WARNING, "no-extended-key-usage", text)
+
+    def _key_usage(self, usage: x509.KeyUsage | None) -> Iterator[Finding]:
+        if usage is None:
+            yield self.leaf(Severity.WARNING, "no-key-usage", "nothing restricts what its key may do")
+        elif usage.key_cert_sign or usage.crl_sign:
+            yield self.leaf(Severity.ERROR, "leaf-can-certify", "its key may sign certificates or CRLs")
+        elif not usage.digital_signature:
+            text = "its key may not sign, which authentication needs"
+            yield self.leaf(Severity.WARNING, "key-usage", text)
+
+    def leaf(self, severity: Severity, code: str, message: str) -> Finding:
+        fix = repair.run(self._view.root, "renew", self._enclave, "--new-keys", "--revoke-old")
+        return self._finding(severity, code, layout.CERT, message, fix)
 
     def _subject(self, facts: CertificateFacts) -> Iterator[Finding]:
         if not names_enclave(facts.common_name, self._enclave) or facts.name_parts != 1:
@@ -298,6 +341,15 @@ class _EnclaveCheck:
         elif validity.not_after != facts.validity.not_after or parse_moment(grant.not_after) > LATEST:
             text = "not valid as long as the certificate"
             yield self._finding(Severity.WARNING, "validity-differs", layout.PERMISSIONS, text, self._renew())
+
+
+def _extension(extensions: x509.Extensions, kind: type) -> Any:
+    from cryptography import x509
+
+    try:
+        return extensions.get_extension_for_class(kind).value
+    except x509.ExtensionNotFound:
+        return None
 
 
 def _loads(key_pem: bytes) -> bool:
