@@ -20,7 +20,6 @@ MAX_NAMESPACE_LENGTH = 245
 MAX_NAME_LENGTH = 247
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
-_NODE_NAME = late_pattern(rf"{_TOKEN}\Z")
 _ABSOLUTE = late_pattern(rf"(?:/{_TOKEN})+\Z")
 _PLAIN = late_pattern(rf"(~?/)?{_TOKEN}(?:/{_TOKEN})*\Z")  # what nearly every name looks like
 _SUBSTITUTION = late_pattern(r"\{([^{}]*)\}")
@@ -46,7 +45,7 @@ def shown(name: str) -> str:
 
 def validate_node_name(name: str) -> None:
     """A single token of at most 255 characters. Raises ``InvalidNameError``."""
-    if _NODE_NAME.match(name) and len(name) <= MAX_NODE_NAME_LENGTH:
+    if name.isascii() and name.isidentifier() and len(name) <= MAX_NODE_NAME_LENGTH:
         return
     what = "node name"
     if not name:

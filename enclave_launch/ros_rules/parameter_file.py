@@ -61,12 +61,18 @@ def value_of_text(text: str) -> ParameterValue | None:
     """The value of ``-p NAME:=text``; ``None`` for a comment alone. Raises as ``sections_of_text``."""
     if not text:
         raise RefusedParameters("the value is missing")
-    values, reader = _Values(), _ValueReader()
-    for kind, text_of_scalar, style, line in parts_of(text):
-        if kind in ("{", "*"):
+    slots: _Slots = {}
+    reader = _ValueReader()
+    for kind, scalar, style, line in parts_of(text):
+        if kind == "scalar":
+            reader.take(slots, scalar, style, line)
+        elif kind == "[":
+            reader.begin_list()
+        elif kind == "]":
+            reader.end_list(slots)
+        else:
             raise RefusedParameters("it must be a value or a list, not a mapping or an alias")
-        reader.take(values, kind, text_of_scalar, style, line)
-    return values.first
+    return _first(slots) if slots else None
 
 
 def parts_of(text: str) -> Iterator[tuple[str, str, str, int]]:
@@ -82,31 +88,13 @@ def parts_of(text: str) -> Iterator[tuple[str, str, str, int]]:
             yield kind, "", "", event.start_mark.line + 1
 
 
-class _Values:
-    """What one parameter was given: a slot for each type, of which readers take the first."""
+# What one parameter was given: a slot for each type, of which readers take the first.
+_Slots = dict[int, Scalar | list[Scalar]]
 
-    def __init__(self) -> None:
-        self._slots: dict[int, Scalar | list[Scalar]] = {}
 
-    @property
-    def first(self) -> ParameterValue | None:
-        if not self._slots:
-            return None
-        value = self._slots[min(self._slots)]
-        return tuple(value) if isinstance(value, list) else value
-
-    def put(self, value: Scalar) -> None:
-        self._slots[type_slot(value)] = value
-
-    def begin_list(self, items: list[Scalar]) -> None:
-        self._slots[type_slot(tuple(items))] = items
-
-    def append(self, item: Scalar) -> bool:
-        """False where this parameter has no list of that type."""
-        items = self._slots.get(type_slot((item,)))
-        if isinstance(items, list):
-            items.append(item)
-        return isinstance(items, list)
+def _first(slots: _Slots) -> ParameterValue:
+    value = slots[min(slots)]
+    return tuple(value) if isinstance(value, list) else value
 
 
 class _ValueReader:
@@ -116,26 +104,26 @@ class _ValueReader:
         self.in_list = False
         self._type: type | None = None  # of the items so far
 
-    def take(self, values: _Values, kind: str, text: str, style: str, line: int) -> None:
-        if kind == "scalar":
-            value = _scalar_of(text, style, line)
-            if self.in_list:
-                self._take_item(value, values, line)
-            else:
-                values.put(value)
-        elif kind == "[":
-            self.in_list, self._type = True, None
-        elif kind == "]":
-            if self.in_list and self._type is None:
-                values.begin_list([])
-            self.in_list = False
+    def begin_list(self) -> None:
+        self.in_list, self._type = True, None
 
-    def _take_item(self, item: Scalar, values: _Values, line: int) -> None:
-        if self._type is None:
-            self._type = type(item)
-            values.begin_list([item])
-        elif self._type is not type(item) or not values.append(item):
-            raise _refused(line, "the items of a list must be of one type")
+    def end_list(self, slots: _Slots) -> None:
+        if self.in_list and self._type is None:
+            slots[type_slot(())] = []
+        self.in_list = False
+
+    def take(self, slots: _Slots, text: str, style: str, line: int) -> None:
+        value = _scalar_of(text, style, line)
+        if not self.in_list:
+            slots[type_slot(value)] = value
+        elif self._type is None:
+            self._type = type(value)
+            slots[type_slot((value,))] = [value]
+        else:
+            items = slots.get(type_slot((value,)))
+            if self._type is not type(value) or not isinstance(items, list):
+                raise _refused(line, "the items of a list must be of one type")
+            items.append(value)
 
 
 class _Path:
@@ -163,16 +151,17 @@ class _Section:
 
     def __init__(self) -> None:
         self.names: list[str] = []
-        self.values: list[_Values] = []
+        self.slots: list[_Slots] = []
         self._index: dict[str, int] = {}
 
     def find(self, name: str) -> int:
         """Where ``name`` stands; it is added where it does not."""
-        if name not in self._index:
-            self._index[name] = len(self.names)
+        at = self._index.get(name)
+        if at is None:
+            at = self._index[name] = len(self.names)
             self.names.append(name)
-            self.values.append(_Values())
-        return self._index[name]
+            self.slots.append({})
+        return at
 
     def rename(self, at: int, name: str) -> None:
         self._index.pop(self.names[at], None)
@@ -180,8 +169,7 @@ class _Section:
         self._index.setdefault(name, at)
 
     def read(self) -> Section:
-        found = ((name, values.first) for name, values in zip(self.names, self.values, strict=True))
-        return {name: value for name, value in found if value is not None}
+        return {name: _first(slots) for name, slots in zip(self.names, self.slots, strict=True) if slots}
 
 
 class _FileReader:
@@ -213,9 +201,9 @@ class _FileReader:
                 raise _refused(line, "a list cannot be a key")
             if not self._below_parameters_key:
                 raise _too_early(line)
-            self._values.take(self._current, kind, text, style, line)
+            self._values.begin_list()
         elif kind == "]":
-            self._values.take(self._current, kind, text, style, line)
+            self._values.end_list(self._section.slots[self._at] if self._section.slots else {})
             self._key_is_next = True
         elif kind == "{":
             self._begin_mapping()
@@ -223,11 +211,6 @@ class _FileReader:
             self._end_mapping()
         else:
             raise _refused(line, "rcl does not take aliases")
-
-    @property
-    def _current(self) -> _Values:
-        values = self._section.values
-        return values[self._at] if values else _Values()
 
     def _begin_mapping(self) -> None:
         self._depth += 1
@@ -281,7 +264,7 @@ class _FileReader:
     def _take_value(self, text: str, style: str, line: int) -> None:
         if not self._below_parameters_key or not self._section.names:
             raise _too_early(line)
-        self._values.take(self._current, "scalar", text, style, line)
+        self._values.take(self._section.slots[self._at], text, style, line)
         self._key_is_next = not self._values.in_list
 
 

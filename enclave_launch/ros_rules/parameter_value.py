@@ -23,23 +23,24 @@ _DOUBLE = late_pattern(
     re.IGNORECASE | re.ASCII,
 )
 _NAMED_DOUBLE = late_pattern(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
-_BEGIN_NUMBERS = frozenset("+-.0123456789iInN \t\n\v\f\r")
+_BEGIN_NUMBERS = frozenset("+-.0123456789 \t\n\v\f\r")
+_NAMES_OF_NUMBERS = frozenset(("inf", "infinity", "nan"))
 _MOST_DIGITS = 25  # of a number in 64 bits, in whichever base
-_KINDS: tuple[type, ...] = (bool, int, float, str)
+_SLOTS: dict[type, int] = {bool: 0, int: 1, float: 2, str: 3, bytes: 5}
 
 
 def type_slot(value: ParameterValue) -> int:
     """Position in rcl's order of types: scalars, bytes, then arrays; readers take the first that is there."""
     if isinstance(value, tuple):
-        return 10 + (_KINDS.index(type(value[0])) if value and type(value[0]) in _KINDS else 9)
-    return 5 if isinstance(value, bytes) else _KINDS.index(type(value))
+        return 10 + (_SLOTS.get(type(value[0]), 9) if value else 9)
+    return _SLOTS[type(value)]
 
 
 def plain_scalar(text: str) -> Scalar:
     """A plain YAML scalar by the rules of rcl's parser (``parse.c``, ``get_value``), which are not YAML 1.1's."""
     if text in _BOOLEANS:
         return _BOOLEANS[text]
-    if text[:1] not in _BEGIN_NUMBERS:
+    if text[:1] not in _BEGIN_NUMBERS and text.lower() not in _NAMES_OF_NUMBERS:
         return text
     if (plain := decimal(text)) is not None:
         return plain

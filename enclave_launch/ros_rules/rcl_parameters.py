@@ -17,7 +17,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 
 from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.light import Any, NamedTuple, TypeVar, late_pattern
+from enclave_launch.boundary.light import Any, NamedTuple, TypeVar
 from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
 from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 
@@ -44,7 +44,7 @@ class ResolvedParameters(NamedTuple):
 Generated = Callable[[str], Mapping[str, Section] | None]
 
 EVERY_NODE = "/**"
-_PLAIN = late_pattern(r"[A-Za-z0-9_./+-]*[A-Za-z0-9][A-Za-z0-9_./+-]*")  # no YAML syntax in it
+_WITHOUT_MARKS = str.maketrans("", "", "_./+-")  # which are no YAML syntax beside a letter or digit
 
 
 def resolve_parameters(
@@ -130,7 +130,8 @@ def _item_as_rcl_reads(value: Scalar | bytes) -> Scalar | bytes:
 
 def _value_of_rule(rule: ParameterRule) -> ParameterValue | None:
     """``None`` where rcl takes the rule and no value comes of it. Raises ``UnreadableParameters``."""
-    if _PLAIN.fullmatch(rule.value):
+    letters = rule.value.translate(_WITHOUT_MARKS)
+    if letters.isascii() and letters.isalnum():
         return plain_scalar(rule.value)
     from enclave_launch.ros_rules.parameter_file import value_of_text
 
