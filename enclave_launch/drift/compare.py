@@ -62,7 +62,9 @@ class _Comparison:
         self._accepted = circumstances.accepted
         self._strangers = circumstances.strangers
         self._forged = circumstances.forged
-        self._processes = [each for each in graph.processes if not self._all_accepted(each)]
+        self._processes = [
+            each for each in graph.processes if not each.nodes or not all(map(self._is_accepted, each.nodes))
+        ]
 
     def findings(self) -> Iterator[DriftFinding]:
         for text in self._forged:
@@ -71,9 +73,6 @@ class _Comparison:
             yield from self._of_process(process)
         yield from self._counts()
         yield from self._meeting()
-
-    def _all_accepted(self, process: GraphProcess) -> bool:
-        return bool(process.nodes) and all(self._is_accepted(node) for node in process.nodes)
 
     def _is_accepted(self, node: GraphNode) -> bool:
         return any(covers(pattern, node.fqn) for pattern in self._accepted)

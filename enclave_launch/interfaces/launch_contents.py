@@ -34,7 +34,8 @@ _TAKE_A_VALUE = frozenset(
 
 def launched(evaluation: Evaluation) -> Launched:
     """What ``evaluation`` starts, as far as other nodes depend on it."""
-    spawners = (item for item in evaluation.processes if _is_spawner(item))
+    of_manager = (item for item in evaluation.processes if item.package == "controller_manager")
+    spawners = (item for item in of_manager if item.executable in ("spawner", "spawner.py"))
     return Launched(
         robot_description=_robot_description(evaluation),
         spawned=tuple(spawned for process in spawners for spawned in _spawned(process)),
@@ -49,10 +50,6 @@ def _robot_description(evaluation: Evaluation) -> str:
     return next((text for text in texts if isinstance(text, str) and text), "")
 
 
-def _is_spawner(process: ResolvedProcess) -> bool:
-    return process.package == "controller_manager" and process.executable in ("spawner", "spawner.py")
-
-
 def _spawned(process: ResolvedProcess) -> Iterator[Spawned]:
     options, names = _options(own_words(process))
     namespace = (process.namespace or "/").rstrip("/")
@@ -60,16 +57,17 @@ def _spawned(process: ResolvedProcess) -> Iterator[Spawned]:
         namespace = ""
     manager = ([*_values(options, _MANAGER), "controller_manager"])[0]
     files = [ParameterFileArgument(file) for file in _values(options, _FILES)]
-    rules = parse_ros_arguments(["--ros-args", *_words(_values(options, _ROS_ARGUMENTS))]).remaps
+    given = (word for text in _values(options, _ROS_ARGUMENTS) for word in split_words(text))
+    rules = parse_ros_arguments(["--ros-args", *given]).remaps
     for name in (*names, *_values(options, _NAME)):
         tokens = [token for token in (*namespace.split("/"), name) if token]
         of_its_own = parameters_of_node(process, namespace or "/", name)
         parameters = {**of_its_own, **resolve_parameters(tokens, files).values}
-        given = _values(options, _TYPE)
+        types = _values(options, _TYPE)
         yield Spawned(
             controller=name,
             manager=manager if manager.startswith("/") else f"{namespace}/{manager}",
-            type=given[0] if given else str(parameters.get("type") or ""),
+            type=types[0] if types else str(parameters.get("type") or ""),
             parameters=parameters,
             rules=rules,
         )
@@ -91,7 +89,3 @@ def _options(words: Sequence[str]) -> tuple[list[tuple[str, str]], list[str]]:
 
 def _values(options: Sequence[tuple[str, str]], spellings: Sequence[str]) -> list[str]:
     return [value for option, value in options if option in spellings]
-
-
-def _words(texts: Sequence[str]) -> list[str]:
-    return [word for text in texts for word in split_words(text)]

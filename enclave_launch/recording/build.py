@@ -31,7 +31,8 @@ _FLAGS = ("-std=gnu11", "-shared", "-fPIC", "-O2", "-Wl,-z,now")
 
 def recorder_library() -> Path:
     """The library, built if it is not there. Raises ``RuntimeFailure`` where that is not possible."""
-    wanted = _cache() / _file_name()
+    text = SOURCE.read_bytes() + " ".join(_FLAGS).encode()
+    wanted = _cache() / f"recorder-{hashlib.sha256(text).hexdigest()[:16]}-{platform.machine()}.so"
     if not _is_ours(wanted):
         _build(wanted)
     return wanted
@@ -44,11 +45,6 @@ def _cache() -> Path:
             "the recorder has nowhere to be kept: there is no home directory; set XDG_CACHE_HOME"
         )
     return Path(base, "enclave-launch")
-
-
-def _file_name() -> str:
-    text = SOURCE.read_bytes() + " ".join(_FLAGS).encode()
-    return f"recorder-{hashlib.sha256(text).hexdigest()[:16]}-{platform.machine()}.so"
 
 
 def _is_ours(path: Path) -> bool:

@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 
 from enclave_launch.errors import UsageError
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import GrantedName, PlanDocument, Told, plan_from_document
+from enclave_launch.review.document import PlanDocument, Told, plan_from_document
 from enclave_launch.review.information_flow import FlowStep, flow_graph, shortest_paths
 
-_TAKES: Mapping[str, bool] = {"subscribe": True, "serve_services": True, "serve_actions": True}
+_TAKES = ("subscribe", "serve_services", "serve_actions")
 
 
 class Never(NamedTuple):
@@ -132,12 +132,10 @@ def _enclaves_named(plan: PlanDocument, pattern: str) -> list[str]:
 def _enclaves_receiving(plan: PlanDocument, pattern: str) -> list[str]:
     named = _enclaves_named(plan, pattern)
     return named or sorted(
-        path for path, grants in plan.enclaves.items() if any(_receives(grant, pattern) for grant in grants)
+        path
+        for path, grants in plan.enclaves.items()
+        if any(each.operation in _TAKES and fnmatchcase(each.name, pattern) for each in grants)
     )
-
-
-def _receives(grant: GrantedName, pattern: str) -> bool:
-    return grant.operation in _TAKES and fnmatchcase(grant.name, pattern)
 
 
 def _items(content: Mapping[str, Any], key: str, place: str) -> list[Any]:

@@ -38,7 +38,9 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
     fqn = str(action.node_name)
     namespace, _, name = fqn.rpartition("/")
     number, label = next_process_name(action, context, cmd)
-    parameters = resolve_parameters(_fqn_tokens(fqn), arguments.parameters)
+    unknown = (UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE)
+    tokens = [None if token in unknown else token for token in fqn.split("/") if token]
+    parameters = resolve_parameters(tokens, arguments.parameters)
     return ResolvedProcess(
         number=number,
         kind=_kind(action),
@@ -150,8 +152,3 @@ def _text(context: Any, value: Any) -> str | None:
     return (
         None if value is None else perform_substitutions(context, normalize_to_list_of_substitutions(value))
     )
-
-
-def _fqn_tokens(fqn: str) -> list[str | None]:
-    unknown = (UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE)
-    return [None if token in unknown else token for token in fqn.split("/") if token]

@@ -76,9 +76,8 @@ class FileSink:
                 self._write_below(self._limit, data)
         except OSError as error:  # a full disk must not end the launch
             if not self._broken:
-                self._tell(
-                    f"cannot write {self.path}: {error.strerror}; what belongs there is lost until it can be"
-                )
+                lost = "what belongs there is lost until it can be"
+                self._tell(f"cannot write {self.path}: {error.strerror}; {lost}")
             self._broken = True
             return
         if self._broken:

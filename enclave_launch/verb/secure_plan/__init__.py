@@ -4,30 +4,19 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from importlib import import_module
 
 from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.completion import offer_launches
 from enclave_launch.verb.options import EVALUATION, POLICY, Option, add_options
-from enclave_launch.verb.secure_plan import (
-    check,
-    diff,
-    drift,
-    evidence,
-    export,
-    flow,
-    hosts,
-    report,
-    show,
-    suggest,
-)
 from enclave_launch.verb.secure_plan.plans import WORDS
 
 PLAN: tuple[Option, ...] = (("words", {"nargs": "+", "metavar": WORDS}, ""),)
 RESOLVING = (("what each node may do", POLICY), ("evaluating the launch file", EVALUATION))
 """As of ``secure-launch``; without effect on a saved plan."""
-VERBS = (show, check, diff, drift, flow, hosts, export, suggest, report, evidence)
+VERBS = ("show", "check", "diff", "drift", "flow", "hosts", "export", "suggest", "report", "evidence")
 DESCRIPTION = """\
 Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
 revisions, ask which enclave can influence which, place it on hosts, export it to systemd, Compose or Kubernetes.
@@ -42,9 +31,9 @@ def build_parser() -> argparse.ArgumentParser:
     parser = CommandParser(prog="secure-plan", description=DESCRIPTION, formatter_class=raw)
     add_version(parser)
     verbs = parser.add_subparsers(metavar="VERB", required=True)
-    for verb in VERBS:
+    for name in VERBS:
+        verb = import_module(f"enclave_launch.verb.secure_plan.{name}")
         head = verb.__doc__ or ""
-        name = verb.__name__.rpartition(".")[2]
         below = verbs.add_parser(name, help=head.partition("\n")[0], description=head, formatter_class=raw)
         add_options(below, getattr(verb, "WORDS", PLAN))
         for title, options in (*RESOLVING, *verb.OPTIONS.items()):

@@ -146,10 +146,11 @@ def _deployment(
 
     graph = flow_graph(plan_from_document(document))
     notes = differences(document, Engine(options.format))
+    file = Path([word for word in options.words if ":=" not in word][-1])
     for note in notes:
         print(f"secure-plan: warning: {note}", file=sys.stderr)
     return Deployment(
-        name=label(options.name or f"ros-{_stem(options.words)}"),
+        name=label(options.name or f"ros-{file.name.partition('.')[0]}"),
         source=" ".join(options.words),
         host=host,
         processes=processes,
@@ -161,12 +162,6 @@ def _deployment(
         lost=lost,
         notes=notes,
     )
-
-
-def _stem(words: list[str]) -> str:
-    """``talker_listener`` of ``demo_nodes talker_listener.launch.xml name:=value``."""
-    files = [word for word in words if ":=" not in word]
-    return Path(files[-1]).name.partition(".")[0]
 
 
 def _files(deployment: Deployment, options: argparse.Namespace) -> dict[str, File]:
