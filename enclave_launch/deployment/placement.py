@@ -44,14 +44,14 @@ def place(processes: Iterable[DeployedProcess], hosts: Hosts) -> Placement:
     listed = list(processes)
     found: dict[str, list[DeployedProcess]] = {name: [] for name in hosts.names}
     nowhere = []
-    for process in listed:
-        host = _host_of(process, hosts)
-        if host is None:
-            nowhere.append(process)
-        else:
-            with translated(InvalidInputError, UsageError):
+    with translated(InvalidInputError, UsageError):
+        for process in listed:
+            host = _host_of(process, hosts)
+            if host is None:
+                nowhere.append(process)
+            else:
                 refuse_host_name(host, process.place)
-            found.setdefault(host, []).append(process)
+                found.setdefault(host, []).append(process)
     if not found:
         return Placement({ONLY_HOST: tuple(listed)})
     return Placement({host: tuple(own) for host, own in found.items()}, tuple(nowhere))

@@ -75,6 +75,14 @@ def test_an_enclave_on_two_hosts_is_told_and_its_bundles_are_refused(
     assert "/front/speaker belongs to several hosts: arm, base" in capsys.readouterr().err
 
 
+def test_a_node_that_two_patterns_place_on_two_hosts_is_wrong_usage(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    hosts = hosts_file(tmp_path, "version: 1\nhosts:\n  arm: {nodes: [/f*]}\n  base: {nodes: [/front*]}\n")
+    assert secure_plan("hosts", launch_file(tmp_path), "--hosts", hosts) == 2
+    assert "node /front/speaker belongs to several hosts: arm, base" in capsys.readouterr().err
+
+
 def test_hosts_with_their_enclaves_go_on_to_the_keystore(tmp_path: Path) -> None:
     launch = launch_file(tmp_path)
     written = tmp_path / "enclaves.yaml"
