@@ -228,9 +228,8 @@ class LiveLaunch:
 
     def _begin(self) -> None:
         argv = [f"{name}:={value}" for name, value in self._source.arguments]
-        self._context = LaunchContext(
-            argv=argv, noninteractive=self._settings.noninteractive, host=self._host
-        )
+        noninteractive = self._settings.noninteractive
+        self._context = LaunchContext(argv=argv, noninteractive=noninteractive, host=self._host)
         self._context.launch_configurations.update(self._source.launch_configurations)
         self._context._event_queue.wake = self._wake.set
         self._context.register_event_handler(OnIncludeLaunchDescription())
@@ -289,11 +288,8 @@ class LiveLaunch:
     def _on_error(self, error: Exception) -> None:
         """As launch does, with the place in the launch file where evaluation knows it."""
         self._failed = True
-        told = (
-            error
-            if isinstance(error, EnclaveLaunchError)
-            else launch_file_error(error, self._source.launch_file)
-        )
+        file = self._source.launch_file
+        told = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, file)
         message = f"Caught exception in launch (see debug for traceback): {told}"
         if self._settings.debug:
             self.say("DEBUG", "".join(traceback.format_exception(error)))
@@ -336,9 +332,8 @@ class LiveLaunch:
             files=SinkWriter(pressure.on_files_full, pressure.on_files_drained),
         )
         screen = ScreenSink(sys.stdout)
-        log = LaunchLog(
-            directory, screen, writers, os.environ, self._settings.debug, self._settings.log_limit
-        )
+        debug, limit = self._settings.debug, self._settings.log_limit
+        log = LaunchLog(directory, screen, writers, os.environ, debug, limit)
         pressure.attach(log)
         return log
 
