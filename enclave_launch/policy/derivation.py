@@ -99,9 +99,8 @@ def derive_policy(
     chosen = options or PolicyOptions()
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
-        from enclave_launch.policy.node_permissions import (
-            node_permissions,
-        )  # where nothing is known, not needed
+        # Where nothing is known, not needed.
+        from enclave_launch.policy.node_permissions import node_permissions
 
         collection.add(node_permissions(node, distro=distro, options=chosen), chosen.policy_file)
     derived = collection.result()
