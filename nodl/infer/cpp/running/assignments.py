@@ -27,7 +27,13 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.running.variables import current_object, declared_type, static_by_name, static_member
+from nodl.infer.cpp.running.variables import (
+    current_object,
+    declared_type,
+    is_pointer,
+    static_by_name,
+    static_member,
+)
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 from nodl.name_template import UnknownPart
 
@@ -35,6 +41,7 @@ from nodl.name_template import UnknownPart
 @expression("assignment_expression")
 def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     """Writes to the left side and gives what was written, before a number took the type of that side."""
+    from nodl.infer.cpp.running.objects import in_braces
     from nodl.infer.cpp.running.operators import has_text
 
     left, operator = field_of(node, "left"), text(field_of(node, "operator"))
@@ -45,7 +52,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     if misread is not None:
         return _with_comma(run, left, misread, right, frame)
     if operator == "=" and right is not None and right.type == "initializer_list":
-        value = _braced(run, left, right, frame)
+        value = in_braces(run, right, declared_type(run, left, frame)[0], frame)
     else:
         value = run.evaluate(right, frame)
     if operator == "=":
@@ -66,29 +73,11 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     else:
         value = _combined(operator[:-1], run.evaluate(left, frame), value)
     value_held = _as_declared(run, left, value, frame)
-    if operator == "=" and left.type == "identifier" and _is_pointer(run, left, frame):
+    if operator == "=" and left.type == "identifier" and is_pointer(run, left, frame):
         _points_elsewhere(run, left, value_held, frame)
     else:
         assign(run, left, value_held, frame)
     return value
-
-
-def _is_pointer(run: Machine, name: Node, frame: Frame) -> bool:
-    found = declared_type(run, name, frame)
-    return found is not None and (found[0].pointer or (found[1] and not _is_reference(run, name, frame)))
-
-
-def _is_reference(run: Machine, name: Node, frame: Frame) -> bool:
-    owner = frame.owner_of(text(name))
-    if owner is not None:
-        return owner.types.get(text(name), "").endswith("&")
-    this = current_object(frame)
-    fields = (
-        [c.fields[text(name)] for c in run.names.ancestry(this.cls) if text(name) in c.fields]
-        if this and this.cls
-        else []
-    )
-    return bool(fields) and "&" in text(fields[0].node).partition("=")[0]
 
 
 def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> None:
@@ -103,13 +92,10 @@ def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> N
 def _with_comma(run: Machine, left: Node, misread: Node, right: Node | None, frame: Frame) -> Value:
     """``(x = a, b)``, which the parser reads as ``x = b`` with an error ``a,`` in between."""
     listed = children(misread)
-    is_comma = text(misread).endswith(",") and len(listed) == 1
-    assign(
-        run,
-        left,
-        run.evaluate(listed[0], frame) if is_comma else unknown("what the parser did not understand"),
-        frame,
-    )
+    value = unknown("what the parser did not understand")
+    if text(misread).endswith(",") and len(listed) == 1:
+        value = run.evaluate(listed[0], frame)
+    assign(run, left, value, frame)
     return run.evaluate(right, frame)
 
 
@@ -132,20 +118,13 @@ def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, fr
 def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
     """The class of what an object is assigned to; ``None`` where a pointer is assigned, or that is not known."""
     inner = unwrapped(left)
-    if inner is not None and inner.type == "pointer_expression":
-        return seen_class(run, inner, frame)
-    if inner is not None and inner.type in ("subscript_expression", "field_expression"):
-        kind = seen_type(run, inner, frame)
-        return run.held_class(kind, frame)
-    found = declared_type(run, inner, frame) if inner is not None else None
-    if (
-        inner is None
-        or found is None
-        or found[0].pointer
-        or (found[1] and not _is_reference(run, inner, frame))
-    ):
+    if inner is None:
         return None
-    return run.class_of(found[0], frame)
+    if inner.type == "pointer_expression":
+        return seen_class(run, inner, frame)
+    if inner.type in ("subscript_expression", "field_expression"):
+        return run.held_class(seen_type(run, inner, frame), frame)
+    return None if is_pointer(run, inner, frame) else run.class_of(declared_type(run, inner, frame)[0], frame)
 
 
 def _combined(operator: str, before: Value, value: Value) -> Value:
@@ -160,18 +139,8 @@ def _as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
     """A number as the type of the variable holds it."""
     if not any(isinstance(atom, int | float) for atom in value):
         return value
-    written = declared_type(run, left, frame)
-    return value if written is None or written[1] else as_type(written[0].name, value)
-
-
-def _braced(run: Machine, left: Node, right: Node, frame: Frame) -> Value:
-    """``x = {...}``: of the type of x where that is known."""
-    from nodl.infer.cpp.running.objects import made
-
-    written = declared_type(run, left, frame)
-    if written is not None and written[0].name:
-        return made(run, right, written[0], children(right), frame)
-    return run.evaluate(right, frame)
+    kind, pointer = declared_type(run, left, frame)
+    return value if pointer else as_type(kind.name, value)
 
 
 def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
@@ -234,9 +203,8 @@ def _one_of(atom: object, value: Value) -> object:
 
 def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) -> None:
     """``*p = x`` where ``p`` is an iterator, or a pointer of which nobody knows to what."""
-    found = declared_type(run, pointer, frame)
-    owner = frame.owner_of(text(pointer))
-    if owner is None or found is None or found[0].pointer or text(pointer) in owner.aliases:
+    kind, owner = declared_type(run, pointer, frame)[0], frame.owner_of(text(pointer))
+    if owner is None or kind.pointer or text(pointer) in owner.aliases:
         return
     if owner.function is not None and any(p.name == text(pointer) for p in owner.function.parameters):
         return
@@ -260,22 +228,17 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
         run.store.set((owner, name), value)
         return
     this_object = current_object(frame)
-    if this_object is not None and "::" not in name:
-        lexical = lexical_class(run, this_object, frame)
-        for each in run.names.ancestry(lexical):
-            if name in each.fields:
-                cell = cell_of(run, this_object, name, each)
-                if not each.fields[name].static:
-                    told(run, (this_object, cell), value, target, frame)
-                    run.store.set((this_object, cell), value)
-                    return
-                before = static_member(run, each, name) if each.templates else BOTTOM
-                run.store.set((each, name), join(before, value) if each.templates else value)
-                return
-    static = static_by_name(run, name, frame)
+    lexical = lexical_class(run, this_object, frame) if this_object is not None and "::" not in name else None
+    declaring = next((each for each in run.names.ancestry(lexical) if name in each.fields), None)
+    if this_object is not None and declaring is not None and not declaring.fields[name].static:
+        cell = (this_object, cell_of(run, this_object, name, declaring))
+        told(run, cell, value, target, frame)
+        run.store.set(cell, value)
+        return
+    static = (declaring, name) if declaring is not None else static_by_name(run, name, frame)
     if static is not None:
-        before = static_member(run, *static) if static[0].templates else BOTTOM
-        run.store.set(static, join(before, value) if static[0].templates else value)
+        several = bool(static[0].templates)  # a variable of each specialisation
+        run.store.set(static, join(static_member(run, *static), value) if several else value)
         return
     outside = run.names.find_global(name, frame.scope, frame.file)
     if outside is not None:
@@ -309,11 +272,8 @@ def _assign_half(run: Machine, node: Node, owners: Value, name: str, value: Valu
     if argument is None or text(field_of(node, "operator")) == "->":
         through(run, node, frame)
         return
-    halves = [
-        (value, a.items[1]) if name == "first" else (a.items[0], value)
-        for a in owners
-        if isinstance(a, Group)
-    ]
+    pairs = [atom.items for atom in owners if isinstance(atom, Group) and len(atom.items) == 2]
+    halves = [(value, second) if name == "first" else (first, value) for first, second in pairs]
     assign(run, argument, tuple(Group(each) for each in halves), frame)
 
 

@@ -90,9 +90,8 @@ _PARAMETER_VIEWS = frozenset({
 
 def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     given, frame, receiver = site.given, site.frame, site.receiver
-    written = declared_type(run, receiver, frame)
-    kind = written[0].name if written is not None else ""
-    inner = written[0].arguments[0] if written is not None and written[0].arguments else None
+    kind, _ = declared_type(run, receiver, frame)
+    inner = kind.arguments[0] if kind.arguments else None
     cls = run.held_class(inner, frame)
     if name.startswith("emplace") and inner is not None and cls is not None:
         value = construct(run, inner, site.values, site.node, frame)
@@ -110,9 +109,9 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
         assign(run, receiver, (open_sequence((value, (atom,))),), frame)
         return value
     in_front = name.endswith("_front") or _is_begin(site)
-    ordered = kind in ORDERED or (name in ("insert", "emplace") and not in_front)
+    ordered = kind.name in ORDERED or (name in ("insert", "emplace") and not in_front)
     longer = (value, *atom.items) if in_front else (*atom.items, value)
-    if kind in SETS and not atom.open:
+    if kind.name in SETS and not atom.open:
         assign(run, receiver, (as_set(longer),), frame)
     else:
         is_open = atom.open or (ordered and not name.endswith("_front"))
@@ -179,8 +178,8 @@ def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
     if len(rest) == 2 and all(isinstance(a, Group) for v in rest for a in v):  # std::piecewise_construct
         key = rest[0][0].items[0] if rest[0] and rest[0][0].items else BOTTOM
         rest = list(rest[1][0].items) if rest[1] else []
-    written = declared_type(run, site.receiver, site.frame)
-    inner = written[0].arguments[1] if written is not None and len(written[0].arguments) > 1 else None
+    kind, _ = declared_type(run, site.receiver, site.frame)
+    inner = kind.arguments[1] if len(kind.arguments) > 1 else None
     cls = run.held_class(inner, site.frame)
     whole = len(rest) == 1 and any(isinstance(a, Obj) and a.cls is cls for a in rest[0])
     if inner is None or cls is None or whole:

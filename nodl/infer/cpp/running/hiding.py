@@ -163,11 +163,9 @@ def _returned(run: Machine, kind: Type, name: str, frame: Frame) -> Type:
 def _of_variable(run: Machine, node: Node, frame: Frame) -> Type:
     from nodl.infer.cpp.running.variables import declared_type
 
-    found = declared_type(run, node, frame)
-    if found is None:
-        return NO_TYPE
-    if "auto" not in found[0].name.split():
-        return found[0]
+    kind, _ = declared_type(run, node, frame)
+    if "auto" not in kind.name.split():
+        return kind
     owner = frame.owner_of(text(node))
     around = owner.function.body if owner is not None and owner.function is not None else None
     return _initialised(run, text(node), around, frame) if around is not None else NO_TYPE

@@ -377,9 +377,9 @@ def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -
             target = field_of(target, "argument")
         if match is None or match[1] not in function.templates or target is None:
             continue
-        written = declared_type(run, target, frame)
-        if written is not None and written[0].arguments:
-            bound[match[1]] = written[0].arguments[0]
+        kind, _ = declared_type(run, target, frame)
+        if kind.arguments:
+            bound[match[1]] = kind.arguments[0]
     return bound
 
 

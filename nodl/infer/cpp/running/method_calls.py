@@ -5,7 +5,6 @@ from __future__ import annotations
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, NODE_METHODS, FunctionModel
 from nodl.infer.cpp.reading.declarations import Class, Function
-from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
@@ -60,13 +59,13 @@ def method_call(run: Machine, site: CallSite) -> Value:
 
 def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
     """Whether the method, of an object that was not seen to be made, would make interfaces."""
-    written = declared_type(run, receiver, frame)
-    cls = run.class_of(written[0], frame) if written is not None else None
+    kind, _ = declared_type(run, receiver, frame)
+    cls = run.class_of(kind, frame)
     if cls is not None:
         return any(map(run.makes_interfaces, run.names.find_methods(cls, name)))
     if CREATES.fullmatch(name):
         return True
-    if written is not None and written[0].name not in ("", "auto"):
+    if kind.name not in ("", "auto"):
         return False
     return any(run.makes_interfaces(f) for table in run.names.methods.values() for f in table.get(name, ()))
 
@@ -74,8 +73,7 @@ def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
 def _declared_pointer(run: Machine, node: Node, frame: Frame) -> bool:
     if node.parent is not None and "->" in text(node.parent)[len(text(node)) : len(text(node)) + 3]:
         return False
-    found = declared_type(run, node, frame)
-    return found is not None and found[1]
+    return declared_type(run, node, frame)[1]
 
 
 def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
@@ -160,8 +158,7 @@ def _on_unknown(run: Machine, atom: Unknown, name: str, site: CallSite) -> Value
         what = f"{text(subject)[:60]}->{name}()"
         run.gap(node, frame, f"the node that {what} makes an interface on is not known: {atom.why}")
         return unknown(f"the result of {name}()")
-    written = declared_type(run, subject, frame)
-    kind = written[0] if written is not None else NO_TYPE
+    kind, _ = declared_type(run, subject, frame)
     is_own = kind.last in run.names.classes  # in whatever namespace
     if (kind.name in ("", "auto") or is_own) and not is_standard(name):
         every = (f for table in run.names.methods.values() for f in table.get(name, ()))

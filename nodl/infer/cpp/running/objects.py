@@ -118,13 +118,11 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
     if cls is None and kind.name in MAPS:
         return as_map([run.evaluate(each, frame) for each in given])
     if cls is None and (kind.name in _TEXTS or kind.name in _SCALARS or kind.last in run.names.enums):
-        if kind.name in _TEXTS and given:
+        if not given:
+            return default_value(run, node, kind, frame)
+        if kind.name in _TEXTS:
             return text_of(run, [run.evaluate(each, frame) for each in given])
-        return (
-            as_type(kind.name, run.evaluate(given[0], frame))
-            if given
-            else default_value(run, node, kind, frame)
-        )
+        return as_type(kind.name, run.evaluate(given[0], frame))
     if cls is not None and is_aggregate(run, cls) and given:
         found = _aggregate(run, node, kind, cls, given, frame)
         keep_references(run, found, given, frame)
@@ -137,6 +135,13 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
     found = construct(run, kind, values, node, frame)
     keep_references(run, found, given, frame)
     return found
+
+
+def in_braces(run: Machine, value: Node, kind: Type, frame: Frame) -> Value:
+    """What braces make of a type that is known; of anything else its value."""
+    if value.type == "initializer_list" and kind.name:
+        return made(run, value, kind, children(value), frame)
+    return run.evaluate(value, frame)
 
 
 def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
@@ -167,14 +172,8 @@ def as_set(items: Sequence[Value]) -> Seq:
     known = [plain(item[0]) if len(item) == 1 else None for item in items]
     if None in known or (len(set(known)) > 1 and not all(isinstance(item[0], Text) for item in items)):
         return open_sequence(items)
-    return Seq(
-        tuple(
-            {
-                str(text): item
-                for text, item in sorted(zip(known, items, strict=True), key=lambda p: str(p[0]))
-            }.values()
-        )
-    )
+    by_text = {str(text): item for text, item in zip(known, items, strict=True)}
+    return Seq(tuple(by_text[text] for text in sorted(by_text)))
 
 
 def cast(run: Machine, kind: Type, value: Value) -> Value:
@@ -196,15 +195,11 @@ def cast(run: Machine, kind: Type, value: Value) -> Value:
 def text_of(run: Machine, values: Sequence[Value]) -> Value:
     """``std::string(...)``: of a text, of so many letters, of a part of a text. Two letters in braces look the same."""
     if len(values) == 1:
-        only = values[0]
-        return (
-            only if not any(isinstance(atom, int | float | Seq) for atom in only) else unknown("a made text")
-        )
-    known = [
-        settled_text(run, value[0]) if len(value) == 1 and isinstance(value[0], Text) else None
-        for value in values
-    ]
-    numbers = [value[0] if len(value) == 1 and isinstance(value[0], int) else -1 for value in values]
+        is_made = any(isinstance(atom, int | float | Seq) for atom in values[0])
+        return unknown("a made text") if is_made else values[0]
+    single = [value[0] if len(value) == 1 else None for value in values]
+    known = [settled_text(run, atom) if isinstance(atom, Text) else None for atom in single]
+    numbers = [atom if isinstance(atom, int) else -1 for atom in single]
     whole = known[0]
     if len(values) == 2 and numbers[0] >= 0 and known[1] is not None and len(known[1]) == 1:
         return literal(known[1] * min(numbers[0], 256))
@@ -215,10 +210,8 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
 
 def _copies(run: Machine, cls: Class, value: Value) -> bool:
     """Whether an object of the class, or of a derived one, is all that a constructor gets."""
-    objects = [
-        a for a in value if isinstance(a, Obj) and a.cls is not None and cls in run.names.ancestry(a.cls)
-    ]
-    return bool(value) and len(objects) == len(value) and cls.name not in run.names.methods[cls]
+    derived = all(isinstance(atom, Obj) and cls in run.names.ancestry(atom.cls) for atom in value)
+    return bool(value) and derived and cls.name not in run.names.methods[cls]
 
 
 def _all_of(kind: Type, value: Value) -> bool:
@@ -265,11 +258,7 @@ def _aggregate(
         if name:
             member = cls.fields.get(name)
             inner = run.names.resolve(member.type, cls.scope, cls.file, bindings) if member else NO_TYPE
-            members[name] = (
-                made(run, value, inner, children(value), frame)
-                if value.type == "initializer_list" and inner.name
-                else run.evaluate(value, frame)
-            )
+            members[name] = in_braces(run, value, inner, frame)
     return construct(run, kind, [], node, frame, members=members)
 
 

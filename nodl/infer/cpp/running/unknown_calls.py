@@ -95,8 +95,7 @@ def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame
             target = field_of(target, "argument")
         if target is None or target.type not in ("identifier", "field_expression"):
             continue
-        declared = declared_type(run, target, frame)
-        if declared is not None and declared[0].name in ("std::string", "string", "std::vector"):
+        if declared_type(run, target, frame)[0].name in ("std::string", "string", "std::vector"):
             _changed(run, name, target, frame)
 
 

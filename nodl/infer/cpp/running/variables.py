@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.hiding import cell_of, lexical_class
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
@@ -152,23 +152,39 @@ def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] |
     return None
 
 
-def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool] | None:
-    """The type that a variable or member was declared with, and whether it is a pointer."""
-    name = text(node).removeprefix("this->")
+def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool]:
+    """The type that a variable or member was declared with, ``NO_TYPE`` if that is not known; whether it is a pointer,
+    or as a local variable a reference."""
+    name, this = text(node).removeprefix("this->"), current_object(frame)
     owner = frame.owner_of(name)
     if owner is not None:
         written = owner.types.get(name, "")
         kind = run.type_of(written, owner)
         return kind, kind.pointer or written.endswith(("&", "*"))
-    this_object = current_object(frame)
-    if this_object is not None and this_object.cls is not None:
-        for each in run.names.ancestry(this_object.cls):
-            if name in each.fields:
-                found = each.fields[name]
-                kind = run.names.resolve(found.type, each.scope, each.file, this_object.bindings.get(each))
-                return kind, found.pointer or kind.pointer
+    ancestry, bindings = (run.names.ancestry(this.cls), this.bindings) if this is not None else ([], {})
+    for each in ancestry:
+        if name in each.fields:
+            found = each.fields[name]
+            kind = run.names.resolve(found.type, each.scope, each.file, bindings.get(each))
+            return kind, found.pointer or kind.pointer
     outside = run.names.find_global(name, frame.scope, frame.file)
-    if outside is not None:
-        kind = run.names.resolve(outside.type, outside.scope, outside.file)
-        return kind, outside.pointer or kind.pointer
-    return None
+    if outside is None:
+        return NO_TYPE, False
+    kind = run.names.resolve(outside.type, outside.scope, outside.file)
+    return kind, outside.pointer or kind.pointer
+
+
+def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:
+    """Whether a variable or member was declared as a pointer, and not as a reference."""
+    kind, marked = declared_type(run, node, frame)
+    return kind.pointer or (marked and not _is_reference(run, node, frame))
+
+
+def _is_reference(run: Machine, node: Node, frame: Frame) -> bool:
+    name, this = text(node), current_object(frame)
+    owner = frame.owner_of(name)
+    if owner is not None:
+        return owner.types.get(name, "").endswith("&")
+    ancestry = run.names.ancestry(this.cls) if this is not None else []
+    declared = next((cls.fields[name].node for cls in ancestry if name in cls.fields), None)
+    return "&" in text(declared).partition("=")[0]
