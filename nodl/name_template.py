@@ -7,9 +7,9 @@ the name is then the parameter ``t``, to be filled in with what the launch file 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from enclave_launch.boundary.light import NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple
 from nodl.names import InvalidNameError, expand_name
 
 Edit = tuple[str, tuple[str, ...]]
@@ -133,6 +133,17 @@ class UnknownPart(NamedTuple):
 Part = str | ParameterPart | UnknownPart
 
 
+def melted(parts: Iterable[Any]) -> tuple[Any, ...]:
+    """Parts of a name, of literal texts that stand side by side one."""
+    found: list[Any] = []
+    for part in parts:
+        if isinstance(part, str) and found and isinstance(found[-1], str):
+            found[-1] += part
+        else:
+            found.append(part)
+    return tuple(found)
+
+
 class NameTemplate(NamedTuple):
     """A name as a sequence of parts, normally a single literal."""
 
@@ -171,8 +182,8 @@ class NameTemplate(NamedTuple):
                 choices = part.texts(parameters)
                 if not choices and not part.may_be_none(parameters):
                     choices = (UnknownPart(f"parameter {part.name!r} has no value"),)
-            results = [_appended(result, choice) for result in results for choice in choices]
-        return tuple(NameTemplate(result) for result in results)
+            results = [(*result, choice) for result in results for choice in choices]
+        return tuple(NameTemplate(melted(result)) for result in results)
 
     @property
     def text(self) -> str:
@@ -181,13 +192,6 @@ class NameTemplate(NamedTuple):
 
     def __str__(self) -> str:
         return "".join(_shown(part) for part in self.parts)
-
-
-def _appended(parts: tuple[Part, ...], part: Part) -> tuple[Part, ...]:
-    """Neighbouring literals melt together."""
-    if isinstance(part, str) and parts and isinstance(parts[-1], str):
-        return (*parts[:-1], parts[-1] + part)
-    return (*parts, part)
 
 
 def _shown(part: Part) -> str:

@@ -7,7 +7,6 @@ writes files.
 
 from __future__ import annotations
 
-import json
 import sys
 from collections.abc import Sequence
 from functools import cached_property, lru_cache
@@ -15,7 +14,7 @@ from pathlib import Path
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from nodl.ament_index import PackageNotFoundError, package_prefix
-from nodl.infer.cpp.cache.codec import decoded, encoded
+from nodl.infer.cpp.cache.codec import keep_variant, variants
 from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of
 
 if TYPE_CHECKING:
@@ -65,22 +64,11 @@ class KeptAnswer:
 
     def find(self) -> Any:
         """What was kept; ``None``: nothing, or the disk would answer otherwise now."""
-        for asked, answer in self._variants():
+        for asked, answer in variants(self._folder, self._key):
             if all(self._program.ask(kind, what) == said for kind, what, said in asked):
                 return answer
         return None
 
     def keep(self, answer: object) -> None:
         asked = [(kind, what, said) for (kind, what), said in self._program.asked.items()]
-        try:
-            content = encoded([(asked, answer), *self._variants()][:VARIANTS])
-            self._folder.write(self._key, json.dumps(content).encode())
-        except (TypeError, ValueError, RecursionError):
-            return  # what cannot be written is not kept
-
-    def _variants(self) -> list[Any]:
-        content = self._folder.read(self._key)
-        try:
-            return list(decoded(json.loads(content))) if content is not None else []
-        except (ValueError, RecursionError):
-            return []
+        keep_variant(self._folder, self._key, (asked, answer), VARIANTS)

@@ -5,14 +5,12 @@ Parameters stay symbolic, with what the code declares as their default; launch f
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
 from nodl.infer.models.ros_arguments import ros_arguments
 from nodl.infer.start import LaunchKey
 from nodl.infer.text import Hole, Input, NodePart, Piece, Text
 from nodl.infer.values import Sequence, Unknown, Value
-from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
+from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.names import InvalidNameError, expand_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
 from nodl.remap import InvalidRemapRuleError, RemapKind, RemapRules, parse_rule
@@ -153,19 +151,16 @@ def templates(name: object) -> list[NameTemplate]:
             results = [(*result, choice) for result in results for choice in choices]
             if len(results) > MAX_ALTERNATIVES:
                 return [NameTemplate((UnknownPart("too many possible defaults"),))]
-        return [NameTemplate(_melted(result)) for result in results]
+        return [NameTemplate(melted(result)) for result in results]
     why = name.why if isinstance(name, Unknown) else "not a text"
     return [NameTemplate((UnknownPart(why),))]
 
 
-def _melted(parts: Iterable[Part]) -> tuple[Part, ...]:
-    melted: list[Part] = []
-    for part in parts:
-        if isinstance(part, str) and melted and isinstance(melted[-1], str):
-            melted[-1] += part
-        else:
-            melted.append(part)
-    return tuple(melted)
+def own_name(what: str, first: bool) -> str:
+    """What a node says of itself (its ``name``, ``ns`` or ``fqn``) in a template, ``first`` or behind other text."""
+    if what == "fqn":
+        return "~" if first else "{ns}/{node}"
+    return "{node}" if what == "name" else "{ns}"
 
 
 def _parts(piece: Piece, first: bool) -> list[Part]:
@@ -174,9 +169,7 @@ def _parts(piece: Piece, first: bool) -> list[Part]:
     if isinstance(piece, Hole):
         return [UnknownPart(piece.why)]
     if isinstance(piece, NodePart):
-        if piece.what == "fqn":
-            return ["~" if first else "{ns}/{node}"]
-        return ["{node}" if piece.what == "name" else "{ns}"]
+        return [own_name(piece.what, first)]
     return _input_parts(piece)
 
 

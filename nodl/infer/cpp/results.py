@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from nodl.dependence import Dependence, Test, Variation, When
@@ -10,9 +10,9 @@ from nodl.infer.cpp.entry import FixedMapping
 from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
 from nodl.infer.cpp.program import ProgramFindings
 from nodl.infer.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
-from nodl.infer.results import certainty_of
+from nodl.infer.results import certainty_of, own_name
 from nodl.infer.start import Start
-from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
+from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import (
     RANDOM_ENDING,
     Certainty,
@@ -169,31 +169,21 @@ def _certainty(template: NameTemplate, found: PossibleEndpoint) -> Certainty:
 
 
 def _templates(atom: object, record: AllocatedNode) -> list[NameTemplate]:
-    texts = [atom] if isinstance(atom, Text) else list(concatenated((atom,)))
-    return [NameTemplate(tuple(_parts(each, record))) for each in texts if isinstance(each, Text)]
+    texts = [atom] if isinstance(atom, Text) else concatenated((atom,))
+    return [NameTemplate(melted(_parts(each, record))) for each in texts if isinstance(each, Text)]
 
 
-def _parts(text: Text, record: AllocatedNode) -> Iterable[Part]:
-    found: list[Part] = []
+def _parts(text: Text, record: AllocatedNode) -> Iterator[Part]:
     for index, part in enumerate(text.parts):
-        made = _node_part(part, record, index == 0) if isinstance(part, NodeNamePart) else part
-        if isinstance(made, str) and found and isinstance(found[-1], str):
-            found[-1] += made
+        if not isinstance(part, NodeNamePart):
+            yield part
+        elif part.record is record:
+            yield own_name(part.what, index == 0)
         else:
-            found.append(made)
-    return found
-
-
-def _node_part(part: NodeNamePart, record: AllocatedNode, first: bool) -> Part:
-    if part.record is record:
-        if part.what == "fqn":
-            return "~" if first else "{ns}/{node}"
-        return "{node}" if part.what == "name" else "{ns}"
-    names = [plain(each) for each in part.record.names]
-    known = names[0] if len(names) == 1 else None
-    return UnknownPart(
-        f"the {part.what} of node {known or 'that is not known'}, which the launch file may change"
-    )
+            names = [plain(each) for each in part.record.names]
+            known = names[0] if len(names) == 1 else None
+            node = f"the {part.what} of node {known or 'that is not known'}"
+            yield UnknownPart(f"{node}, which the launch file may change")
 
 
 # --- what the build decides -------------------------------------------------------------------------------------

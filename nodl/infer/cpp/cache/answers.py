@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
-from nodl.infer.cpp.cache.codec import decoded, encoded
+from nodl.infer.cpp.cache.codec import keep_variant, variants
 from nodl.infer.cpp.cache.fingerprint import analyser, surroundings
 from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of
 from nodl.infer.cpp.reading.project import Workspace
@@ -27,32 +27,24 @@ class WatchedStart:
         self.asked: dict[Asked, None] = {}
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
-        self.asked.setdefault(_parameters(self._start, node))
+        self.asked.setdefault(_said(self._start, "parameters", node))
         return self._start.parameters(node)
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
-        self.asked.setdefault(_final_name(self._start, node))
+        self.asked.setdefault(_said(self._start, "name", node))
         return self._start.final_name(node)
 
 
-def _parameters(start: Start, node: str | None) -> Asked:
-    return (
-        "parameters",
-        json.dumps(node),
-        repr(sorted(start.parameters(node).items(), key=lambda item: item[0])),
-    )
-
-
-def _final_name(start: Start, node: str | None) -> Asked:
-    return "name", json.dumps(node), repr(start.final_name(node))
+def _said(start: Start, what: str, node: str | None) -> Asked:
+    """What a launch says of a node: of its ``parameters``, or of its final ``name``."""
+    answer = sorted(start.parameters(node).items()) if what == "parameters" else start.final_name(node)
+    return what, json.dumps(node), repr(answer)
 
 
 def _says_the_same(start: Start | None, asked: Iterable[Asked]) -> bool:
-    for what, written, said in asked:
-        node = json.loads(written)
-        if start is None or (_parameters if what == "parameters" else _final_name)(start, node)[2] != said:
-            return False
-    return True
+    return all(
+        start is not None and _said(start, what, json.loads(node))[2] == said for what, node, said in asked
+    )
 
 
 class Made(NamedTuple):
@@ -77,7 +69,7 @@ class Answers:
 
     def find(self, question: object, start: Start | None = None) -> Made | None:
         """The answer of a run in which all files that it was made from, and the launch, were as they are now."""
-        for asked, files, answer in self._variants(self._key(question, start)):
+        for asked, files, answer in variants(self._folder, self._key(question, start)):
             if _says_the_same(start, asked) and all(self._content(name) == was for name, was in files):
                 return Made(answer, dict(files))
         return None
@@ -87,20 +79,9 @@ class Answers:
         key = self._key(question, start)
         asked = tuple(start.asked) if start is not None else ()
         variant = (asked, tuple(sorted(made.files.items())), made.answer)
-        try:
-            content = encoded([variant, *self._variants(key)][:VARIANTS])
-            self._folder.write(key, json.dumps(content).encode())
-        except (TypeError, ValueError, RecursionError):
-            return  # what cannot be written is not kept
+        keep_variant(self._folder, key, variant, VARIANTS)
 
     def _key(self, question: object, start: object) -> str:
         if not self._base:
             self._base = digest(analyser(), surroundings(self._workspace, self._folders))
         return digest(self._base, question, start is None)
-
-    def _variants(self, key: str) -> list[tuple[tuple[Asked, ...], tuple[tuple[str, str], ...], Any]]:
-        content = self._folder.read(key)
-        try:
-            return list(decoded(json.loads(content))) if content is not None else []
-        except (ValueError, RecursionError):
-            return []

@@ -1,15 +1,17 @@
-"""Answers as JSON and back: named tuples and enumerations of a fixed list, nothing else. Pure.
+"""Answers as JSON and back: named tuples and enumerations of a fixed list, nothing else; those kept under one key.
 
 Not ``pickle``: what is read must never be able to run code.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from enclave_launch.boundary.light import TextEnum
 from nodl.dependence import Dependence, Test, Variation, When
+from nodl.infer.cpp.cache.folder import CacheFolder
 from nodl.infer.cpp.entry import Entry, FixedMapping, Solved
 from nodl.infer.start import LaunchKey
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
@@ -59,3 +61,20 @@ def decoded(value: object) -> Any:
         return _RECORDS[value["record"]](*(decoded(each) for each in value["fields"]))
     except (KeyError, TypeError, ValueError) as error:
         raise ValueError(f"not an answer of ours: {error}") from error
+
+
+def variants(folder: CacheFolder, key: str) -> list[Any]:
+    """The answers to one question that are kept under ``key``, newest first; none where they cannot be read."""
+    content = folder.read(key)
+    try:
+        return list(decoded(json.loads(content))) if content is not None else []
+    except (ValueError, RecursionError):
+        return []
+
+
+def keep_variant(folder: CacheFolder, key: str, variant: object, most: int) -> None:
+    """Keep one more answer, and of those before the newest; one that cannot be written is not kept."""
+    try:
+        folder.write(key, json.dumps(encoded([variant, *variants(folder, key)][:most])).encode())
+    except (TypeError, ValueError, RecursionError):
+        return

@@ -10,7 +10,7 @@ from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.syntax import Node
-from nodl.name_template import ParameterPart, Part, UnknownPart
+from nodl.name_template import ParameterPart, Part, UnknownPart, melted
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.findings import AllocatedNode
@@ -245,7 +245,7 @@ def concatenated(*values: Value) -> Value:
         results = [(*head, *piece) for head in results for piece in pieces]
         if len(results) > MAX_ALTERNATIVES:
             return unknown("too many possible texts")
-    return tuple(dict.fromkeys(Text(melted(parts)) for parts in results))
+    return tuple(dict.fromkeys(Text(melted(part for part in parts if part != "")) for parts in results))
 
 
 def spread(atom: Atom) -> list[tuple[Part | NodeNamePart, ...]]:
@@ -253,19 +253,6 @@ def spread(atom: Atom) -> list[tuple[Part | NodeNamePart, ...]]:
     if isinstance(atom, Param) and len(atom.default) > 1:
         return [as_parts(atom._replace(known=(each,))) for each in atom.default]
     return [as_parts(atom)]
-
-
-def melted(parts: Iterable[Part | NodeNamePart]) -> tuple[Part | NodeNamePart, ...]:
-    """The parts without empty ones, literals that stand side by side as one."""
-    found: list[Part | NodeNamePart] = []
-    for part in parts:
-        if part == "":
-            continue
-        if isinstance(part, str) and found and isinstance(found[-1], str):
-            found[-1] += part
-        else:
-            found.append(part)
-    return tuple(found)
 
 
 def plain(atom: Atom) -> str | None:
