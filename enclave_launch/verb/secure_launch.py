@@ -247,10 +247,10 @@ def _policy_text(plan: LaunchPlan) -> str:
     from keystore.formats.policy import Policy
     from keystore.formats.policy_xml import policy_xml
 
-    if not any(enclave.profiles for enclave in plan.derived.policy.enclaves):
+    known = tuple(enclave for enclave in plan.derived.policy.enclaves if enclave.profiles)
+    if not known:
         nothing = "no enclave with known permissions: there is no policy to print"
         raise ManifestError("\n".join((*map(str, plan.problems), nothing)))
-    known = tuple(enclave for enclave in plan.derived.policy.enclaves if enclave.profiles)
     return policy_xml(Policy(known)).decode()
 
 

@@ -39,9 +39,8 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
     now = utc_now()
     until = parse_end(options.valid_for, now) if options.valid_for else None
     return ProvisionOptions(
-        domains=Domains.parse(options.domain_id)
-        if options.domain_id
-        else None,  # None: those of the processes
+        # None: those that the plan finds in the environments of the processes.
+        domains=Domains.parse(options.domain_id) if options.domain_id else None,
         create=not options.no_create_keystore,
         creation=creation,
         valid_until=until,
