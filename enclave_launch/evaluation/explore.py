@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import EmitEvent
-from enclave_launch.description.events.dispatch import chain, run_handler
+from enclave_launch.description.events.dispatch import AND_THEN, chain, run_handler
 from enclave_launch.description.events.event import (
     ProcessStarted,
     Shutdown,
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
     from enclave_launch.description.events.handlers import BaseEventHandler
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.host.plan_host import PlanHost
+
+
+_LONGEST_CHAIN = 100  # events of which each leads to the next: a timer that starts itself anew never ends
 
 
 class Explorer:
@@ -70,12 +73,20 @@ class Explorer:
         if queue.empty():
             return False
         event, mark = queue.get_nowait()
+        if mark is not None and mark.count(AND_THEN) >= _LONGEST_CHAIN:
+            self._leave_open(event.timer_action if isinstance(event, TimerEvent) else event)
+            return True
         for handler in self._context._event_handlers.matching(event):
             if self._depth == 0 or handler.internal or id(handler) not in self._fired:
                 self._run(handler, event, mark)
         if isinstance(event, Shutdown):
             self._context._set_is_shutdown(True)
         return True
+
+    def _leave_open(self, written: object) -> None:
+        """What the chain goes on to start is not followed, since it may have no end."""
+        what = f"what comes after {_LONGEST_CHAIN} events that each led to the next"
+        self._host.unforeseeable(Unforeseeable(what, location_of(written, self._context)))
 
     def _announce_start(self) -> bool:
         """``OnProcessStart`` is certain for a process that was started."""
@@ -146,7 +157,9 @@ class Explorer:
             started = self._host.started[new_from:] if id(handler) in known else self._host.started
             event = handler.foresee(started)
             self._note(handler, event)
-            if event is not None:
+            if event is not None and self._depth >= _LONGEST_CHAIN:
+                self._leave_open(handler)
+            elif event is not None:
                 self._try(event)
 
     def _try(self, event: Event) -> None:

@@ -76,6 +76,46 @@ def test_chains_of_exits_are_followed(launch_py: Any, started: Any) -> None:
     ]
 
 
+ENDLESS = {
+    "a timer that starts itself anew": """
+        def again(context):
+            return [EP(cmd=["x"]), TimerAction(period=1.0, actions=[OpaqueFunction(function=again)])]
+        entities = [OpaqueFunction(function=again)]
+    """,
+    "a process started anew at each exit": """
+        def again(context):
+            p = EP(cmd=["x"])
+            return [p, RegisterEventHandler(OnProcessExit(target_action=p, on_exit=[OpaqueFunction(function=again)]))]
+        entities = [OpaqueFunction(function=again)]
+    """,
+    "an event that emits itself": """
+        class Tick(Event):
+            pass
+        handler = EventHandler(matcher=lambda event: isinstance(event, Tick), entities=[EmitEvent(event=Tick())])
+        entities = [RegisterEventHandler(handler), EmitEvent(event=Tick()), EP(cmd=["x"])]
+    """,
+}
+
+
+@pytest.mark.parametrize("case", ENDLESS)
+def test_events_without_end_are_followed_for_a_while_and_then_left_open(case: str, launch_py: Any) -> None:
+    found = launch_py(ENDLESS[case])
+    assert {process.cmd for process in found.processes} == {("x",)} and len(found.processes) < 110
+    assert [each.what for each in found.unforeseeable] == [
+        "what comes after 100 events that each led to the next"
+    ]
+
+
+def test_a_long_chain_with_an_end_is_followed_to_it(launch_py: Any, started: Any) -> None:
+    found = launch_py("""
+        actions = [EP(cmd=["last"])]
+        for number in range(60):
+            actions = [TimerAction(period=1.0, actions=actions)]
+        entities = actions
+    """)
+    assert [cmd for cmd, _ in started(found)] == ["last"] and not found.unforeseeable
+
+
 def test_one_supposition_does_not_colour_the_next(launch_py: Any, started: Any) -> None:
     found = launch_py("""
         a, b = EP(cmd=["a"]), EP(cmd=["b"])

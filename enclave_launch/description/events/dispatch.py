@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
 
 
+AND_THEN = ", then "  # between an event and the one that it led to
+
 QueuedEvent = tuple["Event", "str | None"]
 Buckets = dict[tuple["type[Event] | None", int], dict[int, "BaseEventHandler"]]
 
@@ -177,4 +179,4 @@ def chain(mark: str | None, next_mark: str | None) -> str | None:
     """``timer 2`` inside ``OnProcessExit a-1`` is ``OnProcessExit a-1, then timer 2``."""
     if mark is None or next_mark is None:
         return mark or next_mark
-    return f"{mark}, then {next_mark}"
+    return f"{mark}{AND_THEN}{next_mark}"
