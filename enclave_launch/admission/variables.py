@@ -66,18 +66,11 @@ def preloaded(environment: Mapping[str, str]) -> Iterator[Setting]:
 def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
     """Configurations of a DDS with security properties of their own; reads the files that they are in."""
     for name in _CONFIGURATIONS:
-        for part in _documents(environment.get(name, "")):
-            text = part if part.lstrip().startswith("<") else text_or_nothing(part.removeprefix("file://"))
+        # Cyclone DDS takes files and documents in one list, separated by commas, Connext by semicolons.
+        for part in re.split("[,;]", environment.get(name, "")):
+            text = part if "<" in part else text_or_nothing(part.strip().removeprefix("file://"))
             if _SECURITY.search(text):
                 yield Setting(name, part)
-
-
-def _documents(value: str) -> Iterator[str]:
-    """Cyclone DDS takes several, separated by commas, each a file or a document; Connext by semicolons."""
-    if "<" in value:
-        yield value
-    else:
-        yield from (part for part in re.split("[,;]", value) if part)
 
 
 def domain_of(environment: Mapping[str, str]) -> int:

@@ -147,6 +147,9 @@ def test_an_impossible_domain_is_a_problem_with_its_place(value: str, plan: Plan
 )
 def test_a_security_variable_of_the_launch_file_is_told_to_have_no_effect(name: str, plan: Plan) -> None:
     (warning,) = plan(TALKER.format(f'<env name="{name}" value="x"/>')).warnings
+    assert not plan(TALKER.format('<env name="ZENOH_CONFIG_OVERRIDE" value="x"/>')).warnings, (
+        "no matter on DDS"
+    )
     assert warning.code is Code.VARIABLE_OVERRIDDEN and f"{name}=x" in warning.text
 
 
@@ -166,7 +169,11 @@ def test_a_dds_configuration_with_security_of_its_own_is_refused(plan: Plan, tmp
         "CYCLONEDDS_URI": (
             f"file://{secured}",
             f"{plain},{secured}",
+            f"{plain}, {secured}",
+            f"{secured},<CycloneDDS/>",
+            f"<CycloneDDS/>,file://{secured}",
             "<Security><Authentication/></Security>",
+            "<Domain><!-- one, two --><Security/></Domain>",
         ),
         "FASTRTPS_DEFAULT_PROFILES_FILE": (str(fast),),
     }

@@ -104,11 +104,21 @@ def test_a_prefix_for_all_processes_is_asked_about_as_well(words: str, plan: Pla
         ("; true", ["shell"]),
         ("| tee log", ["shell"]),
         ("`unset_all`", ["shell"]),
+        ("x;true", ["shell"]),
+        ("x & unset_all", ["shell"]),
+        ("'\\$(unset_all)'", ["shell"]),
+        ("'one\ntwo'", ["shell"]),
+        ("; x 'that is not closed", ["shell"]),
+        ("x" * 50_000, ["shell"]),
+        ("a-b {c} x#y", []),
     ],
 )
 def test_a_node_behind_a_shell_is_one_command_or_refused(args: str, expected: list[str], plan: Plan) -> None:
     arguments = quoteattr(shlex.quote(args) if args[:1] in (";", "|", "`", "'") else args)
-    assert refused(plan(f'<node pkg="demo_nodes" exec="talker" shell="true" args={arguments}/>')) == expected
+    text = f'<node pkg="demo_nodes" exec="talker" shell="true" args={arguments}/>'
+    assert refused(plan(text)) == expected
+    assert refused(plan(text, accept_prefixes=("shell",))) == []
+    assert refused(plan(text.replace(' shell="true"', ""))) == [], "without a shell they are words"
 
 
 @pytest.mark.parametrize(

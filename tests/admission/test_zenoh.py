@@ -40,6 +40,13 @@ def test_a_process_on_zenoh_gets_its_enclaves_session_and_nothing_that_overrides
     assert not [name for name in variables(found, 1) if "ZENOH" in name or "PEERS" in name]
 
 
+@pytest.mark.parametrize("name", ["ZENOH_SESSION_CONFIG_URI", "ZENOH_CONFIG_OVERRIDE", "ROS_STATIC_PEERS"])
+def test_what_would_lead_past_the_session_is_told_to_have_no_effect(name: str, plan: Plan) -> None:
+    found = plan(TALKER.format(ZENOH + f'<env name="{name}" value="x"/>'))
+    (text,) = told(found, Code.VARIABLE_OVERRIDDEN)
+    assert f"{name}=x" in text and variables(found)[name] != "x"
+
+
 def test_the_middleware_of_the_launchers_environment_counts(
     plan: Plan, monkeypatch: pytest.MonkeyPatch
 ) -> None:
