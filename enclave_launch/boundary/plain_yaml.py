@@ -162,9 +162,17 @@ def _text_written(text: str) -> str:
         return text
     if not (text.isascii() and text.isprintable()):
         raise _NeedsPyYAML
-    import yaml
+    from io import StringIO
 
-    return str(yaml.dump([text], Dumper=yaml.SafeDumper, width=math.inf))[2:-1]
+    from yaml import ScalarNode
+    from yaml.emitter import Emitter
+    from yaml.resolver import Resolver
+
+    resolver: Any = Resolver()
+    kind = resolver.resolve(ScalarNode, text, (True, False))
+    if kind == Resolver.DEFAULT_SCALAR_TAG and Emitter(StringIO()).analyze_scalar(text).allow_block_plain:
+        return text
+    return "'" + text.replace("'", "''") + "'"
 
 
 def _float_written(value: float) -> str:

@@ -209,13 +209,14 @@ def test_what_is_taught_in_place_counts_at_once(
     [
         lambda: yaml.add_representer(str, lambda dumper, text: dumper.represent_scalar("!t", text)),
         lambda: yaml.representer.SafeRepresenter.add_representer(str, in_quotes),
+        lambda: yaml.SafeDumper.add_representer(str, in_quotes),
         lambda: yaml.representer.Representer.add_representer(str, in_quotes),
         lambda: setattr(yaml.Dumper, "increase_indent", deeper),
         lambda: setattr(yaml.emitter.Emitter, "increase_indent", deeper),
     ],
 )
 def test_a_dumper_that_was_taught_writes_so(teach: Callable[[], None], untouched: None) -> None:
-    values = {"a": ["text"]}
+    values = {"a": ["text", "a #b"]}
     with accelerated(yaml):
         plain = yaml.dump(values), yaml.safe_dump(values)
         teach()
@@ -281,7 +282,10 @@ def test_what_may_not_stand_in_yaml_is_refused_though_its_pattern_is_compiled_la
         "from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files\n"
         "with libyaml_for_launch_files():\n"
         "    import re, yaml\n"
+        "import copy\n"
         "compiled = isinstance(yaml.reader.Reader.NON_PRINTABLE, re.Pattern)\n"
+        "for _, pattern in yaml.SafeLoader.yaml_implicit_resolvers['t']:\n"
+        "    assert isinstance(copy.copy(pattern), re.Pattern) and pattern.match('true')\n"
         "for text in ('a: 1 \\u00e9\\U0001f600', 'a: \\x01'):\n"
         "    try:\n"
         "        print(compiled, yaml.safe_load(text))\n"
