@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from nodl.infer.interpreter.define import linearized, methods_in
+from nodl.infer.interpreter.define import methods_in, program_classes
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.raising import Raised
 from nodl.infer.interpreter.run import Run
@@ -97,9 +97,7 @@ def expect_methods(run: Run, value: Iterable[object]) -> None:
     for instance in value:
         if not isinstance(instance, Instance) or not isinstance(instance.cls, ClassValue):
             continue
-        for base in linearized(instance.cls):
-            if not isinstance(base, ClassValue):
-                continue
+        for base in program_classes(instance.cls):
             for name in list(base.cells):
                 if isinstance(name, str) and name not in _NOT_CALLED and not name.startswith("["):
                     bound = methods_in(base.cells.get(name, ()), instance, instance.cls)

@@ -8,7 +8,7 @@ may meet. ``stamp`` names the state: equal stamps, equal contents.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 from nodl.infer.values import (
     ABSENT,
@@ -134,6 +134,24 @@ class ProgramState:
     def maybe(self, action: Alternative) -> None:
         """Run ``action`` as something that may happen or not."""
         self.branches((action, lambda: True))
+
+    def each(self, alternatives: Iterable[Callable[[], Value]]) -> list[Value]:
+        """What each of ``alternatives`` gives, run as ``branches`` of which every one falls through."""
+        given: list[Value] = []
+
+        def noted(make: Callable[[], Value]) -> Alternative:
+            def run() -> bool:
+                given.append(make())
+                return True
+
+            return run
+
+        self.branches([noted(make) for make in alternatives])
+        return given
+
+    def perhaps(self, make: Callable[[], Value]) -> Value:
+        """What ``make`` gives, run as something that may happen or not."""
+        return self.each((make, lambda: BOTTOM))[0]
 
     def repeatedly(self, action: Alternative, widen_texts: bool) -> None:
         """``maybe`` as one step towards a fixpoint: what keeps growing is widened."""

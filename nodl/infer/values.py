@@ -12,10 +12,12 @@ import ast
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, TypeAlias
 
+from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.text import Text, common_text
 
 if TYPE_CHECKING:
     from nodl.infer.findings import NodeRecord
+    from nodl.infer.interpreter.frames import Frame
     from nodl.infer.program import SourceModule
 
 Value: TypeAlias = tuple[object, ...]
@@ -24,6 +26,7 @@ Cells: TypeAlias = dict[object, Value]
 # More different strings than this in one value become a pattern; more objects become unknown.
 MAX_STRINGS = 32
 MAX_ATOMS = 64
+CONSTANTS = (str, int, float, bool, bytes, type(None))
 TOO_MANY = "too many possible values"
 COMMAND_LINE = "command line arguments"
 OF_A_NODE = "an attribute of a node whose name is made at run time"
@@ -136,23 +139,11 @@ class HeapObject:
         self.escaped = False
 
 
-class Items:
+class Items(NamedTuple):
     """The contents of a sequence: each element if the length is known, else what any element may be."""
 
-    __slots__ = ("exact", "rest")
-
-    def __init__(self, exact: tuple[Value, ...] | None, rest: Value = BOTTOM):
-        self.exact = exact
-        self.rest = rest
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Items) and self.exact == other.exact and self.rest == other.rest
-
-    def __hash__(self) -> int:
-        return hash((self.exact, self.rest))
-
-    def __repr__(self) -> str:
-        return f"Items({self.exact}, {self.rest})"
+    exact: tuple[Value, ...] | None
+    rest: Value = BOTTOM
 
     def any_element(self) -> Value:
         return self.rest if self.exact is None else join_all(self.exact)
@@ -180,23 +171,10 @@ class Sequence(HeapObject):
         return items
 
 
-# Never changed once made; written out, since a frozen dataclass takes three times as long to make and to compare.
-class Key:
+class Key(NamedTuple):
     """The cell of a dictionary under a constant key."""
 
-    __slots__ = ("constant",)
-
-    def __init__(self, constant: object) -> None:
-        self.constant = constant
-
-    def __eq__(self, other: object) -> bool:
-        return type(other) is Key and other.constant == self.constant
-
-    def __hash__(self) -> int:
-        return hash(self.constant)
-
-    def __repr__(self) -> str:
-        return f"Key({self.constant!r})"
+    constant: object
 
 
 class Dictionary(HeapObject):
@@ -244,17 +222,7 @@ class FunctionValue:
     """A function with what it closes over. ``owner`` is the class whose body defines it."""
 
     __slots__ = (
-        "attributes",
-        "cached",
-        "closure",
-        "context_manager",
-        "defaults",
-        "kw_defaults",
-        "module",
-        "name",
-        "node",
-        "owner",
-        "shared",
+        "attributes", "cached", "closure", "defaults", "kw_defaults", "module", "name", "node", "owner", "shared",
     )  # fmt: skip
 
     def __init__(
@@ -262,7 +230,7 @@ class FunctionValue:
         node: ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda,
         name: str,
         module: ModuleValue,
-        closure: object,
+        closure: Frame | None,
         owner: ClassValue | None,
     ):
         self.node = node
@@ -272,7 +240,6 @@ class FunctionValue:
         self.owner = owner
         self.defaults: tuple[Value, ...] = ()
         self.kw_defaults: tuple[Value | None, ...] = ()
-        self.context_manager = False
         self.attributes: Cells = {}
         self.cached = False  # by functools.cache
         self.shared = False  # it stands for several, made at the same place
@@ -400,6 +367,11 @@ def _join_items(items: list[Items]) -> Items:
 def present(value: Value) -> Value:
     """``value`` where it is set."""
     return tuple(atom for atom in value if type(atom) is not Absent) if ABSENT[0] in value else value
+
+
+def boolean(outcome: bool | None) -> Value:
+    """The value of a test; ``None``: it may have either outcome."""
+    return BOOLEAN if outcome is None else (outcome,)
 
 
 def constant_strings(value: Value) -> list[str]:

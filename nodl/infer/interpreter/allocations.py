@@ -6,8 +6,11 @@ import ast
 import itertools
 from collections.abc import Callable
 
+from enclave_launch.boundary.light import Any, TypeVar
 from nodl.infer.state import ProgramState
 from nodl.infer.values import HeapObject, Items, LocalCells, Sequence, Value
+
+Made = TypeVar("Made", bound=HeapObject)
 
 
 class Allocations:
@@ -20,7 +23,7 @@ class Allocations:
         self._context_ids = itertools.count(1)
         self._tuples: dict[object, Value] = {}
         self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
-        self._allocated: dict[tuple[object, ...], HeapObject] = {}
+        self._allocated: dict[tuple[object, ...], Any] = {}
         self.born: list[HeapObject] = []  # in this period
 
     def enter(self, key: object) -> int:
@@ -33,10 +36,10 @@ class Allocations:
         self.context = inner
         return previous
 
-    def allocate(self, node: ast.AST, kind: str, make: Callable[[], HeapObject]) -> HeapObject:
+    def allocate(self, node: ast.AST, kind: str, make: Callable[[], Made]) -> Made:
         """The object made at ``node`` in this calling context; made twice it stands for all of them."""
         key = (self.context, id(node), kind)
-        found = self._allocated.get(key)
+        found: Made | None = self._allocated.get(key)
         if found is None:
             found = self._allocated[key] = make()
             found.cells.born = self.state.period

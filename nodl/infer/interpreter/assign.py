@@ -5,16 +5,19 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter import special
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.define import program_classes
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.subscripts import slice_of
 from nodl.infer.methods import PropertyValue, Variables
 from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
     ITEMS,
+    OTHER,
+    OTHER_KEYS,
     ClassValue,
     Dictionary,
     External,
@@ -27,6 +30,7 @@ from nodl.infer.values import (
     Sequence,
     Value,
     join,
+    present,
 )
 
 
@@ -42,11 +46,6 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
         _unpack(run, target.elts, value, frame)
     elif isinstance(target, ast.Starred):
         assign(run, target.value, value, frame)
-
-
-def assign_unknown(run: Run, target: ast.expr, frame: Frame) -> None:
-    """Assign a value of which nothing is known, to each part of a tuple or list as well."""
-    assign(run, target, ANY, frame)
 
 
 def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
@@ -93,8 +92,8 @@ def _set_by_class(run: Run, owner: Instance, name: str, value: Value, node: ast.
     if hook:
         run.call(hook, Arguments([(name,), value]), node, frame)
         return True
-    for base in linearized(owner.cls):
-        held = base.cells.get(name) if isinstance(base, ClassValue) else None
+    for base in program_classes(owner.cls):
+        held = base.cells.get(name)
         if held:
             return _set_by_descriptor(run, owner, held, value, node, frame)
     return False
@@ -115,9 +114,43 @@ def _set_by_descriptor(
     return taken and len(held) == 1
 
 
-def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame) -> None:
-    from nodl.infer.interpreter.comprehensions import store_item
+def store_item(run: Run, obj: Dictionary, key: Value, value: Value) -> None:
+    """``obj[key] = value``."""
+    if len(key) == 1 and special.is_key(key[0]):
+        cell = Key(key[0])
+        if not run.repeated and obj.cells.get(cell) == ABSENT:
+            del obj.cells[cell]  # it comes last again; undone, it is as absent as before
+        run.state.store(obj, cell, value)
+        return
+    known = [atom for atom in key if isinstance(atom, str | int)]
+    for atom in known:
+        cell = Key(atom)
+        run.state.write(obj.cells, cell, join(obj.cells.get(cell, ABSENT), value))
+    if len(known) < len(key):
+        run.state.write(obj.cells, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
+        run.state.write(obj.cells, OTHER_KEYS, join(obj.cells.get(OTHER_KEYS, BOTTOM), key))
 
+
+def copy_dictionary(run: Run, target: Dictionary, source: Value) -> None:
+    """Add the entries of ``source``; what is escaped or not a dictionary may add any value under any key."""
+    for atom in source:
+        if isinstance(atom, Dictionary):
+            for key, value, certain in atom.entries():
+                if len(source) > 1 or not certain:
+                    value = join(target.cells.get(key, ABSENT), value)
+                run.state.store(target, key, value)
+            if not atom.is_open:
+                continue
+            for cell in (OTHER, OTHER_KEYS):
+                held = present(atom.cells.get(cell, BOTTOM))
+                run.state.store(target, cell, join(target.cells.get(cell, BOTTOM), held))
+            if not atom.escaped:
+                continue
+        run.escape_value((atom,))
+        run.state.store(target, OTHER, join(target.cells.get(OTHER, BOTTOM), ANY))
+
+
+def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame) -> None:
     owners = run.evaluate(target.value, frame)
     if isinstance(target.slice, ast.Slice):
         for owner in owners:
@@ -145,8 +178,6 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
 def _store_slice(
     run: Run, owner: object, bounds: ast.Slice, value: Value, certain: bool, frame: Frame
 ) -> None:
-    from nodl.infer.interpreter.subscripts import slice_of
-
     if not isinstance(owner, Sequence):
         run.escape_value(value)
         return
@@ -247,8 +278,6 @@ def delete(run: Run, target: ast.expr, frame: Frame) -> None:
 
 def _deleted_part(run: Run, target: ast.Subscript, frame: Frame) -> Value | slice | None:
     """The key, or the slice if its bounds are known."""
-    from nodl.infer.interpreter.subscripts import slice_of
-
     if isinstance(target.slice, ast.Slice):
         return slice_of(run, target.slice, frame)
     return run.evaluate(target.slice, frame)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter import imports, special
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.define import is_enumeration, linearized
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.run import AttributeReader, Run
 from nodl.infer.methods import (
@@ -38,6 +38,7 @@ from nodl.infer.values import (
     Value,
     external,
     join,
+    join_all,
     unknown,
 )
 
@@ -129,10 +130,9 @@ def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame, n
 def _bound_class_method(method: ClassMethod, cls: object) -> Value:
     if method.static:
         return method.function
-    bound: Value = tuple(
+    return tuple(
         BoundMethod(atom, cls) if isinstance(atom, FunctionValue) else atom for atom in method.function
     )
-    return bound
 
 
 def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame) -> Value:
@@ -151,7 +151,7 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
             value = base.cells.get(name)
             if value is None:
                 continue
-            if any(isinstance(other, External) and other.path.startswith("enum.") for other in order):
+            if is_enumeration(cls):
                 return _enum_member(run, base, name, value, node)
             result: Value = BOTTOM
             for atom in value:
@@ -252,20 +252,11 @@ def _of_super(run: Run, proxy: SuperProxy, name: str, node: ast.AST, frame: Fram
         return (ForeignMethod("builtins.object", receiver, name),)
     for base in rest:
         if isinstance(base, ClassValue) and name in base.cells:
-            return _bound_in_class(base.cells[name], cls)
-    if name == "__new__":
-        return external("builtins.object.__new__")
-    if name == "__init_subclass__":
-        return external("builtins.object.__init_subclass__")
+            held = base.cells[name]
+            return join_all(_bound_class_method(a, cls) if isinstance(a, ClassMethod) else (a,) for a in held)
+    if name in ("__new__", "__init_subclass__"):
+        return external(f"builtins.object.{name}")
     return unknown(f"{name} of a base class that is not analysed")
-
-
-def _bound_in_class(value: Value, cls: ClassValue) -> Value:
-    result: Value = BOTTOM
-    for atom in value:
-        found = _bound_class_method(atom, cls) if isinstance(atom, ClassMethod) else (atom,)
-        result = join(result, found)
-    return result
 
 
 def _of_native_object(run: Run, atom: NativeObject, name: str, node: ast.AST, frame: Frame) -> Value:
@@ -288,14 +279,10 @@ def _of_unknown(run: Run, atom: Unknown, name: str, node: ast.AST, frame: Frame)
     return (NativeMethod(atom, name),) if name in foreign.NODE_METHODS else (atom,)
 
 
-def _of_method(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -> Value:
-    if isinstance(atom, BoundMethod):
-        if name == "__self__":
-            return (atom.receiver,)
-        if name == "__func__":
-            return (atom.function,)
-        return _of_function(run, atom.function, name, node, frame)
-    return ANY
+def _of_method(run: Run, atom: BoundMethod, name: str, node: ast.AST, frame: Frame) -> Value:
+    if name == "__self__":
+        return (atom.receiver,)
+    return (atom.function,) if name == "__func__" else _of_function(run, atom.function, name, node, frame)
 
 
 ATTRIBUTES: dict[type, AttributeReader] = {
@@ -306,7 +293,6 @@ ATTRIBUTES: dict[type, AttributeReader] = {
     SuperProxy: _of_super,
     FunctionValue: _of_function,
     BoundMethod: _of_method,
-    ForeignMethod: _of_method,
     Unknown: _of_unknown,
     str: _of_native,
     Text: _of_native,

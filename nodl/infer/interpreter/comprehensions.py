@@ -5,42 +5,29 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable
 
-from nodl.infer.interpreter import special
-from nodl.infer.interpreter.assign import assign
+from nodl.infer.interpreter.assign import assign, store_item
 from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.loops import MAX_UNROLLED
 from nodl.infer.interpreter.run import Run
-from nodl.infer.values import (
-    ABSENT,
-    BOTTOM,
-    OTHER,
-    OTHER_KEYS,
-    Dictionary,
-    Items,
-    Key,
-    LocalCells,
-    Value,
-    join,
-)
+from nodl.infer.values import Dictionary, Items, LocalCells, Value, join_all
+
+Emit = Callable[[], None]
 
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     """A list (a set for a set comprehension), exact only where iterables and conditions are decided."""
     inner = _inner_frame(run, frame)
     collected: list[Value] = []
-    exact = _generate(
-        run, node.generators, 0, inner, lambda: collected.append(run.evaluate(node.elt, inner)), frame
-    )
+
+    def emit() -> None:
+        collected.append(run.evaluate(node.elt, inner))
+
+    exact = _generate(run, node.generators, inner, emit, frame)
     _leave(inner)
     kind = "set" if isinstance(node, ast.SetComp) else "list"
-    if exact:
-        return run.sequence(node, kind, Items(tuple(collected)))
-    result = BOTTOM
-    for value in collected:
-        result = join(result, value)
-    return run.sequence(node, kind, Items(None, result))
+    return run.sequence(node, kind, Items(tuple(collected)) if exact else Items(None, join_all(collected)))
 
 
 def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
@@ -53,27 +40,9 @@ def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
         value = run.evaluate(node.value, inner)
         store_item(run, result, key, value)
 
-    _generate(run, node.generators, 0, inner, add, frame)
+    _generate(run, node.generators, inner, add, frame)
     _leave(inner)
     return (result,)
-
-
-def store_item(run: Run, obj: object, key: Value, value: Value) -> None:
-    """``obj[key] = value`` for a dictionary."""
-    assert isinstance(obj, Dictionary)
-    if len(key) == 1 and special.is_key(key[0]):
-        cell = Key(key[0])
-        if not run.repeated and obj.cells.get(cell) == ABSENT:
-            del obj.cells[cell]  # it comes last again; undone, it is as absent as before
-        run.state.store(obj, cell, value)
-        return
-    known = [atom for atom in key if isinstance(atom, str | int)]
-    for atom in known:
-        cell = Key(atom)
-        run.state.write(obj.cells, cell, join(obj.cells.get(cell, ABSENT), value))
-    if len(known) < len(key):
-        run.state.write(obj.cells, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
-        run.state.write(obj.cells, OTHER_KEYS, join(obj.cells.get(OTHER_KEYS, BOTTOM), key))
 
 
 def _inner_frame(run: Run, frame: Frame) -> Frame:
@@ -92,71 +61,53 @@ def _leave(inner: Frame) -> None:
 
 
 def _generate(
-    run: Run,
-    generators: list[ast.comprehension],
-    index: int,
-    frame: Frame,
-    emit: Callable[[], None],
-    around: Frame | None = None,
+    run: Run, generators: list[ast.comprehension], frame: Frame, emit: Emit, around: Frame | None = None
 ) -> bool:
     """Bind the targets for every combination and ``emit``. True: exactly the emitted elements, in order.
 
     ``around``: where the first of all iterables is evaluated.
     """
-    if index == len(generators):
+    if not generators:
         emit()
         return True
-    generator = generators[index]
+    generator = generators[0]
+
+    def one(element: Value) -> bool:
+        run.spend(1)
+        assign(run, generator.target, element, frame)
+        return _where(run, generators[1:], generator.ifs, frame, emit)
+
     items = elements(run, run.evaluate(generator.iter, around or frame), generator.iter, frame)
     if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.fuel):
         run.repeated += 1
         element = items.any_element()
         if element:
             for _ in range(2):  # the second time with what the first one left behind
-                run.state.maybe(lambda: _one(run, generators, index, frame, element, emit) or True)
+                run.state.maybe(lambda: one(element) or True)
         run.repeated -= 1
         return False
     exact = True
     run.turns -= 0 if run.repeated else len(items.exact)
     for turn, element in enumerate(items.exact):
         previous = run.enter((id(generator), turn))
-        exact = _one(run, generators, index, frame, element, emit) and exact
+        exact = one(element) and exact
         run.context = previous
     return exact
 
 
-def _one(
-    run: Run,
-    generators: list[ast.comprehension],
-    index: int,
-    frame: Frame,
-    element: Value,
-    emit: Callable[[], None],
-) -> bool:
-    generator = generators[index]
-    run.spend(1)
-    assign(run, generator.target, element, frame)
-    return _where(run, generators, index, generator.ifs, frame, emit)
-
-
 def _where(
-    run: Run,
-    generators: list[ast.comprehension],
-    index: int,
-    tests: list[ast.expr],
-    frame: Frame,
-    emit: Callable[[], None],
+    run: Run, generators: list[ast.comprehension], tests: list[ast.expr], frame: Frame, emit: Emit
 ) -> bool:
-    """``emit`` where all ``tests`` hold; what an undecided one lets through may be there or not."""
+    """The inner ``generators`` where all ``tests`` hold; what an undecided one lets through may be there or not."""
     if not tests:
-        return _generate(run, generators, index + 1, frame, emit)
+        return _generate(run, generators, frame, emit)
     outcome = decide(run, tests[0], frame)
     if outcome is False:
         return True
 
     def go_on() -> bool:
         narrowed(run, tests[0], True, frame)
-        return _where(run, generators, index, tests[1:], frame, emit)
+        return _where(run, generators, tests[1:], frame, emit)
 
     if outcome is True:
         return go_on()

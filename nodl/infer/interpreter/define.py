@@ -22,13 +22,12 @@ from nodl.infer.values import (
 FunctionNode = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 
 # Decorators that leave the function what it is, as far as names are concerned.
-_TRANSPARENT = frozenset(
-    {
-        "functools.lru_cache", "functools.cache", "abc.abstractmethod",
-        "typing.override", "typing.overload", "typing_extensions.override", "typing.final",
-        "pytest.fixture", "asyncio.coroutine",
-    }
-)  # fmt: skip
+_CACHES = ("functools.cache", "functools.lru_cache")
+_TRANSPARENT = frozenset({
+    *_CACHES, "abc.abstractmethod", "contextlib.contextmanager", "contextlib.asynccontextmanager",
+    "typing.override", "typing.overload", "typing_extensions.override", "typing.final", "pytest.fixture",
+    "asyncio.coroutine",
+})  # fmt: skip
 _PROPERTIES = frozenset({"builtins.property", "functools.cached_property", "abc.abstractproperty"})
 _PLAIN_METACLASSES = frozenset({"abc.ABCMeta", "enum.EnumMeta", "enum.EnumType", "builtins.type"})
 _PLAIN_DECORATORS = frozenset(
@@ -85,7 +84,6 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
             return tuple(
                 a.with_accessor(decorator.attr, value) for a in found if isinstance(a, PropertyValue)
             )
-    made_by_call = isinstance(decorator, ast.Call)
     callee = run.evaluate(decorator.func if isinstance(decorator, ast.Call) else decorator, frame)
     atom = sole(callee)
     path = atom.path if isinstance(atom, External) else ""
@@ -96,21 +94,14 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
         return value
     if path in ("builtins.staticmethod", "builtins.classmethod"):
         return (ClassMethod(value, path == "builtins.staticmethod"),)
-    if path in ("contextlib.contextmanager", "contextlib.asynccontextmanager"):
-        function.context_manager = True
-        return value
-    if path in ("functools.cache", "functools.lru_cache"):
-        function.cached = True
-        return value
     if path in _TRANSPARENT:
+        function.cached = function.cached or path in _CACHES
         return value
+    if isinstance(decorator, ast.Call):
+        callee = run.evaluate(decorator, frame)
     if isinstance(atom, External):
-        if made_by_call:
-            run.evaluate(decorator, frame)
         run.register_callback(value, None)
         return value
-    if made_by_call:
-        callee = run.evaluate(decorator, frame)
     return run.call(callee, Arguments([value]), decorator, frame)
 
 
@@ -125,15 +116,10 @@ def _take_name(run: Run, function: FunctionValue, decorator: ast.Call, frame: Fr
 def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     """``class``: run the body, complete the class, apply the decorators last to first, bind the name."""
     bases = tuple(sole(run.evaluate(base, frame)) for base in node.bases if not isinstance(base, ast.Starred))
-    keywords = {
-        keyword.arg: run.evaluate(keyword.value, frame)
-        for keyword in node.keywords
-        if keyword.arg is not None
-    }
+    keywords = {each.arg: run.evaluate(each.value, frame) for each in node.keywords if each.arg is not None}
     if any(isinstance(base, ast.Starred) for base in node.bases) or len(keywords) < len(node.keywords):
         run.gap(node, frame, f"the bases of class {node.name} are made at run time")
     cls = run.allocate(node, "class", lambda: ClassValue(node, node.name, frame.module, bases))
-    assert isinstance(cls, ClassValue)
     body = Frame(frame.module, cls.cells, frame.closure if frame.is_class else frame, frame.depth)
     if not frame.is_class:
         frame.capture()
@@ -171,13 +157,14 @@ def complete_class(
     for base in linearized(cls)[1:]:
         hook = base.cells.get("__init_subclass__") if isinstance(base, ClassValue) else None
         if hook:
-            run.call(_function_of(hook), Arguments([(cls,)], keywords), node, frame)
+            run.call(functions_of(hook), Arguments([(cls,)], keywords), node, frame)
             return
         if isinstance(base, Unknown):
             run.escape_value((cls,))
 
 
-def _function_of(value: Value) -> Value:
+def functions_of(value: Value) -> Value:
+    """``value`` with the functions themselves in place of class and static methods."""
     return tuple(
         each for atom in value for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
     )
@@ -185,12 +172,9 @@ def _function_of(value: Value) -> Value:
 
 def _inherit_metaclass(run: Run, cls: ClassValue, metaclass: object, node: ast.AST, frame: Frame) -> None:
     """A metaclass of the program, or one that is not known, may do anything to the class."""
-    if isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES:
-        own = any(
-            isinstance(base, ClassValue) and base.node in run.with_metaclass for base in linearized(cls)[1:]
-        )
-        if not own:
-            return
+    plain = isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES
+    if plain and not any(base.node in run.with_metaclass for base in program_classes(cls)[1:]):
+        return
     run.with_metaclass.add(cls.node)
     run.gap(node, frame, f"class {cls.name} has a metaclass, which is not analysed")
     run.escape_value((cls,))
@@ -230,9 +214,8 @@ def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.exp
 def _fields(run: Run, cls: ClassValue, frame: Frame) -> list[tuple[str, Value | None]]:
     """The fields of a dataclass in the order of its constructor, with their defaults."""
     fields: dict[str, Value | None] = {}
-    for base in reversed(linearized(cls)[1:]):
-        if isinstance(base, ClassValue) and base.fields:
-            fields.update(base.fields)
+    for base in reversed(program_classes(cls)[1:]):
+        fields.update(base.fields or ())
     for statement in cls.node.body:
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
             annotation = ast.dump(statement.annotation) if statement.annotation else ""
@@ -267,18 +250,22 @@ def linearized(cls: ClassValue) -> tuple[object, ...]:
     return cls.linear
 
 
+def program_classes(cls: ClassValue) -> list[ClassValue]:
+    """The class and its bases that are analysed, in the method resolution order."""
+    return [base for base in linearized(cls) if isinstance(base, ClassValue)]
+
+
+def is_enumeration(cls: ClassValue) -> bool:
+    """Whether a class of ``enum`` is among its bases."""
+    return any(isinstance(base, External) and base.path.startswith("enum.") for base in linearized(cls))
+
+
 def _merge(orders: list[list[object]], bases: list[object]) -> list[object]:
-    sequences = [list(order) for order in (*orders, bases) if order]
+    sequences = [order for order in (*orders, bases) if order]
     result: list[object] = []
     while sequences:
-        head = next(
-            (
-                order[0]
-                for order in sequences
-                if not any(order[0] in other[1:] for other in sequences if other is not order)
-            ),
-            sequences[0][0],
-        )
+        behind = [item for order in sequences for item in order[1:]]
+        head = next((order[0] for order in sequences if order[0] not in behind), sequences[0][0])
         result.append(head)
         sequences = [[item for item in order if item is not head] for order in sequences]
         sequences = [order for order in sequences if order]
@@ -299,12 +286,8 @@ def methods_in(held: Value, receiver: object, cls: ClassValue) -> Value:
 
 def foreign_bases(cls: ClassValue) -> list[object]:
     """The bases that are not analysed: ``External`` or ``Unknown``; ``object`` does not count."""
-    return [
-        base
-        for base in linearized(cls)
-        if not isinstance(base, ClassValue)
-        and not (isinstance(base, External) and base.path in _HARMLESS_BASES)
-    ]
+    foreign = (base for base in linearized(cls) if not isinstance(base, ClassValue))
+    return [base for base in foreign if not (isinstance(base, External) and base.path in _HARMLESS_BASES)]
 
 
 _HARMLESS_BASES = frozenset({"builtins.object", "typing.Generic", "abc.ABC", "typing.Protocol"})

@@ -6,7 +6,7 @@ import ast
 import builtins
 
 from nodl.infer.interpreter import comprehensions, special
-from nodl.infer.interpreter.assign import assign
+from nodl.infer.interpreter.assign import assign, copy_dictionary, store_item
 from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, truth, truth_of
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.formatting import f_string
@@ -17,21 +17,20 @@ from nodl.infer.interpreter.run import Evaluator, Run
 from nodl.infer.interpreter.subscripts import subscript
 from nodl.infer.methods import SuperProxy
 from nodl.infer.values import (
-    ABSENT,
     ANY,
-    BOOLEAN,
     BOTTOM,
     NONE,
     OTHER,
-    OTHER_KEYS,
     ClassValue,
     Dictionary,
     Instance,
     Items,
     Unknown,
     Value,
+    boolean,
     external,
     join,
+    join_all,
     present,
     unknown,
 )
@@ -61,10 +60,7 @@ def _name(run: Run, node: ast.Name, frame: Frame) -> Value:
     if name in _BUILTINS:
         return external("builtins." + name)
     if module.stars:
-        found: Value = BOTTOM
-        for star in module.stars:
-            found = join(found, external(f"{star}.{name}"))
-        return found
+        return join_all(external(f"{star}.{name}") for star in module.stars)
     return unknown(f"the name {name}, which nothing analysed defines")
 
 
@@ -122,18 +118,15 @@ def _super(run: Run, node: ast.Call, frame: Frame) -> Value:
     if len(node.args) == 2:
         owner = run.evaluate(node.args[0], frame)
         receiver = run.evaluate(node.args[1], frame)
-        classes: list[object] = [atom for atom in owner if isinstance(atom, ClassValue)]
+        classes = [atom for atom in owner if isinstance(atom, ClassValue)]
     else:
         classes, receiver = _implicit_super(frame)
-    result: Value = BOTTOM
-    for cls in classes:
-        for atom in receiver:
-            if isinstance(cls, ClassValue) and isinstance(atom, Instance | ClassValue):
-                result = join(result, (SuperProxy(cls, atom),))
+    objects = [atom for atom in receiver if isinstance(atom, Instance | ClassValue)]
+    result = join_all((SuperProxy(cls, atom),) for cls in classes for atom in objects)
     return result or unknown("super() outside of an analysed object")
 
 
-def _implicit_super(frame: Frame) -> tuple[list[object], Value]:
+def _implicit_super(frame: Frame) -> tuple[list[ClassValue], Value]:
     outer: Frame | None = frame
     while outer is not None:
         function = outer.function
@@ -169,33 +162,13 @@ def _literal_sequence(kind: str) -> Evaluator:
 
 def _dict(run: Run, node: ast.Dict, frame: Frame) -> Value:
     obj = run.allocate(node, "dict", Dictionary)
-    assert isinstance(obj, Dictionary)
     for key, value in zip(node.keys, node.values, strict=True):
         held = run.evaluate(value, frame)
         if key is not None:
-            comprehensions.store_item(run, obj, run.evaluate(key, frame), held)
+            store_item(run, obj, run.evaluate(key, frame), held)
         else:
             copy_dictionary(run, obj, held)
     return (obj,)
-
-
-def copy_dictionary(run: Run, target: Dictionary, source: Value) -> None:
-    """Add the entries of ``source``; what is escaped or not a dictionary may add any value under any key."""
-    for atom in source:
-        if isinstance(atom, Dictionary):
-            for key, value, certain in atom.entries():
-                if len(source) > 1 or not certain:
-                    value = join(target.cells.get(key, ABSENT), value)
-                run.state.store(target, key, value)
-            if not atom.is_open:
-                continue
-            for cell in (OTHER, OTHER_KEYS):
-                held = present(atom.cells.get(cell, BOTTOM))
-                run.state.store(target, cell, join(target.cells.get(cell, BOTTOM), held))
-            if not atom.escaped:
-                continue
-        run.escape_value((atom,))
-        run.state.store(target, OTHER, join(target.cells.get(OTHER, BOTTOM), ANY))
 
 
 def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
@@ -204,15 +177,12 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
         outcome = forked(run, node.test, frame)
     if outcome is not None:
         return run.evaluate(node.body if outcome else node.orelse, frame)
-    results: list[Value] = []
 
-    def side(expression: ast.expr, holds: bool) -> bool:
+    def side(expression: ast.expr, holds: bool) -> Value:
         narrowed(run, node.test, holds, frame)
-        results.append(run.evaluate(expression, frame))
-        return True
+        return run.evaluate(expression, frame)
 
-    run.state.branches((lambda: side(node.body, True), lambda: side(node.orelse, False)))
-    return join(*results)
+    return join_all(run.state.each((lambda: side(node.body, True), lambda: side(node.orelse, False))))
 
 
 def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
@@ -241,23 +211,20 @@ def _perhaps(run: Run, operand: ast.expr, before: list[ast.expr], held: bool, fr
     """What ``operand`` gives where those ``before`` it were all true, or (unless ``held``) all false."""
     if isinstance(operand, ast.Constant):
         return run.evaluate(operand, frame)
-    results: list[Value] = []
 
-    def evaluate() -> bool:
+    def evaluate() -> Value:
         for test in before:
             narrowed(run, test, held, frame)
-        results.append(run.evaluate(operand, frame))
-        return True
+        return run.evaluate(operand, frame)
 
-    run.state.maybe(evaluate)
-    return results[0]
+    return run.state.perhaps(evaluate)
 
 
 def _unary(run: Run, node: ast.UnaryOp, frame: Frame) -> Value:
     value = run.evaluate(node.operand, frame)
     if isinstance(node.op, ast.Not):
         outcome = truth(special.tested(run, value, node, frame))
-        return BOOLEAN if outcome is None else (not outcome,)
+        return boolean(None if outcome is None else not outcome)
     if special.has_own(value):
         name = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__"}[type(node.op)]
         return special.call_special(run, value[0], name, node, frame) or ANY
@@ -279,7 +246,7 @@ def _walrus(run: Run, node: ast.NamedExpr, frame: Frame) -> Value:
     return value
 
 
-def _await(run: Run, node: ast.Await, frame: Frame) -> Value:
+def _inner(run: Run, node: ast.Await | ast.Starred, frame: Frame) -> Value:
     return run.evaluate(node.value, frame)
 
 
@@ -293,10 +260,6 @@ def _yield_from(run: Run, node: ast.YieldFrom, frame: Frame) -> Value:
     items = elements(run, run.evaluate(node.value, frame), node, frame)
     frame.yielded = join(frame.yielded or BOTTOM, items.any_element())
     return ANY
-
-
-def _starred(run: Run, node: ast.Starred, frame: Frame) -> Value:
-    return run.evaluate(node.value, frame)
 
 
 EXPRESSIONS: dict[type, Evaluator] = {
@@ -321,8 +284,8 @@ EXPRESSIONS: dict[type, Evaluator] = {
     ast.GeneratorExp: comprehensions.comprehension,
     ast.DictComp: comprehensions.dict_comprehension,
     ast.NamedExpr: _walrus,
-    ast.Await: _await,
+    ast.Await: _inner,
     ast.Yield: _yield,
     ast.YieldFrom: _yield_from,
-    ast.Starred: _starred,
+    ast.Starred: _inner,
 }

@@ -3,48 +3,34 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter.frames import Frame
-from nodl.infer.interpreter.raising import (
-    Raised,
-    Unwinding,
-    catches,
-    handled_value,
-)
+from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.raising import Attempt, Raised, catches
 from nodl.infer.interpreter.run import Run
-from nodl.infer.values import (
-    ANY,
-    Value,
-    join,
-)
+from nodl.infer.values import ANY, Sequence, Value, external, join
 
 
 def run_try(run: Run, node: Any, frame: Frame) -> bool:
     """Handlers run after a certain exception, or after any prefix of a body that may have raised one."""
     mark = run.state.mark()
-    before = Unwinding(run, frame)
-    risks, returned = run.risks, frame.returned
+    attempt, returned = Attempt(run, frame), frame.returned
     raised = None
-    run.state.depth += 1
-    run.tries += 1
-    run.try_forks = run.state.forks
-    tries = run.tries
     try:
         passes = run.execute(node.body, frame)
     except Raised as found:
         raised, passes = found, False
     jump = frame.jump
-    before.restore(run, frame)
+    attempt.end(run, frame)
     frame.jump = jump if raised is None else ""
-    run.tries = tries - 1
     if passes and node.orelse:
         passes = run.execute(node.orelse, frame)
     try:
-        if raised is not None and run.risks - risks <= raised_risks(raised):
+        if raised is not None and run.risks - attempt.risks <= 1:
             passes = _handled(run, node.handlers, raised, frame)
-        elif raised is not None or run.risks != risks:
+        elif raised is not None or run.risks != attempt.risks:
             passes = _perhaps_handled(run, node, passes, mark, frame)
     except Raised:
         if node.finalbody and swallows(run, node.finalbody, frame):
@@ -80,26 +66,27 @@ def _finally(run: Run, body: list[ast.stmt], returned: Value, passes: bool, mark
     return done and passes
 
 
-def raised_risks(raised: Raised) -> int:
-    """A certain exception is itself one risk."""
-    return 1
-
-
 def _handled(run: Run, handlers: list[ast.ExceptHandler], raised: Raised, frame: Frame) -> bool:
     """The handler that certainly catches the exception, or the exception again."""
     for handler in handlers:
-        outcome = catches(handled_value(run, handler, frame), raised)
+        outcome = catches(_classes_of(run, handler, frame), raised)
         if outcome is None:
             break
         if outcome:
             return _run_handler(run, handler, raised.value, frame)
     else:
         raise raised
-    return run.state.branches([_handler_of(run, handler, raised.value, frame) for handler in handlers])
+    return run.state.branches([partial(_run_handler, run, each, raised.value, frame) for each in handlers])
 
 
-def _handler_of(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> Callable[[], bool]:
-    return lambda: _run_handler(run, handler, value, frame)
+def _classes_of(run: Run, handler: ast.ExceptHandler, frame: Frame) -> Value:
+    """The classes that a handler names, as one alternative each; all exceptions for a bare ``except``."""
+    if handler.type is None:
+        return external("builtins.BaseException")
+    value = run.evaluate(handler.type, frame)
+    if len(value) == 1 and isinstance(value[0], Sequence):
+        return elements(run, value, handler, frame).any_element()
+    return value
 
 
 def _run_handler(run: Run, handler: ast.ExceptHandler, value: Value, frame: Frame) -> bool:
@@ -116,20 +103,14 @@ def _run_handler(run: Run, handler: ast.ExceptHandler, value: Value, frame: Fram
 def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame) -> bool:
     """Each handler may run: it sees every value written on the way through the body."""
 
-    def no_exception() -> bool:
-        return passes
-
-    def handler_of(handler: ast.ExceptHandler) -> Any:
-        def handle() -> bool:
-            run.state.join_seen(mark)
-            return _run_handler(run, handler, ANY, frame)
-
-        return handle
+    def handle(handler: ast.ExceptHandler) -> bool:
+        run.state.join_seen(mark)
+        return _run_handler(run, handler, ANY, frame)
 
     if not node.handlers:
         return passes
     jump = frame.jump
-    result = run.state.branches([no_exception, *(handler_of(handler) for handler in node.handlers)])
+    result = run.state.branches([lambda: passes, *(partial(handle, handler) for handler in node.handlers)])
     if not passes:
         if jump:
             frame.unsettled = True  # the jump of the body may happen, or a handler runs instead

@@ -4,72 +4,60 @@ from __future__ import annotations
 
 from nodl.infer.interpreter.binding import MISSING
 from nodl.infer.interpreter.calls import call_bound
-from nodl.infer.interpreter.define import foreign_bases, linearized, methods_in
+from nodl.infer.interpreter.define import (
+    foreign_bases,
+    functions_of,
+    is_enumeration,
+    linearized,
+    methods_in,
+    program_classes,
+)
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import enum_members
 from nodl.infer.interpreter.run import Run
-from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod
+from nodl.infer.methods import BoundMethod, ForeignMethod
 from nodl.infer.models import foreign
-from nodl.infer.values import (
-    BOTTOM,
-    ClassValue,
-    External,
-    FunctionValue,
-    Instance,
-    Value,
-)
+from nodl.infer.values import BOTTOM, ClassValue, External, FunctionValue, Instance, Value, sole
 
 
 def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     """A new object: its constructor is the first one in the method resolution order."""
-    for base in linearized(cls):
-        if isinstance(base, ClassValue):
-            run.instantiated.setdefault(base.node)
+    for base in program_classes(cls):
+        run.instantiated.setdefault(base.node)
     found = _member_by_value(run, cls, call)
     if found:
         return found
     made = _made_by_new(run, cls, call)
     if made is not None:
         return made
-    return (initialise(run, cls, new_instance(run, cls, call), call),)
+    instance = new_instance(run, cls, call)
+    initialise(run, cls, instance, call)
+    return (instance,)
 
 
 def _member_by_value(run: Run, cls: ClassValue, call: Call) -> Value:
     """``Side('l')`` of an enumeration: the member with this value; nothing where that is not known."""
-    if not any(isinstance(base, External) and base.path.startswith("enum.") for base in linearized(cls)):
+    if not is_enumeration(cls):
         return BOTTOM
     wanted = call.args.at(0)
     members = enum_members(run, cls, call.node, call.frame).exact
-    if wanted is None or len(wanted) != 1 or members is None or len(call.args.positional) != 1:
+    if members is None or len(call.args.positional) != 1 or not isinstance(sole(wanted), str | int):
         return BOTTOM
     for member in members:
         atom = member[0]
-        if (
-            isinstance(atom, Instance)
-            and atom.cells.get("_value_") == wanted
-            and isinstance(wanted[0], str | int)
-        ):
+        if isinstance(atom, Instance) and atom.cells.get("_value_") == wanted:
             return member
     return BOTTOM
 
 
 def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
     """What the program's own ``__new__`` gives, initialised where it is an object of the class."""
-    for base in linearized(cls):
-        if isinstance(base, ClassValue) and "__new__" in base.cells:
-            constructors = tuple(
-                each
-                for atom in base.cells["__new__"]
-                for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
-            )
-            shifted = call.args.preceded((cls,))
-            made = run.call(constructors, shifted, call.node, call.frame)
-            for atom in made:
-                if (
-                    isinstance(atom, Instance)
-                    and isinstance(atom.cls, ClassValue)
-                    and cls in linearized(atom.cls)
-                ):
+    for base in program_classes(cls):
+        if "__new__" in base.cells:
+            constructors = functions_of(base.cells["__new__"])
+            made = run.call(constructors, call.args.preceded((cls,)), call.node, call.frame)
+            for atom in (each for each in made if isinstance(each, Instance)):
+                if isinstance(atom.cls, ClassValue) and cls in linearized(atom.cls):
                     initialise(run, atom.cls, atom, call)
             return made
     return None
@@ -78,12 +66,10 @@ def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
 def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
     """``object.__new__(cls)``."""
     site = (call.frame.module.source.path, getattr(call.node, "lineno", 0))
-    instance = run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
-    assert isinstance(instance, Instance)
-    return instance
+    return run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
 
 
-def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> Instance:
+def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:
     """Call the constructor: the first one in the method resolution order."""
     _expect_callbacks(run, cls, instance)
     for base in linearized(cls):
@@ -105,11 +91,9 @@ def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> Ins
             path = base.path if isinstance(base, External) else ""
             run.call_atom(ForeignMethod(path, instance, "__init__"), call)
             break
-    return instance
 
 
-def _fill_fields(run: Run, cls: ClassValue, instance: object, call: Call) -> None:
-    assert isinstance(instance, Instance)
+def _fill_fields(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:
     for index, (name, default) in enumerate(cls.fields or ()):
         value = call.args.at(index, name)
         run.state.store(instance, name, value if value is not None else default or MISSING)
@@ -121,18 +105,18 @@ def _fill_fields(run: Run, cls: ClassValue, instance: object, call: Call) -> Non
 def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
     """A foreign base class calls the methods that override its own; which ones, only its model knows."""
     seen: set[object] = set()
-    bases = foreign_bases(cls)
-    hooks = [foreign.hooks_of(base) for base in bases]
+    hooks = [foreign.hooks_of(base) for base in foreign_bases(cls)]
     if not hooks:
         return
     every = any(names is None for names in hooks)
     wanted = frozenset().union(*(names for names in hooks if names is not None))
-    for base in linearized(cls):
-        if not isinstance(base, ClassValue):
-            continue
+    for base in program_classes(cls):
         for name, value in list(base.cells.items()):
-            if name in seen or name == "__init__" or not isinstance(name, str):
-                continue
-            if every or name in wanted:
+            if (
+                name not in seen
+                and name != "__init__"
+                and isinstance(name, str)
+                and (every or name in wanted)
+            ):
                 seen.add(name)
                 run.register_callback(methods_in(value, instance, cls), None)

@@ -8,7 +8,9 @@ from collections.abc import Iterator
 
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter.raising import Attempt, Raised
 from nodl.infer.interpreter.run import Run
+from nodl.infer.models import concrete
 from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
     ANY,
@@ -38,10 +40,7 @@ def elements(run: Run, value: Value, node: ast.AST, frame: Frame) -> Items:
         return Items(None, ANY)
     if len(found) == 1:
         return found[0]
-    result: Value = BOTTOM
-    for items in found:
-        result = join(result, items.any_element())
-    return Items(None, result)
+    return Items(None, join_all(items.any_element() for items in found))
 
 
 def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
@@ -73,8 +72,6 @@ def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
 
 
 def _pulled_all(run: Run, obj: NativeObject, node: ast.AST, frame: Frame) -> Items:
-    from nodl.infer.models import concrete
-
     found: list[Value] = []
     call = Call(Arguments(), node, frame)
     if concrete.is_usable(run, obj):
@@ -93,8 +90,6 @@ def _pulled_all(run: Run, obj: NativeObject, node: ast.AST, frame: Frame) -> Ite
 
 def lose(run: Run, obj: NativeObject) -> Value:
     """What an iterator may give that cannot be followed any more."""
-    from nodl.infer.models import concrete
-
     result = concrete.lose(run, obj)
     if obj.fallback is not None:
         fallback, obj.fallback = obj.fallback, None
@@ -141,26 +136,19 @@ def own_elements(run: Run, obj: Instance, node: ast.AST, frame: Frame) -> Iterat
 
 
 def _asked(run: Run, obj: Instance, by_index: bool, node: ast.AST, frame: Frame) -> Iterator[Value]:
-    from nodl.infer.interpreter.raising import Raised, Unwinding
-
     end = "builtins.IndexError" if by_index else "builtins.StopIteration"
     for index in itertools.count():
-        before, forks = Unwinding(run, frame), run.state.forks
-        risks = run.risks
-        run.try_forks, run.tries = forks, run.tries + 1
-        run.state.depth += 1
+        attempt = Attempt(run, frame)
         try:
             following = special.method(obj, "__getitem__" if by_index else "__next__")
             found = run.call(following, Arguments([(index,)] if by_index else []), node, frame)
         except Raised as raised:
-            before.restore(run, frame)
-            run.tries -= 1
-            if end in raised.kinds and run.risks - risks <= 1:
+            attempt.end(run, frame)
+            if end in raised.kinds and run.risks - attempt.risks <= 1:
                 return
             raise Undecided from raised
-        before.restore(run, frame)
-        run.tries -= 1
-        if run.risks != risks or not found:
+        attempt.end(run, frame)
+        if run.risks != attempt.risks or not found:
             raise Undecided
         yield found
 
@@ -175,28 +163,22 @@ def input_items(text: Text) -> Value:
 
 def keys_of(obj: Dictionary) -> Items:
     """The keys in order if all are known and certainly there; else what any key may be."""
-    entries = obj.entries()
-    keys = tuple((cell.constant,) for cell, _, _ in entries)
-    if obj.is_open:
-        result = present(obj.cells.get(OTHER_KEYS, ANY))
-        for key in keys:
-            result = join(result, key)
-        return Items(None, join(result, ANY) if obj.escaped else result)
-    certain = all(certain for _, _, certain in entries) and not obj.summary
-    return Items(keys) if certain else Items(None, Items(keys).any_element())
+    return _in_order(
+        obj, tuple((cell.constant,) for cell, _, _ in obj.entries()), obj.cells.get(OTHER_KEYS, ANY)
+    )
 
 
 def values_of(obj: Dictionary) -> Items:
     """The values in the order of their keys if all are known and certainly there; else what any may be."""
-    entries = obj.entries()
-    values = tuple(value for _, value, _ in entries)
+    return _in_order(obj, tuple(value for _, value, _ in obj.entries()), obj.cells.get(OTHER, BOTTOM))
+
+
+def _in_order(obj: Dictionary, known: tuple[Value, ...], others: Value) -> Items:
     if obj.is_open:
-        result = present(obj.cells.get(OTHER, BOTTOM))
-        for value in values:
-            result = join(result, value)
+        result = join_all((present(others), *known))
         return Items(None, join(result, ANY) if obj.escaped else result)
-    certain = all(certain for _, _, certain in entries) and not obj.summary
-    return Items(values) if certain else Items(None, Items(values).any_element())
+    certain = all(certain for _, _, certain in obj.entries()) and not obj.summary
+    return Items(known) if certain else Items(None, join_all(known))
 
 
 def enum_members(run: Run, cls: ClassValue, node: ast.AST, frame: Frame) -> Items:

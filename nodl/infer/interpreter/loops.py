@@ -13,19 +13,15 @@ from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.iterate import elements, lose
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models.concrete import NotConcrete, is_usable, pulled
-from nodl.infer.values import (
-    Items,
-    NativeObject,
-    Sequence,
-    Value,
-    join,
-    join_all,
-)
+from nodl.infer.values import Items, NativeObject, Sequence, Value, join, join_all
 
 MAX_UNROLLED = 64  # turns, those of the loops around multiplied
 MAX_UNROLLED_NUMBERS = 16  # in callbacks, where loops over numbers compute rather than name
 MAX_ROUNDS = 8
 WIDEN_TEXTS_FROM = 3
+
+For = ast.For | ast.AsyncFor
+Loop = ast.For | ast.AsyncFor | ast.While
 
 
 def stream(run: Run, value: Value, call: Call) -> Iterator[Value]:
@@ -65,20 +61,36 @@ def _is_streamed(run: Run, value: Value) -> bool:
     return not run.repeated and is_list and isinstance(atom, Sequence) and atom.items.exact is not None
 
 
-def run_for(run: Run, node: ast.For | ast.AsyncFor, frame: Frame) -> bool:
+def run_for(run: Run, node: For, frame: Frame) -> bool:
     """``for``: turn by turn as far as elements are known, else to a fixpoint. False: control cannot pass."""
     iterated = run.evaluate(node.iter, frame)
     if _is_streamed(run, iterated):
-        return _streamed(run, node, iterated, frame)
-    return _for(run, node, elements(run, iterated, node, frame), frame)
+        return _looped(run, node, frame, lambda: _streamed(run, node, iterated, frame))
+    items = elements(run, iterated, node, frame)
+    return _looped(run, node, frame, lambda: _for(run, node, items, frame))
 
 
-def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Frame) -> bool:
-    """A loop over an iterator or a list, turn by turn; the rest at once when it cannot be followed to its end."""
-    source = stream(run, iterated, Call(Arguments(), node, frame))
+def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
+    """``while``: turn by turn while the test is decided, then to a fixpoint. False: control cannot pass."""
+    return _looped(run, node, frame, lambda: _while(run, node, frame))
+
+
+def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], tuple[bool, bool]]) -> bool:
+    """The ``turns`` of a loop, which tell whether control can pass it, and whether at its end; then its ``else``."""
     before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = False
     frame.loop_forks = run.state.forks
+    passes, finished = turns()
+    frame.unsettled, frame.loop_forks = before, loop_forks
+    frame.jump = ""
+    if passes and finished and node.orelse:
+        return run.execute(node.orelse, frame)
+    return passes
+
+
+def _streamed(run: Run, node: For, iterated: Value, frame: Frame) -> tuple[bool, bool]:
+    """A loop over an iterator or a list, turn by turn; the rest at once when it cannot be followed to its end."""
+    source = stream(run, iterated, Call(Arguments(), node, frame))
     seen: list[Value] = []
     broken = False
     passes, finished = True, True
@@ -107,18 +119,14 @@ def _streamed(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, frame: Fr
     run.unrolled = unrolled
     if broken:
         run.state.join_seen(start)
-    frame.unsettled, frame.loop_forks = before, loop_forks
-    frame.jump = ""
-    if passes and finished and node.orelse:
-        return run.execute(node.orelse, frame)
-    return passes
+    return passes, finished
 
 
 def _stop() -> Value:
     raise NotConcrete
 
 
-def _rest(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, seen: list[Value], frame: Frame) -> None:
+def _rest(run: Run, node: For, iterated: Value, seen: list[Value], frame: Frame) -> None:
     """The turns that cannot be followed: any of the elements, any number of times."""
     atom = iterated[0]
     element = join_all(seen)
@@ -130,28 +138,19 @@ def _rest(run: Run, node: ast.For | ast.AsyncFor, iterated: Value, seen: list[Va
         _fixpoint(run, frame, lambda: _turn(run, node.target, element, node.body, frame))
 
 
-def _for(run: Run, node: ast.For | ast.AsyncFor, items: Items, frame: Frame) -> bool:
-    before, loop_forks = frame.unsettled, frame.loop_forks
-    frame.unsettled = False
-    frame.loop_forks = run.state.forks
-    finished = True
+def _for(run: Run, node: For, items: Items, frame: Frame) -> tuple[bool, bool]:
     if items.exact is not None and len(items.exact) * run.unrolled <= _limit(run, items.exact, node):
         run.unrolled *= len(items.exact) or 1
-        passes, finished = _unrolled(run, node, items.exact, frame)
+        outcome = _unrolled(run, node, items.exact, frame)
         run.unrolled //= len(items.exact) or 1
-    else:
-        element = items.any_element()
-        passes = True
-        if element or items.exact is None:
-            _fixpoint(run, frame, lambda: _turn(run, node.target, element, node.body, frame))
-    frame.unsettled, frame.loop_forks = before, loop_forks
-    frame.jump = ""
-    if passes and finished and node.orelse:
-        return run.execute(node.orelse, frame)
-    return passes
+        return outcome
+    element = items.any_element()
+    if element or items.exact is None:
+        _fixpoint(run, frame, lambda: _turn(run, node.target, element, node.body, frame))
+    return True, True
 
 
-def _limit(run: Run, exact: tuple[Value, ...], node: ast.For | ast.AsyncFor) -> int:
+def _limit(run: Run, exact: tuple[Value, ...], node: For) -> int:
     numbers = all(len(element) == 1 and type(element[0]) is int for element in exact)
     if run.state.forks and not run.repeated:
         return MAX_UNROLLED
@@ -164,7 +163,7 @@ def _limit(run: Run, exact: tuple[Value, ...], node: ast.For | ast.AsyncFor) -> 
 
 
 @functools.lru_cache(maxsize=4096)
-def _may_name(node: ast.For | ast.AsyncFor | ast.While) -> bool:
+def _may_name(node: Loop) -> bool:
     """Whether the loop's number can become part of a text: one stands in the body, or the number is passed on."""
     counting = node.test if isinstance(node, ast.While) else node.target
     numbers = {name.id for name in ast.walk(counting) if isinstance(name, ast.Name)}
@@ -185,9 +184,7 @@ def _turn(run: Run, target: ast.expr, element: Value, body: list[ast.stmt], fram
     return run.execute(body, frame)
 
 
-def _followed(
-    run: Run, node: ast.For | ast.AsyncFor, index: int, element: Value, frame: Frame
-) -> tuple[bool, bool]:
+def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> tuple[bool, bool]:
     """One turn by itself; may the next one follow, and may the loop have been left?"""
     previous = run.enter((id(node), index))
     mark = run.state.mark()
@@ -201,39 +198,22 @@ def _followed(
     return passes or frame.jump == "continue", False
 
 
-def _unrolled(
-    run: Run, node: ast.For | ast.AsyncFor, exact: tuple[Value, ...], frame: Frame
-) -> tuple[bool, bool]:
+def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> tuple[bool, bool]:
     """One turn after the other; can control pass the loop, and may it have run to its end?"""
     start = run.state.mark()
-    broken = False
+    broken, outcome = False, (True, True)
     run.state.depth += 1
     for index, element in enumerate(exact):
         run.turns -= not run.repeated
         passes, jumped = _followed(run, node, index, element, frame)
         broken = broken or jumped
         if not passes:
-            run.state.depth -= 1
-            if broken:
-                run.state.join_seen(start)
-            return broken or frame.jump == "break", broken
+            outcome = broken or frame.jump == "break", broken
+            break
     run.state.depth -= 1
     if broken:
         run.state.join_seen(start)
-    return True, True
-
-
-def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
-    """``while``: turn by turn while the test is decided, then to a fixpoint. False: control cannot pass."""
-    before, loop_forks = frame.unsettled, frame.loop_forks
-    frame.unsettled = False
-    frame.loop_forks = run.state.forks
-    passes, finished = _while(run, node, frame)
-    frame.unsettled, frame.loop_forks = before, loop_forks
-    frame.jump = ""
-    if passes and finished and node.orelse:
-        return run.execute(node.orelse, frame)
-    return passes
+    return outcome
 
 
 def _while(run: Run, node: ast.While, frame: Frame) -> tuple[bool, bool]:

@@ -9,10 +9,7 @@ from nodl.infer.interpreter import loops, special
 from nodl.infer.interpreter.assign import assign
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.iterate import lose
-from nodl.infer.interpreter.raising import (
-    Raised,
-    Unwinding,
-)
+from nodl.infer.interpreter.raising import Attempt, Raised
 from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import BoundMethod
 from nodl.infer.models.concrete import NotConcrete
@@ -40,8 +37,7 @@ def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
         entered = _entered(run, manager, node, frame)
         if item.optional_vars is not None:
             assign(run, item.optional_vars, entered, frame)
-    swallows = any(_may_swallow(atom) for manager in managers for atom in manager)
-    if swallows:
+    if any(_may_swallow(atom) for manager in managers for atom in manager):
         return _swallowing(run, node, managers, frame)
     before = frame.raised
     frame.raised = False
@@ -73,20 +69,14 @@ def _may_swallow(atom: object) -> bool:
 def _swallowing(run: Run, node: ast.With | ast.AsyncWith, managers: list[Value], frame: Frame) -> bool:
     """``contextlib.suppress``, or a manager of the program that may return true: the body up to an exception."""
     mark = run.state.mark()
-    before = Unwinding(run, frame)
-    risks = run.risks
-    run.tries += 1
-    run.try_forks = run.state.forks
-    tries = run.tries
-    run.state.depth += 1
+    attempt = Attempt(run, frame)
     try:
         passes = run.execute(node.body, frame)
         certain = False
     except Raised:
-        passes, certain = True, run.risks - risks <= 1
-    before.restore(run, frame)
-    run.tries = tries - 1
-    if not certain and run.risks != risks:
+        passes, certain = True, run.risks - attempt.risks <= 1
+    attempt.end(run, frame)
+    if not certain and run.risks != attempt.risks:
         run.state.join_seen(mark)
         passes = True
     _exited(run, managers, node, frame)

@@ -7,14 +7,15 @@ import operator
 from collections.abc import Callable
 
 from nodl.infer.interpreter import special
+from nodl.infer.interpreter.assign import copy_dictionary
 from nodl.infer.interpreter.formatting import as_texts, percent
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Run
+from nodl.infer.models import concrete
 from nodl.infer.text import Hole, Text, TextAtom, concatenate, concatenations, make_text
 from nodl.infer.values import (
     ANY,
-    BOTTOM,
     Dictionary,
     Instance,
     Items,
@@ -23,6 +24,7 @@ from nodl.infer.values import (
     Unknown,
     Value,
     join,
+    join_all,
     sole,
 )
 
@@ -87,11 +89,7 @@ def _holds(value: Value, kind: type) -> bool:
 
 
 def _arithmetic(run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value) -> Value:
-    result: Value = BOTTOM
-    for a in left:
-        for b in right:
-            result = join(result, _arithmetic_atoms(run, node, a, op, b))
-    return result or ANY
+    return join_all(_arithmetic_atoms(run, node, a, op, b) for a in left for b in right) or ANY
 
 
 def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: object) -> Value:
@@ -138,37 +136,22 @@ def _container_operation(
     run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
 ) -> Value | None:
     """Union, difference ... of sets, and ``|`` of dictionaries."""
-    from nodl.infer.interpreter.expressions import copy_dictionary
-    from nodl.infer.models import concrete
-
     if isinstance(left[0], Dictionary) and isinstance(op, ast.BitOr):
         merged = run.allocate(node, "merged", Dictionary)
-        assert isinstance(merged, Dictionary)
         copy_dictionary(run, merged, left)
         copy_dictionary(run, merged, right)
         return (merged,)
-    function = {
-        ast.BitOr: operator.or_,
-        ast.BitAnd: operator.and_,
-        ast.BitXor: operator.xor,
-        ast.Sub: operator.sub,
-    }
-    chosen = function.get(type(op))
-    call = Call(Arguments([left, right]), node, frame)
-    return concrete.compute(run, chosen, call) if chosen is not None else None
+    if not isinstance(op, ast.BitOr | ast.BitAnd | ast.BitXor | ast.Sub):
+        return None
+    return concrete.compute(run, _ARITHMETIC[type(op)], Call(Arguments([left, right]), node, frame))
 
 
 def _native_binary(
     run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
 ) -> Value:
     """A path divided by a text, for instance."""
-    from nodl.infer.models import concrete
-
-    function = getattr(
-        operator, special.OPERATORS[type(op)].replace("or", "or_").replace("and", "and_"), None
-    )
     call = Call(Arguments([left, right]), node, frame)
-    found = concrete.compute(run, function, call) if function is not None else None
+    found = concrete.compute(run, _ARITHMETIC.get(type(op), operator.matmul), call)
     return found if found is not None else ANY
 
 
@@ -200,9 +183,7 @@ def _added_sequences(run: Run, node: ast.AST, left: Value, right: Value, sequenc
         first, second = sequences[0].items, sequences[1].items
         if first.exact is not None and second.exact is not None and len(first.exact + second.exact) <= 256:
             return run.sequence(node, kind, Items(first.exact + second.exact))
-    element: Value = BOTTOM
-    for sequence in sequences:
-        element = join(element, sequence.items.any_element())
+    element = join_all(sequence.items.any_element() for sequence in sequences)
     if any(not isinstance(atom, Sequence) for atom in (*left, *right)):
         element = join(element, ANY)
     return run.sequence(node, kind, Items(None, element))

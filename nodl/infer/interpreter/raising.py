@@ -6,19 +6,12 @@ others end their path, as ever, and count as a risk: a handler is left out only 
 
 from __future__ import annotations
 
-import ast
 import builtins
 
 from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
-from nodl.infer.values import (
-    ClassValue,
-    External,
-    Instance,
-    Value,
-    external,
-)
+from nodl.infer.values import ClassValue, External, Instance, Value
 
 
 class Raised(Exception):
@@ -106,35 +99,21 @@ def _builtin_kinds(kind: type[BaseException] | None) -> tuple[object, ...]:
     return tuple(f"builtins.{each.__name__}" for each in kind.__mro__ if issubclass(each, BaseException))
 
 
-class Unwinding:
-    """Where the interpreter stood at a ``try``, to go back there after an exception."""
+class Attempt:
+    """A ``try``, or what works like one: until its ``end`` risks are counted. ``risks``: how many there were before;
+    an exception that ends it is itself one more."""
 
     def __init__(self, run: Run, frame: Frame) -> None:
         state = run.state
-        self._numbers = (
-            len(run.stack),
-            run.context,
-            state.depth,
-            run.unrolled,
-            run.try_forks,
-            frame.loop_forks,
-        )
+        self._numbers = run.context, state.depth, run.unrolled, run.tries, run.try_forks, frame.loop_forks
+        self._stack = len(run.stack)
+        self.risks = run.risks
+        state.depth += 1
+        run.tries += 1
+        run.try_forks = state.forks
 
-    def restore(self, run: Run, frame: Frame) -> None:
-        size, run.context, run.state.depth, run.unrolled, run.try_forks, frame.loop_forks = self._numbers
-        del run.stack[size:]
+    def end(self, run: Run, frame: Frame) -> None:
+        """Go back to where the interpreter stood, also after an exception."""
+        run.context, run.state.depth, run.unrolled, run.tries, run.try_forks, frame.loop_forks = self._numbers
+        del run.stack[self._stack :]
         frame.jump = ""
-
-
-def handled_value(run: Run, handler: ast.ExceptHandler, frame: Frame) -> Value:
-    """The classes that a handler names, as one alternative each; all exceptions for a bare ``except``."""
-    from nodl.infer.interpreter.iterate import elements
-    from nodl.infer.values import Sequence
-
-    if handler.type is None:
-        return external("builtins.BaseException")
-    value = run.evaluate(handler.type, frame)
-    atom = value[0] if len(value) == 1 else None
-    if isinstance(atom, Sequence):
-        return elements(run, value, handler, frame).any_element()
-    return value

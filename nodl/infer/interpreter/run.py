@@ -9,6 +9,7 @@ from __future__ import annotations
 import ast
 import itertools
 from collections.abc import Callable
+from functools import partial
 
 from enclave_launch.boundary.light import Any, NamedTuple
 from nodl.infer.findings import Findings, OptionDefaults
@@ -36,6 +37,7 @@ from nodl.infer.values import (
     Unknown,
     Value,
     join,
+    join_all,
 )
 from nodl.source_ref import SourceRef
 
@@ -61,6 +63,7 @@ class BudgetExceeded(Exception):
 Evaluator = Callable[["Run", Any, Frame], Value]
 Executor = Callable[["Run", Any, Frame], bool]
 Caller = Callable[["Run", Any, Call], Value]
+Model = Callable[["Run", Call], Value]  # what a function of a library does
 AttributeReader = Callable[["Run", Any, str, ast.AST, Frame], Value]
 
 
@@ -227,20 +230,8 @@ class Run(Allocations):
             merged = BOTTOM
         if len(callee) == 1 and not merged:
             return self.call_atom(callee[0], call)
-        results: list[Value] = []
-
-        def alternative(atom: object) -> Callable[[], bool]:
-            def run() -> bool:
-                results.append(self.call_atom(atom, call))
-                return True
-
-            return run
-
-        self.state.branches([alternative(atom) for atom in callee if atom is not None])
-        joined = merged
-        for result in results:
-            joined = join(joined, result)
-        return joined or ANY
+        results = self.state.each(partial(self.call_atom, atom, call) for atom in callee if atom is not None)
+        return join_all((merged, *results)) or ANY
 
     def _merge_receivers(self, callee: Value, call: Call) -> tuple[Value, Value]:
         """One call for a method of many objects, ``self`` being any of them; returns what is left to call."""
@@ -252,19 +243,9 @@ class Run(Allocations):
         done = [function for function, objects in receivers.items() if len(objects) > 1]
         for function in done:
             shifted = Call(call.args.preceded(tuple(receivers[function])), call.node, call.frame)
-            merged = join(merged, self._maybe_called(function, shifted))
+            merged = join(merged, self.state.perhaps(partial(self.call_atom, function, shifted)))
         left = tuple(a for a in callee if not (isinstance(a, BoundMethod) and a.function in done))
         return left, merged
-
-    def _maybe_called(self, function: FunctionValue, call: Call) -> Value:
-        results: list[Value] = []
-
-        def run() -> bool:
-            results.append(self.call_atom(function, call))
-            return True
-
-        self.state.maybe(run)
-        return results[0]
 
     def call_atom(self, atom: object, call: Call) -> Value:
         handler = self.tables.callables.get(type(atom))

@@ -10,6 +10,7 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import BoundMethod
 from nodl.infer.values import (
     ANY,
+    BOOLEAN,
     BOTTOM,
     ClassValue,
     External,
@@ -17,7 +18,9 @@ from nodl.infer.values import (
     Instance,
     Sequence,
     Value,
+    boolean,
     join,
+    join_all,
 )
 
 OPERATORS: dict[type, str] = {
@@ -58,25 +61,20 @@ def call_special(run: Run, obj: object, name: str, node: ast.AST, frame: Frame, 
     return run.call(found, Arguments(list(given)), node, frame) if found else BOTTOM
 
 
+def _asked_each(run: Run, owners: Value, name: str, node: ast.AST, frame: Frame, given: Value) -> Value:
+    return join_all(call_special(run, atom, name, node, frame, given) for atom in owners)
+
+
 def binary(run: Run, left: Value, op: ast.operator, right: Value, node: ast.AST, frame: Frame) -> Value:
     """``left op right`` as far as a class of the program defines it; nothing: neither side does."""
     name = OPERATORS.get(type(op), "")
-    result: Value = BOTTOM
-    for atom in left:
-        result = join(result, call_special(run, atom, f"__{name}__", node, frame, right))
-    if not result:
-        for atom in right:
-            result = join(result, call_special(run, atom, f"__r{name}__", node, frame, left))
-    return result
+    result = _asked_each(run, left, f"__{name}__", node, frame, right)
+    return result or _asked_each(run, right, f"__r{name}__", node, frame, left)
 
 
 def in_place(run: Run, left: Value, op: ast.operator, right: Value, node: ast.AST, frame: Frame) -> Value:
     """``left op= right`` by ``__iadd__`` and the like; nothing where no class of ``left`` defines it."""
-    name = f"__i{OPERATORS.get(type(op), '')}__"
-    result: Value = BOTTOM
-    for atom in left:
-        result = join(result, call_special(run, atom, name, node, frame, right))
-    return result
+    return _asked_each(run, left, f"__i{OPERATORS.get(type(op), '')}__", node, frame, right)
 
 
 def comparison(run: Run, op: ast.cmpop, left: Value, right: Value, node: ast.AST, frame: Frame) -> Value:
@@ -86,20 +84,15 @@ def comparison(run: Run, op: ast.cmpop, left: Value, right: Value, node: ast.AST
     name = COMPARISONS.get(type(op))
     if name is None:
         return BOTTOM
-    result: Value = BOTTOM
-    for atom in left:
-        result = join(result, call_special(run, atom, name, node, frame, right))
-    for atom in right if not result else ():
-        result = join(result, call_special(run, atom, _MIRRORED.get(name, name), node, frame, left))
+    result = _asked_each(run, left, name, node, frame, right)
+    result = result or _asked_each(run, right, _MIRRORED.get(name, name), node, frame, left)
     if not result and name == "__ne__":
         return _negated(run, comparison(run, ast.Eq(), left, right, node, frame), node, frame)
     return result
 
 
 def _contained(run: Run, op: ast.cmpop, left: Value, right: Value, node: ast.AST, frame: Frame) -> Value:
-    result: Value = BOTTOM
-    for atom in right:
-        result = join(result, call_special(run, atom, "__contains__", node, frame, left))
+    result = _asked_each(run, right, "__contains__", node, frame, left)
     if result:
         result = booleans(run, result, node, frame)
     return _negated(run, result, node, frame) if isinstance(op, ast.NotIn) else result
@@ -113,36 +106,33 @@ def booleans(run: Run, value: Value, node: ast.AST, frame: Frame) -> Value:
     """``bool(value)``: ``(True,)``, ``(False,)`` or both."""
     from nodl.infer.interpreter.conditions import truth_of
 
-    result: Value = BOTTOM
-    for atom in tested(run, value, node, frame):
-        outcome = truth_of(atom)
-        result = join(result, (True, False) if outcome is None else (outcome,))
-    return result or (True, False)
+    outcomes = (truth_of(atom) for atom in tested(run, value, node, frame))
+    return join_all(map(boolean, outcomes)) or BOOLEAN
 
 
 def tested(run: Run, value: Value, node: ast.AST, frame: Frame) -> Value:
     """``value`` with objects whose class defines truth replaced by what their method says."""
     if not has_own(value):
         return value
-    result: Value = BOTTOM
-    for atom in value:
-        said = call_special(run, atom, "__bool__", node, frame)
-        said = said or call_special(run, atom, "__len__", node, frame)
-        result = join(result, said or (atom,))
-    return result or ANY
+    return _replaced(run, value, ("__bool__", "__len__"), node, frame)
 
 
 def spoken(run: Run, value: Value, node: ast.AST, frame: Frame, spec: Value | None = None) -> Value:
     """``value`` with objects whose class defines their text replaced by it (``format`` with ``spec``, else ``str``)."""
     if not has_own(value):
         return value
+    return _replaced(run, value, ("__str__", "__repr__"), node, frame, spec)
+
+
+def _replaced(
+    run: Run, value: Value, names: tuple[str, ...], node: ast.AST, frame: Frame, spec: Value | None = None
+) -> Value:
+    """Each object as the first of its methods ``names`` says, before all ``__format__`` where there is a ``spec``."""
     result: Value = BOTTOM
     for atom in value:
-        said: Value = BOTTOM
-        if spec is not None:
-            said = call_special(run, atom, "__format__", node, frame, spec)
-        said = said or call_special(run, atom, "__str__", node, frame)
-        said = said or call_special(run, atom, "__repr__", node, frame)
+        said = BOTTOM if spec is None else call_special(run, atom, "__format__", node, frame, spec)
+        for name in names:
+            said = said or call_special(run, atom, name, node, frame)
         result = join(result, said or (atom,))
     return result or ANY
 

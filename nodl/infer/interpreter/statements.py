@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable
+from functools import partial
 
 from nodl.infer.interpreter import imports, loops, patterns, special
 from nodl.infer.interpreter.assign import assign, delete
@@ -13,10 +13,7 @@ from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.handling import run_try
 from nodl.infer.interpreter.managers import run_with
 from nodl.infer.interpreter.operators import binary_operation
-from nodl.infer.interpreter.raising import (
-    throw,
-    throw_value,
-)
+from nodl.infer.interpreter.raising import throw, throw_value
 from nodl.infer.interpreter.run import Executor, Run
 from nodl.infer.values import (
     ANY,
@@ -75,12 +72,8 @@ def _augmented(run: Run, node: ast.AugAssign, frame: Frame) -> bool:
     if isinstance(node.op, ast.Add | ast.BitOr):
         mutated = [atom for atom in old if isinstance(atom, Sequence) and atom.kind in ("list", "set")]
         for atom in mutated:
-            run.call(
-                run.attribute((atom,), "extend" if atom.kind == "list" else "update", node, frame),
-                Arguments([added]),
-                node,
-                frame,
-            )
+            method = run.attribute((atom,), "extend" if atom.kind == "list" else "update", node, frame)
+            run.call(method, Arguments([added]), node, frame)
         if mutated and len(mutated) == len(old):
             return True
     assign(run, node.target, binary_operation(run, node, old, node.op, added, frame), frame)
@@ -100,15 +93,11 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
 
-    def taken() -> bool:
-        narrowed(run, node.test, True, frame)
-        return run.execute(node.body, frame)
+    def side(body: list[ast.stmt], holds: bool) -> bool:
+        narrowed(run, node.test, holds, frame)
+        return run.execute(body, frame)
 
-    def other() -> bool:
-        narrowed(run, node.test, False, frame)
-        return run.execute(node.orelse, frame)
-
-    return run.state.branches((taken, other))
+    return run.state.branches((lambda: side(node.body, True), lambda: side(node.orelse, False)))
 
 
 def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
@@ -159,18 +148,9 @@ def _cases(run: Run, cases: list[ast.match_case], subject: Value, frame: Frame) 
         if outcome:
             return run.execute(case.body, frame)
         if outcome is None:
-            return run.state.branches(
-                (_body_of(run, case.body, frame), _cases_of(run, cases[index + 1 :], subject, frame))
-            )
+            rest = partial(_cases, run, cases[index + 1 :], subject, frame)
+            return run.state.branches((partial(run.execute, case.body, frame), rest))
     return True
-
-
-def _body_of(run: Run, body: list[ast.stmt], frame: Frame) -> Callable[[], bool]:
-    return lambda: run.execute(body, frame)
-
-
-def _cases_of(run: Run, cases: list[ast.match_case], subject: Value, frame: Frame) -> Callable[[], bool]:
-    return lambda: _cases(run, cases, subject, frame)
 
 
 def _global(run: Run, node: ast.Global, frame: Frame) -> bool:

@@ -29,6 +29,7 @@ from nodl.infer.values import (
     Value,
     external,
     join,
+    join_all,
     present,
     unknown,
 )
@@ -42,12 +43,7 @@ def subscript(run: Run, node: ast.Subscript, frame: Frame) -> Value:
         for bound in (node.slice.lower, node.slice.upper, node.slice.step):
             if bound is not None:
                 run.evaluate(bound, frame)
-    result: Value = BOTTOM
-    for atom in owner:
-        if atom is None:
-            continue
-        result = join(result, _element(run, atom, key, node, frame))
-    return result or ANY
+    return join_all(_element(run, atom, key, node, frame) for atom in owner if atom is not None) or ANY
 
 
 def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Frame) -> Value:
@@ -100,10 +96,7 @@ def variable(run: Run, atom: Variables, key: Value, node: ast.AST, frame: Frame)
 def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Frame) -> Value:
     names = [atom for atom in key if isinstance(atom, str)]
     if names and all(name in cls.cells for name in names):  # Enum["MEMBER"]
-        result: Value = BOTTOM
-        for name in names:
-            result = join(result, run.attribute((cls,), name, node, frame))
-        return result
+        return join_all(run.attribute((cls,), name, node, frame) for name in names)
     return (cls,)  # Generic[T]
 
 
@@ -146,11 +139,9 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     if items.exact is None or sequence.escaped:
         return join(items.any_element(), ANY) if sequence.escaped else items.any_element() or ANY
     if all(type(index) is int for index in key):
-        length = len(items.exact)
-        result: Value = BOTTOM
-        for index in key:
-            if isinstance(index, int) and -length <= index < length:
-                result = join(result, items.exact[index])
+        exact, length = items.exact, len(items.exact)
+        inside = (index for index in key if isinstance(index, int) and -length <= index < length)
+        result = join_all(exact[index] for index in inside)
         if not result and is_settled(run):
             throw(run, IndexError)
         return result or ANY

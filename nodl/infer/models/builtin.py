@@ -2,27 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.formatting import as_texts, formatted, text_value
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import keys_of
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.models import iterables, reflection
-from nodl.infer.values import (
-    ANY,
-    BOOLEAN,
-    Dictionary,
-    Sequence,
-    Unknown,
-    Value,
-    sole,
-    unknown,
-)
-
-Model = Callable[[Run, Call], Value]
+from nodl.infer.values import ANY, Dictionary, Sequence, Unknown, Value, boolean, sole, unknown
 
 
 def _str(run: Run, call: Call) -> Value:
@@ -48,8 +35,7 @@ def _float(run: Run, call: Call) -> Value:
 
 
 def _bool(run: Run, call: Call) -> Value:
-    outcome = truth(special.tested(run, call.args.at(0) or (False,), call.node, call.frame))
-    return BOOLEAN if outcome is None else (outcome,)
+    return boolean(truth(special.tested(run, call.args.at(0) or (False,), call.node, call.frame)))
 
 
 def _len(run: Run, call: Call) -> Value:
@@ -80,10 +66,6 @@ def _repr(run: Run, call: Call) -> Value:
     if own:
         return own
     return (repr(atom),) if isinstance(atom, str | int | float) else unknown("repr()")
-
-
-def _unknown_text(run: Run, call: Call) -> Value:
-    return unknown("text that the user types")
 
 
 FUNCTIONS: dict[str, Model] = {
@@ -127,7 +109,7 @@ FUNCTIONS: dict[str, Model] = {
         "vars": reflection.call_vars,
         "globals": reflection.call_globals,
         "locals": reflection.call_locals,
-        "input": _unknown_text,
+        "input": lambda run, call: unknown("text that the user types"),
         "object": reflection.call_object,
         "object.__new__": reflection.object_new,
         "object.__init_subclass__": reflection.nothing,

@@ -15,10 +15,9 @@ from pathlib import PurePosixPath
 from enclave_launch.boundary.files import read_bytes
 from nodl.ament_index import PackageNotFoundError, package_prefix, package_share_directory
 from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.values import BOOLEAN, NativeObject, Value, sole, unknown
 
-Model = Callable[[Run, Call], Value]
 MAX_FILE_BYTES = 1 << 18
 _CONTENTS = "the contents of a file, read when the program runs"
 

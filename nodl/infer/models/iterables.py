@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from nodl.infer.interpreter import special
+from nodl.infer.interpreter.assign import copy_dictionary
 from nodl.infer.interpreter.conditions import truth
-from nodl.infer.interpreter.expressions import copy_dictionary
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
@@ -23,6 +23,7 @@ from nodl.infer.values import (
     Key,
     Value,
     join,
+    join_all,
     sole,
     unknown,
 )
@@ -150,7 +151,6 @@ def call_filter(run: Run, call: Call) -> Value:
 def call_dict(run: Run, call: Call) -> Value:
     """``dict``: made of dictionaries, pairs and keywords; keys that are not constant go under ``OTHER``."""
     obj = run.allocate(call.node, "dict", Dictionary)
-    assert isinstance(obj, Dictionary)
     for atom in call.args.at(0) or BOTTOM:
         if isinstance(atom, Dictionary):
             copy_dictionary(run, obj, (atom,))
@@ -161,8 +161,7 @@ def call_dict(run: Run, call: Call) -> Value:
     return (obj,)
 
 
-def _store_pairs(run: Run, obj: object, items: Items, call: Call) -> None:
-    assert isinstance(obj, Dictionary)
+def _store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
     for pair in items.exact if items.exact is not None else (items.any_element(),):
         parts = elements(run, pair, call.node, call.frame).exact
         key = sole(parts[0]) if parts and len(parts) == 2 else None
@@ -176,10 +175,7 @@ def _store_pairs(run: Run, obj: object, items: Items, call: Call) -> None:
 def chosen(run: Run, call: Call) -> Value:
     """``min``, ``max``, ``next``, ``random.choice``: one of the elements."""
     if len(call.args.positional) > 1 and not call.args.more:
-        result: Value = BOTTOM
-        for value in call.args.positional:
-            result = join(result, value)
-        return join(result, argument_items(run, call).any_element()) or ANY
+        return join_all((*call.args.positional, argument_items(run, call).any_element())) or ANY
     return argument_items(run, call).any_element() or ANY
 
 

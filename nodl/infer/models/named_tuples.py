@@ -7,12 +7,12 @@ from __future__ import annotations
 
 import ast
 import keyword
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from nodl.infer.interpreter.define import define_class
 from nodl.infer.interpreter.frames import Call, Frame
 from nodl.infer.interpreter.iterate import elements
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.values import BOTTOM, ClassValue, Instance, LocalCells, Value, external, sole, unknown
 
 _UNKNOWN = "the class made by namedtuple()"
@@ -145,7 +145,4 @@ def _tree(name: str, fields: Sequence[str], defaults: int, line: int) -> ast.Cla
     return tree
 
 
-FUNCTIONS: dict[str, Callable[[Run, Call], Value]] = {
-    "collections.namedtuple": made,
-    "typing.NamedTuple": made,
-}
+FUNCTIONS: dict[str, Model] = {"collections.namedtuple": made, "typing.NamedTuple": made}

@@ -6,8 +6,7 @@ import collections
 from collections.abc import Callable
 
 from nodl.infer.interpreter import special
-from nodl.infer.interpreter.comprehensions import store_item
-from nodl.infer.interpreter.expressions import copy_dictionary
+from nodl.infer.interpreter.assign import copy_dictionary, store_item
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements, keys_of, values_of
@@ -15,7 +14,7 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.interpreter.subscripts import variable
 from nodl.infer.methods import Variables
 from nodl.infer.models import concrete
-from nodl.infer.text import MAX_LENGTH, Hole, Text, TextAtom, edited, input_of, make_text, with_edit
+from nodl.infer.text import MAX_LENGTH, Text, TextAtom, edited, input_of, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -32,6 +31,7 @@ from nodl.infer.values import (
     Sequence,
     Value,
     join,
+    join_all,
     present,
     sole,
     unknown,
@@ -86,17 +86,14 @@ def _variables_method(run: Run, receiver: Variables, name: str, call: Call) -> V
         run.gap(call.node, call.frame, "variables are set from a dictionary")
         run.escape(call.args)
         return NONE
-    certain = not receiver.owner.summary and all(present(value) is value for value in named.values())
-    rows: list[Value] = [run.tuple_of(((key,), present(value))) for key, value in named.items()]
-    listed: dict[str, list[Value]] = {
-        "keys": [(key,) for key in named],
-        "values": list(named.values()),
-        "items": rows,
-    }
-    found_items = listed.get(name)
-    if found_items is None:
+    if name not in ("keys", "values", "items"):
         return _lost(run, receiver, call)
-    items = Items(tuple(present(value) for value in found_items))
+    certain = not receiver.owner.summary and all(present(value) is value for value in named.values())
+    rows: list[tuple[Value, Value]] = [((key,), present(value)) for key, value in named.items()]
+    if name == "items":
+        items = Items(tuple(run.tuple_of(row) for row in rows))
+    else:
+        items = Items(tuple(key if name == "keys" else value for key, value in rows))
     return run.sequence(call.node, "list", items if certain else Items(None, items.any_element()))
 
 
@@ -170,10 +167,7 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
         part = with_edit(divided, "split", tuple(str(each) for each in arguments))
         return run.sequence(call.node, "list", Items(None, (part,)))
     symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
-    if symbolic is not None:
-        return (symbolic,)
-    hole = make_text((Hole(f"the result of str.{name}()"),))
-    return text_value([hole])
+    return unknown(f"the result of str.{name}()") if symbolic is None else (symbolic,)
 
 
 def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ...], call: Call) -> Value:
@@ -217,8 +211,7 @@ def _extend(run: Run, owner: Sequence, call: Call) -> Value:
 
 
 def _insert(run: Run, owner: Sequence, call: Call) -> Value:
-    value = call.args.at(1) or ANY
-    run.state.store(owner, ITEMS, (Items(None, join(owner.items.any_element(), value)),))
+    run.state.store(owner, ITEMS, (Items(None, join(owner.items.any_element(), call.args.at(1) or ANY)),))
     return NONE
 
 
@@ -250,10 +243,8 @@ def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
 
 
 def _united(run: Run, owner: Sequence, call: Call) -> Value:
-    everything = owner.items.any_element()
-    for value in call.args.positional:
-        everything = join(everything, elements(run, value, call.node, call.frame).any_element())
-    return run.sequence(call.node, owner.kind, Items(None, everything))
+    added = [elements(run, value, call.node, call.frame).any_element() for value in call.args.positional]
+    return run.sequence(call.node, owner.kind, Items(None, join_all((owner.items.any_element(), *added))))
 
 
 SequenceMethod = Callable[[Run, Sequence, Call], Value]
@@ -300,14 +291,6 @@ def _setdefault(run: Run, owner: Dictionary, call: Call) -> Value:
     value = _get(run, owner, call)
     store_item(run, owner, call.args.at(0) or ANY, value)
     return value
-
-
-def _keys(run: Run, owner: Dictionary, call: Call) -> Value:
-    return run.sequence(call.node, "list", keys_of(owner))
-
-
-def _values(run: Run, owner: Dictionary, call: Call) -> Value:
-    return run.sequence(call.node, "list", values_of(owner))
 
 
 def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
@@ -374,7 +357,6 @@ def _last_item(run: Run, owner: Dictionary, call: Call) -> Value:
 
 def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
     copied = run.allocate(call.node, "dict", Dictionary)
-    assert isinstance(copied, Dictionary)
     copied.default = join(copied.default, owner.default)
     copy_dictionary(run, copied, (owner,))
     if owner.escaped and not copied.escaped:
@@ -388,8 +370,8 @@ DictionaryMethod = Callable[[Run, Dictionary, Call], Value]
 _DICTIONARY: dict[str, DictionaryMethod] = {
     "get": _get,
     "setdefault": _setdefault,
-    "keys": _keys,
-    "values": _values,
+    "keys": lambda run, owner, call: run.sequence(call.node, "list", keys_of(owner)),
+    "values": lambda run, owner, call: run.sequence(call.node, "list", values_of(owner)),
     "items": _pairs,
     "update": _update,
     "pop": _pop_item,

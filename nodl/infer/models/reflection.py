@@ -6,18 +6,17 @@ import ast
 
 from nodl.infer.interpreter import patterns
 from nodl.infer.interpreter.assign import store_attribute
-from nodl.infer.interpreter.define import complete_class, linearized
+from nodl.infer.interpreter.define import complete_class, linearized, program_classes
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.subscripts import is_settled
 from nodl.infer.methods import BoundMethod, PropertyValue, Variables
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
-    BOOLEAN,
-    BOTTOM,
     NONE,
     OF_A_NODE,
     ClassValue,
@@ -28,8 +27,10 @@ from nodl.infer.values import (
     Instance,
     ModuleValue,
     Value,
+    boolean,
     constant_strings,
     join,
+    join_all,
     present,
     sole,
     unknown,
@@ -47,10 +48,9 @@ def call_getattr(run: Run, call: Call) -> Value:
         throw(run, AttributeError)
     elif there:
         return run.attribute(owner, str(sole(names)), call.node, call.frame)
-    found: Value = BOTTOM
-    for name in constant_strings(names):
-        found = join(found, run.attribute(owner, name, call.node, call.frame))
-    if len(constant_strings(names)) < len(names):
+    known = constant_strings(names)
+    found = join_all(run.attribute(owner, name, call.node, call.frame) for name in known)
+    if len(known) < len(names):
         _any_method(run, owner, names)
         is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
         found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
@@ -61,7 +61,8 @@ def call_getattr(run: Run, call: Call) -> Value:
 def _any_method(run: Run, owner: Value, names: Value) -> None:
     """``getattr(self, 'on_' + x)``: any method whose name fits may be meant."""
     run.state.reflected = True
-    prefixes = [text.pieces[0] if isinstance(text, Text) else "" for text in names]
+    starts = (text.pieces[0] if isinstance(text, Text) else "" for text in names)
+    prefixes = tuple(start if isinstance(start, str) else "" for start in starts)
     for atom in owner:
         if isinstance(atom, ModuleValue | ClassValue):
             for name, value in list(atom.cells.items()):
@@ -72,14 +73,11 @@ def _any_method(run: Run, owner: Value, names: Value) -> None:
         for name, value in list(atom.cells.items()):
             if isinstance(name, str):
                 run.escape_value(value, opened=False, objects=False)
-        for base in linearized(atom.cls):
-            for name, value in list(base.cells.items()) if isinstance(base, ClassValue) else ():
-                for prefix in prefixes:
-                    start = prefix if isinstance(prefix, str) else ""
-                    if isinstance(name, str) and name.startswith(start) and not name.startswith("__"):
-                        functions = [each for each in value if isinstance(each, FunctionValue)]
-                        bound = tuple(BoundMethod(function, atom) for function in functions)
-                        run.register_callback(bound, None)
+        for base in program_classes(atom.cls):
+            for name, value in list(base.cells.items()):
+                if isinstance(name, str) and name.startswith(prefixes) and not name.startswith("__"):
+                    functions = [each for each in value if isinstance(each, FunctionValue)]
+                    run.register_callback(tuple(BoundMethod(each, atom) for each in functions), None)
 
 
 def call_setattr(run: Run, call: Call) -> Value:
@@ -105,8 +103,7 @@ def call_setattr(run: Run, call: Call) -> Value:
 
 def call_hasattr(run: Run, call: Call) -> Value:
     """``hasattr``: true, false, or either where that is not decided."""
-    outcome = has_attribute(run, sole(call.args.at(0)), sole(call.args.at(1)))
-    return BOOLEAN if outcome is None else (outcome,)
+    return boolean(has_attribute(run, sole(call.args.at(0)), sole(call.args.at(1))))
 
 
 def has_attribute(run: Run, owner: object, name: object) -> bool | None:
@@ -122,25 +119,18 @@ def has_attribute(run: Run, owner: object, name: object) -> bool | None:
     cls = owner.cls if isinstance(owner, Instance) else owner
     if not isinstance(cls, ClassValue):
         return None
-    order = linearized(cls)
-    if any(isinstance(base, ClassValue) and base.cells.get(name) for base in order):
+    classes = program_classes(cls)
+    if any(base.cells.get(name) for base in classes):
         return True
-    plain = all(
-        isinstance(base, ClassValue)
-        and "__getattr__" not in base.cells
-        and "__getattribute__" not in base.cells
-        for base in order
-    )
-    known = (
-        plain and not run.callbacks and not run.repeated and not owner.summary and not name.startswith("__")
-    )
-    return False if known else None
+    hooked = any(hook in base.cells for base in classes for hook in ("__getattr__", "__getattribute__"))
+    if hooked or len(classes) < len(linearized(cls)) or owner.summary or name.startswith("__"):
+        return None
+    return False if is_settled(run) else None
 
 
 def call_isinstance(run: Run, call: Call) -> Value:
     """``isinstance``: true, false, or either where that is not decided."""
-    outcome = patterns.is_instance(call.args.at(0) or ANY, call.args.at(1) or ANY)
-    return BOOLEAN if outcome is None else (outcome,)
+    return boolean(patterns.is_instance(call.args.at(0) or ANY, call.args.at(1) or ANY))
 
 
 def call_type(run: Run, call: Call) -> Value:
@@ -165,7 +155,6 @@ def _made_class(run: Run, call: Call) -> Value:
     node = ast.ClassDef(name, [], [], [], [], lineno=line, col_offset=column, end_lineno=line)
     key = call.frame.module
     cls = run.allocate(call.node, "type", lambda: ClassValue(node, name, key, tuple(sole(b) for b in listed)))
-    assert isinstance(cls, ClassValue)
     for entry, value, _ in space.entries():
         run.state.store(cls, entry.constant, value)
     complete_class(run, cls, dict(call.args.keywords), call.node, call.frame)
@@ -184,10 +173,7 @@ def import_dynamic(run: Run, call: Call) -> Value:
     if not names:
         run.gap(call.node, call.frame, "a module whose name is made at run time is not analysed")
         return unknown("a module whose name is made at run time")
-    found: Value = BOTTOM
-    for name in names:
-        found = join(found, import_module(run, name, call.frame))
-    return found
+    return join_all(import_module(run, name, call.frame) for name in names)
 
 
 def call_vars(run: Run, call: Call) -> Value:
@@ -217,23 +203,17 @@ def call_locals(run: Run, call: Call) -> Value:
 
 def object_new(run: Run, call: Call) -> Value:
     """``object.__new__(cls)``: an object whose constructor has not run."""
+    from nodl.infer.interpreter.instantiation import new_instance
+
     made: list[object] = []
     for atom in call.args.at(0) or ANY:
         if isinstance(atom, ClassValue):
-            for base in linearized(atom):
-                if isinstance(base, ClassValue):
-                    run.instantiated.setdefault(base.node)
+            for base in program_classes(atom):
+                run.instantiated.setdefault(base.node)
             made.append(new_instance(run, atom, call))
         else:
             made.append(unknown("an object of a class that is not known")[0])
     return tuple(made)
-
-
-def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
-    """An object of ``cls`` whose constructor has not run."""
-    from nodl.infer.interpreter import instantiation
-
-    return instantiation.new_instance(run, cls, call)
 
 
 def nothing(run: Run, call: Call) -> Value:

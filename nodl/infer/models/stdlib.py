@@ -9,7 +9,7 @@ from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.methods import Getter, Partial, PartialMethod
 from nodl.infer.models import builtin, options
 from nodl.infer.models.iterables import MAX_RANGE
@@ -37,7 +37,6 @@ from nodl.infer.values import (
     unknown,
 )
 
-Model = Callable[[Run, Call], Value]
 Method = Callable[[Run, Instance, Call], Value]
 
 
