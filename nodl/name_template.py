@@ -71,20 +71,17 @@ class ParameterPart(NamedTuple):
         if "*" not in self.name:
             return [parameters[self.name]] if self.name in parameters else []
         pattern = re.escape(self.name).replace(r"\*\*", ".+").replace(r"\*", "[^.]+")
-        if self.edits and self.edits[0][0] == "key":
-            return [name for name in sorted(parameters) if re.fullmatch(pattern, name)]
-        return [parameters[name] for name in sorted(parameters) if re.fullmatch(pattern, name)]
+        found = [name for name in sorted(parameters) if re.fullmatch(pattern, name)]
+        return [*found] if self.edits and self.edits[0][0] == "key" else [parameters[name] for name in found]
 
     def _items(self, value: object) -> Sequence[object]:
         if self.item is None:
             return (value,)
         if not isinstance(value, list | tuple):
             return ()
-        if isinstance(self.item, int):
-            return (
-                tuple(value[self.item : self.item + 1]) if self.item >= 0 else tuple(value[self.item :][:1])
-            )
-        return tuple(value)
+        if not isinstance(self.item, int):
+            return tuple(value)
+        return tuple(value[self.item : self.item + 1] if self.item >= 0 else value[self.item :][:1])
 
     def _edited(self, text: str) -> list[str]:
         texts = [text]

@@ -28,11 +28,8 @@ class EndpointKind(TextEnum):
     @property
     def family(self) -> str:
         """``topic``, ``service`` or ``action``: the elements of NoDL v1."""
-        return (
-            "topic"
-            if self in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
-            else self.value.partition("_")[0]
-        )
+        family, divided, _ = self.value.partition("_")
+        return family if divided else "topic"
 
     @property
     def role(self) -> str:

@@ -4,30 +4,28 @@ from __future__ import annotations
 
 import ast
 import functools
+import gc
+import itertools
 import re
 import sys
 from bisect import bisect_left
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 
 from nodl.infer.callbacks import call_from_outside, completed, expect_methods, settle, settle_meanwhile
-from nodl.infer.interpreter.decisions import Decisions
 from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.imports import execute_module
 from nodl.infer.interpreter.run import BudgetExceeded, Run
 from nodl.infer.interpreter.tables import new_run
 from nodl.infer.models.foreign import is_node_class
-from nodl.infer.paths import refine
+from nodl.infer.paths import Decisions, refine
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.values import (
-    ANY,
-    ClassValue,
-    External,
-    FunctionValue,
-    unknown,
-)
+from nodl.infer.values import ANY, ClassValue, External, FunctionValue, unknown
 from nodl.source_ref import SourceRef
 
+_ANALYSES_A_COLLECTION = 100
+_analyses = itertools.count(1)
 MAX_NESTING = 6_000  # Python calls of the interpreter
 
 # A function or class whose text has none of these creates nothing by itself.
@@ -37,14 +35,42 @@ _CREATING = re.compile(
 )
 
 
+@contextmanager
+def without_collector() -> Iterator[None]:
+    """Analysis makes many small objects that stay alive to its end; looking for garbage finds none.
+
+    What is left then counts as old, or the next new object would have all of it searched; now and then it is searched.
+    """
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled and next(_analyses) % _ANALYSES_A_COLLECTION:
+            gc.freeze()
+            gc.unfreeze()  # puts everything into the oldest generation
+            gc.enable()
+        elif enabled:
+            gc.enable()
+            gc.collect()
+
+
 def start(program: Program, main: SourceModule, functions: Iterable[str] = ()) -> Run:
     """Run ``main`` as a script, then ``functions`` of it (``main`` if the script itself starts nothing)."""
     named = tuple(functions)
+    return _followed(program, main, lambda run: _start(run, main, named))
 
+
+def start_function(program: Program, module: SourceModule, path: list[str]) -> Run:
+    """Import ``module`` and call ``path`` in it (``main``, ``Class.method``), as an entry point does."""
+    return _followed(program, module, lambda run: _start_function(run, module, path))
+
+
+def _followed(program: Program, main: SourceModule, body: Callable[[Run], None]) -> Run:
     def follow(decisions: Decisions | None) -> Run:
         run = new_run(program, main)
         run.decisions = decisions
-        _guarded(run, lambda: _start(run, main, named))
+        _guarded(run, lambda: body(run))
         return run
 
     run = follow(None)
@@ -62,35 +88,18 @@ def _start(run: Run, main: SourceModule, functions: tuple[str, ...]) -> None:
     settle(run)
 
 
-def start_function(program: Program, module: SourceModule, path: list[str]) -> Run:
-    """Import ``module`` and call ``path`` in it (``main``, ``Class.method``), as an entry point does."""
-
-    def follow(decisions: Decisions | None) -> Run:
-        run = new_run(program, module)
-        run.decisions = decisions
-        _guarded(run, lambda: _start_function(run, module, path))
-        return run
-
-    run = follow(None)
-    refine(run, follow)
-    return run
-
-
 def _start_function(run: Run, module: SourceModule, path: list[str]) -> None:
-    def body() -> None:
-        completed(run, lambda: execute_module(run, module, module.name))
-        imported = run.modules[module.name]
-        value = imported.cells.get(path[0], ())
-        frame = Frame(imported, {}, None, 0)
-        for step in path[1:]:
-            value = run.attribute(value, step, module.tree, frame)
-        if not value:
-            run.findings.gap(SourceRef(module.path), f"the entry point {'.'.join(path)} is not defined here")
-        for atom in value:
-            call_from_outside(run, imported, atom, Arguments())
-        settle(run)
-
-    body()
+    completed(run, lambda: execute_module(run, module, module.name))
+    imported = run.modules[module.name]
+    value = imported.cells.get(path[0], ())
+    frame = Frame(imported, {}, None, 0)
+    for step in path[1:]:
+        value = run.attribute(value, step, module.tree, frame)
+    if not value:
+        run.findings.gap(SourceRef(module.path), f"the entry point {'.'.join(path)} is not defined here")
+    for atom in value:
+        call_from_outside(run, imported, atom, Arguments())
+    settle(run)
 
 
 def analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:

@@ -116,12 +116,8 @@ class _Audit:
         for place in _places_of(module.source):
             self._place(place)
         for node, cls in self._run.classes.items():
-            if (
-                cls.module is module
-                and is_node(cls)
-                and not self._is_made(cls.node)
-                and self._referred(cls.name)
-            ):
+            lost = cls.module is module and is_node(cls) and cls.node not in self._instantiated
+            if lost and self._referred(cls.name):
                 self._gap(node, f"class {cls.name} {_LOST}")
 
     def _place(self, place: _Place) -> None:
@@ -133,7 +129,7 @@ class _Audit:
                 if isinstance(function, ast.FunctionDef) and self._was_handed(function):
                     self._gap(
                         place.node, f"{function.name} {_LOST}"
-                    )  # a generator, whoever has it may run it
+                    )  # a generator: whoever has it may run it
                 return  # control certainly does not get there
             if isinstance(around, ast.ClassDef):
                 cls = around
@@ -163,13 +159,10 @@ class _Audit:
         name = node.name
         if cls is None:
             return self._referred(name)
-        if not self._is_made(cls) and not self._referred(cls.name):
+        if cls not in self._instantiated and not self._referred(cls.name):
             return False
         special = name.startswith("__") and name.endswith("__")
         return special or node in self._run.bound or name in self._run.asked or name in self._found().texts
-
-    def _is_made(self, node: ast.ClassDef) -> bool:
-        return node in self._instantiated
 
     def _referred(self, name: str) -> bool:
         mentions = self._found()

@@ -25,10 +25,9 @@ class FoundEndpoint(NamedTuple):
 class NodeRecord:
     """A node under its allocation site."""
 
-    def __init__(self, source: SourceRef, *, class_key: object = None, lifecycle: bool = False) -> None:
+    def __init__(self, source: SourceRef) -> None:
         self.source = source
-        self.class_key = class_key
-        self.lifecycle = lifecycle
+        self.lifecycle = False
         self.names: Value = BOTTOM
         self.namespaces: Value = BOTTOM
         self.created = False  # Node.__init__ was seen
@@ -44,8 +43,10 @@ class NodeRecord:
     def __repr__(self) -> str:
         return f"NodeRecord({self.source})"
 
-    def add_endpoint(self, endpoint: FoundEndpoint) -> None:
-        self.endpoints.setdefault(endpoint)
+    def add_endpoint(
+        self, kind: EndpointKind, name: object, type_name: str, source: SourceRef, qos: QosPolicies = ()
+    ) -> None:
+        self.endpoints.setdefault(FoundEndpoint(kind, name, type_name, source, qos))
 
     def declare(self, name: str, default: Value) -> None:
         self.parameters[name] = join(self.parameters.get(name, BOTTOM), default)

@@ -6,67 +6,26 @@ from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.values import BOTTOM, ClassValue, FunctionValue, HeapObject, Value
 
 
-class BoundMethod:
+class BoundMethod(NamedTuple):
     """A function of the program with the object or class that becomes its first argument."""
 
-    __slots__ = ("function", "receiver")
-
-    def __init__(self, function: FunctionValue, receiver: object) -> None:
-        self.function = function
-        self.receiver = receiver
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, BoundMethod)
-            and other.function is self.function
-            and other.receiver is self.receiver
-        )
-
-    def __hash__(self) -> int:
-        return hash((id(self.function), id(self.receiver)))
+    function: FunctionValue
+    receiver: object
 
 
-class NativeMethod:
+class NativeMethod(NamedTuple):
     """Attribute ``name`` of a string, container or modelled object."""
 
-    __slots__ = ("name", "receiver")
-
-    def __init__(self, receiver: object, name: str) -> None:
-        self.receiver = receiver
-        self.name = name
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, NativeMethod)
-            and other.name == self.name
-            and type(other.receiver) is type(self.receiver)
-            and other.receiver == self.receiver
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.receiver, self.name))
+    receiver: object
+    name: str
 
 
-class ForeignMethod:
+class ForeignMethod(NamedTuple):
     """Method ``name`` that ``receiver`` inherits from the foreign class ``path``."""
 
-    __slots__ = ("name", "path", "receiver")
-
-    def __init__(self, path: str, receiver: object, name: str) -> None:
-        self.path = path
-        self.receiver = receiver
-        self.name = name
-
-    def __eq__(self, other: object) -> bool:
-        return (
-            isinstance(other, ForeignMethod)
-            and other.receiver is self.receiver
-            and other.name == self.name
-            and other.path == self.path
-        )
-
-    def __hash__(self) -> int:
-        return hash((self.path, id(self.receiver), self.name))
+    path: str
+    receiver: object
+    name: str
 
 
 class Partial(NamedTuple):
@@ -120,19 +79,10 @@ class PartialMethod(NamedTuple):
     partial: Partial
 
 
-class Variables:
+class Variables(NamedTuple):
     """The dictionary of an object's or a module's variables: ``vars(x)``, ``x.__dict__``, ``globals()``."""
 
-    __slots__ = ("owner",)
-
-    def __init__(self, owner: HeapObject) -> None:
-        self.owner = owner
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, Variables) and other.owner is self.owner
-
-    def __hash__(self) -> int:
-        return id(self.owner)
+    owner: HeapObject
 
     def named(self) -> dict[str, Value]:
         """What is certainly or perhaps set, by name."""

@@ -12,13 +12,37 @@ from collections.abc import Callable, Iterator
 from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord
 from nodl.infer.interpreter.conditions import OPPOSITE
-from nodl.infer.interpreter.decisions import Decisions, TooManyPaths
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Piece, Text, make_text, pieces_of
 
+MAX_FORKS = 4  # undecided tests of which each outcome is followed by itself
 MAX_STEPS = 40_000  # of all paths together; a larger program is not followed path by path
 Guards = frozenset[tuple[str, str, tuple[str, ...]]]
-Follow = Callable[[Decisions], Run]
+Follow = Callable[["Decisions"], Run]
+
+
+class TooManyPaths(Exception):
+    """The program has more undecided tests in a row than are followed one by one."""
+
+
+class Decisions:
+    """Outcomes of the undecided tests on one path through the program, in their order."""
+
+    def __init__(self, outcomes: list[bool]) -> None:
+        self.outcomes = outcomes
+        self.conditions: list[object] = []  # what the test asks of a parameter, or None
+        self.taken = 0
+
+    def next(self, condition: object) -> bool:
+        """The outcome of the next test. Raises ``TooManyPaths``."""
+        if self.taken == MAX_FORKS:
+            raise TooManyPaths
+        if self.taken == len(self.outcomes):
+            self.outcomes.append(True)
+        outcome = self.outcomes[self.taken]
+        self.conditions.append(condition)
+        self.taken += 1
+        return outcome
 
 
 class Path(NamedTuple):

@@ -17,8 +17,7 @@ from collections.abc import Iterable, Sequence
 from enclave_launch.boundary.files import read_bytes
 from nodl.infer.cpp.cache.folder import digest, digest_of
 from nodl.infer.kept import installed_in
-from nodl.infer.mangling import mangle
-from nodl.infer.source_text import source_text
+from nodl.infer.source_text import mangle, source_text
 
 MAX_SOURCE_BYTES = 1_000_000
 

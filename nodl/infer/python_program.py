@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from nodl.infer.analysis import start, start_function
-from nodl.infer.collector import without_collector
+from nodl.infer.analysis import start, start_function, without_collector
 from nodl.infer.coverage import unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.program import Program

@@ -12,7 +12,7 @@ from nodl.infer.text import Hole, Input, NodePart, Piece, Text
 from nodl.infer.values import Sequence, Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.names import InvalidNameError, expand_name
-from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
+from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
 from nodl.remap import InvalidRemapRuleError, RemapKind, RemapRules, parse_rule
 
 MAX_ALTERNATIVES = 16
@@ -54,12 +54,11 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKe
         gaps.append(Gap(record.source, "the node that these interfaces belong to is not known"))
     elif names == [None]:
         gaps.append(Gap(record.source, "the name of this node is made at run time"))
+    made = "of this node is made at run time"
     if not all(atom is None or isinstance(atom, str) for atom in record.namespaces):
-        gaps.append(
-            Gap(record.source, f"the namespace of this node is made at run time{_made_of(record.namespaces)}")
-        )
+        gaps.append(Gap(record.source, f"the namespace {made}{_made_of(record.namespaces)}"))
     if record.created and names != [None] and not all(isinstance(atom, str) for atom in record.names):
-        gaps.append(Gap(record.source, f"the name of this node is made at run time{_made_of(record.names)}"))
+        gaps.append(Gap(record.source, f"the name {made}{_made_of(record.names)}"))
     interfaces = []
     for name in names:
         for namespace in _namespaces(record):
@@ -115,12 +114,8 @@ def _plain_texts(value: Value) -> list[str]:
 
 
 def _endpoints(found: FoundEndpoint, note: str) -> list[Endpoint]:
-    return [
-        Endpoint(
-            found.kind, template, found.type, found.source, certainty_of(template), note=note, qos=found.qos
-        )
-        for template in templates(found.name)
-    ]
+    shape = Endpoint(found.kind, NameTemplate(()), found.type, found.source, note=note, qos=found.qos)
+    return [shape._replace(name=each, certainty=certainty_of(each)) for each in templates(found.name)]
 
 
 def certainty_of(template: NameTemplate) -> Certainty:
@@ -179,11 +174,8 @@ def _input_parts(piece: Input) -> list[Part]:
     declared = piece.owner.default(piece.name)
     if piece.item == "each" and declared and all(_is_empty_list(atom) for atom in declared):
         return [ParameterPart(piece.name, "", piece.item, (("unless empty", ()), *piece.edits))]
-    defaults = _default_texts(declared, piece.item)
-    parts: list[Part] = [
-        ParameterPart(piece.name, default, piece.item, piece.edits) for default in defaults or [None]
-    ]
-    return parts
+    defaults = _default_texts(declared, piece.item) or [None]
+    return [ParameterPart(piece.name, default, piece.item, piece.edits) for default in defaults]
 
 
 def _is_empty_list(atom: object) -> bool:
@@ -208,9 +200,8 @@ def _default_items(atom: object, item: int | str) -> list[str | None]:
     exact = atom.items.exact if isinstance(atom, Sequence) else None
     if exact is None:
         return [None]
-    chosen = (
-        exact if item == "each" else exact[item : item + 1] if isinstance(item, int) and item >= 0 else ()
-    )
+    at = slice(item, item + 1) if isinstance(item, int) and item >= 0 else slice(0)
+    chosen = exact if item == "each" else exact[at]
     return [text for element in chosen for text in _default_texts(element, None)]
 
 
@@ -254,7 +245,9 @@ def _rules_in(value: Value, record: NodeRecord, gaps: list[Gap]) -> list[str]:
     return rules
 
 
-_REMAPPED = "remap rules given in code may apply to it"
+def _perhaps_remapped(endpoint: Endpoint) -> Endpoint:
+    unknown = NameTemplate((UnknownPart("remap rules given in code may apply to it"),))
+    return endpoint._replace(name=unknown, certainty=Certainty.UNKNOWN)
 
 
 def _remapped_later(endpoint: Endpoint, rules: RemapRules, name: str, namespace: str) -> Endpoint:
@@ -262,10 +255,9 @@ def _remapped_later(endpoint: Endpoint, rules: RemapRules, name: str, namespace:
     parts = endpoint.name.parts
     part = parts[0]
     if len(parts) > 1 or not isinstance(part, ParameterPart):
-        return endpoint._replace(name=NameTemplate((UnknownPart(_REMAPPED),)), certainty=Certainty.UNKNOWN)
-    pairs = [
-        text for rule in rules.names if rule.node in (None, name) for text in (rule.match, rule.replacement)
-    ]
+        return _perhaps_remapped(endpoint)
+    ours = (rule for rule in rules.names if rule.node in (None, name))
+    pairs = [text for rule in ours for text in (rule.match, rule.replacement)]
     edit = ("remapped", (namespace, name, *pairs))
     return endpoint._replace(name=NameTemplate((part._replace(edits=(*part.edits, edit)),)))
 
@@ -287,11 +279,10 @@ def _remapped_endpoint(
     if not rules.names:
         return endpoint
     if name is None or namespace is None:
-        return endpoint._replace(name=NameTemplate((UnknownPart(_REMAPPED),)), certainty=Certainty.UNKNOWN)
+        return _perhaps_remapped(endpoint)
     if not endpoint.name.is_literal:
         return _remapped_later(endpoint, rules, name, namespace)
-    of_topics = endpoint.kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
-    not_meant = RemapKind.SERVICE if of_topics else RemapKind.TOPIC
+    not_meant = RemapKind.SERVICE if endpoint.kind.family == "topic" else RemapKind.TOPIC
     try:
         full = expand_name(endpoint.name.text, namespace=namespace, node=name)
         for rule in rules.names:

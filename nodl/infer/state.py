@@ -22,8 +22,8 @@ from nodl.infer.values import (
     Value,
     contains,
     join,
+    widen,
 )
-from nodl.infer.widening import widen
 
 Alternative = Callable[[], bool]  # runs one branch; tells whether its end can be reached
 Written = dict[tuple[int, object], tuple[Cells, object, Value]]  # by cell: its value at the end of a branch

@@ -8,8 +8,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 
 from enclave_launch.boundary.light import NamedTuple
-from nodl.infer.analysis import analyse_rest, start
-from nodl.infer.collector import without_collector
+from nodl.infer.analysis import analyse_rest, start, without_collector
 from nodl.infer.coverage import may_make_interfaces, unsettled_places
 from nodl.infer.interpreter.run import Run
 from nodl.infer.packages import EntryPoint, Package, find_package

@@ -10,17 +10,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from enclave_launch.boundary.light import NamedTuple
+from nodl.name_template import EDITS, Edit
 
 MAX_PARTS = 24
 MAX_PRODUCT = 64
 MAX_LENGTH = 4096  # characters of a known text; no name is longer
-
-# str methods that are applied later, when an input's value is known.
-DEFERRED_METHODS = frozenset(
-    {"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"}
-)
-
-Edit = tuple[str, tuple[str, ...]]
 
 
 class Input(NamedTuple):
@@ -125,18 +119,10 @@ def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
     if not left or not right:
         return left or right
     head, tail = pieces_of(left), pieces_of(right)
-    if (
-        len(head) + len(tail) > MAX_PARTS
-        or type(head[-1]) is type(tail[0])
-        or _is_long(left)
-        or _is_long(right)
-    ):
+    melts = len(head) + len(tail) > MAX_PARTS or type(head[-1]) is type(tail[0])
+    if melts or any(type(text) is str and len(text) > MAX_LENGTH for text in (left, right)):
         return text_of((*head, *tail))
     return make_text((*head, *tail))
-
-
-def _is_long(text: TextAtom) -> bool:
-    return type(text) is str and len(text) > MAX_LENGTH
 
 
 def concatenations(operands: Sequence[Sequence[TextAtom]]) -> list[TextAtom]:
@@ -179,27 +165,22 @@ def _literal_end(text: TextAtom, index: int) -> str:
 
 def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
     """``text.method(*arguments)`` where it can be said symbolically, else ``None``."""
-    if method not in DEFERRED_METHODS:
+    if method not in EDITS:
         return None
     pieces = text.pieces
     if len(pieces) == 1:
-        return _edited_input(pieces[0], method, arguments)
+        piece = pieces[0]
+        return (
+            with_edit(piece, method, arguments) if isinstance(piece, Input) and len(piece.edits) < 8 else None
+        )
     first, last = pieces[0], pieces[-1]
-    if method in ("lstrip", "strip") and isinstance(first, str):
-        first = first.lstrip(*arguments)
-        if not first:
-            return None
-    elif method in ("lstrip", "strip"):
+    if method in ("lstrip", "strip"):
+        first = first.lstrip(*arguments) if isinstance(first, str) else ""
+    if method in ("rstrip", "strip"):
+        last = last.rstrip(*arguments) if isinstance(last, str) else ""
+    if method not in ("lstrip", "rstrip", "strip") or not first or not last:
         return None
-    if method in ("rstrip", "strip") and isinstance(last, str):
-        last = last.rstrip(*arguments)
-        if not last:
-            return None
-    elif method in ("rstrip", "strip"):
-        return None
-    if method in ("lstrip", "rstrip", "strip"):
-        return text_of((first, *pieces[1:-1], last))
-    return None
+    return text_of((first, *pieces[1:-1], last))
 
 
 def input_of(text: object) -> Input | None:
@@ -212,10 +193,4 @@ def input_of(text: object) -> Input | None:
 
 def with_edit(piece: Input, method: str, arguments: tuple[str, ...]) -> Text:
     """The input after one more edit."""
-    return make_text((Input(piece.name, piece.owner, piece.item, (*piece.edits, (method, arguments))),))
-
-
-def _edited_input(piece: Piece, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
-    if isinstance(piece, Input) and len(piece.edits) < 8:
-        return make_text((Input(piece.name, piece.owner, piece.item, (*piece.edits, (method, arguments))),))
-    return None
+    return make_text((piece._replace(edits=(*piece.edits, (method, arguments))),))

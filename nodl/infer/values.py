@@ -1,4 +1,4 @@
-"""The abstract values of the analysis: what an expression of the analysed program may denote.
+"""The abstract values of the analysis: what an expression of the analysed program may denote, and how they are joined.
 
 A ``Value`` is a tuple of atoms, read as "one of these". Python constants (``str``, ``int``, ``None`` ...)
 stand for themselves, ``Text`` is a string known in part, ``Unknown`` is anything, the rest are the
@@ -283,14 +283,13 @@ class ClassValue(HeapObject):
 class Instance(HeapObject):
     """An object of an analysed class, or of a modelled foreign class (``cls`` is then its ``External``)."""
 
-    __slots__ = ("cls", "node", "site")
+    __slots__ = ("cls", "node")
 
-    def __init__(self, cls: ClassValue | External, site: tuple[str, int]):
+    def __init__(self, cls: ClassValue | External):
         super().__init__()
         self.cells = AttributeCells() if isinstance(cls, ClassValue) else FieldCells()
         self.cls = cls
         self.node: NodeRecord | None = None
-        self.site = site
 
 
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
@@ -382,3 +381,39 @@ def constant_strings(value: Value) -> list[str]:
 def sole(value: Value | None) -> object:
     """The single atom of ``value``, or ``Unknown`` when there is not exactly one."""
     return value[0] if value is not None and len(value) == 1 else ANY[0]
+
+
+def widen(old: Value, new: Value, texts_too: bool) -> Value:
+    """``join`` for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
+    if any(type(atom) is Unknown for atom in old):  # it may be any number or text already
+        covered = (int, float, str, Text) if texts_too else (int, float)
+        new = tuple(atom for atom in new if not isinstance(atom, covered) or contains(old, atom))
+    joined = join(old, new)
+    if joined is old:
+        return old
+    widened = _widened(old, joined, texts_too)
+    return old if all(contains(old, atom) for atom in widened) else widened
+
+
+def _widened(old: Value, joined: Value, texts_too: bool) -> Value:
+    if isinstance(joined[0], Items) and old and isinstance(old[0], Items):
+        return (_widen_items(old[0], joined[0], texts_too),)
+    if any(type(atom) in (int, float) and not contains(old, atom) for atom in joined):
+        if not old:
+            return joined
+        joined = join(tuple(atom for atom in joined if type(atom) not in (int, float)), ANY)
+    texts = [atom for atom in joined if isinstance(atom, str | Text)]
+    kept = [atom for atom in joined if not isinstance(atom, str | Text)]
+    if texts_too and any(isinstance(atom, Sequence) and not contains(old, atom) for atom in kept):
+        kept = [atom for atom in kept if not isinstance(atom, Sequence)]
+        return join((*kept, *texts), unknown(TOO_MANY))  # containers in containers, without end
+    if texts_too and len(texts) > 1 and any(not contains(old, text) for text in texts):
+        return join(tuple(kept), (widened_texts(texts),))
+    return joined
+
+
+def _widen_items(old: Items, new: Items, texts_too: bool) -> Items:
+    """Elements widen one by one while the length stays; later, and when it changes, all together."""
+    if old.exact is not None and new.exact is not None and not texts_too:
+        return Items(tuple(widen(a, b, texts_too) for a, b in zip(old.exact, new.exact, strict=True)))
+    return Items(None, widen(old.any_element(), new.any_element(), texts_too))

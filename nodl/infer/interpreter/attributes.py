@@ -179,7 +179,7 @@ def _enum_member(run: Run, cls: ClassValue, name: str, value: Value, node: ast.A
     key = ("enum", id(cls), name)
     member = run.enum_members.get(key)
     if member is None:
-        member = run.enum_members[key] = Instance(cls, (cls.module.source.path, cls.node.lineno))
+        member = run.enum_members[key] = Instance(cls)
         member.cells.update({"value": value, "_value_": value, "name": (name,)})
     return (member,)
 

@@ -6,14 +6,17 @@ Pruning a branch is only done on certainty; narrowing only removes alternatives 
 from __future__ import annotations
 
 import ast
+import operator
 from collections.abc import Callable
 
+from enclave_launch.boundary.light import Any
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Text, input_of
 from nodl.infer.values import (
     BOTTOM,
+    CONSTANTS,
     ITEMS,
     ClassValue,
     Dictionary,
@@ -22,17 +25,14 @@ from nodl.infer.values import (
     ModuleValue,
     NativeObject,
     Sequence,
-    Unknown,
     Value,
     contains,
 )
 
-_CONSTANTS = (str, int, float, bool, bytes, type(None))
-
 
 def truth_of(atom: object) -> bool | None:
     """``bool(atom)`` of the concrete value, ``None`` if it may be either."""
-    if isinstance(atom, _CONSTANTS):
+    if isinstance(atom, CONSTANTS):
         return bool(atom)
     if isinstance(atom, Text):
         return True if any(isinstance(piece, str) for piece in atom.pieces) else None
@@ -137,13 +137,9 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
 
 
 def _narrow_comparison(run: Run, test: ast.Compare, outcome: bool, frame: Frame) -> None:
-    operator = test.ops[0]
-    if isinstance(operator, ast.Is | ast.Eq):
-        wanted = outcome
-    elif isinstance(operator, ast.IsNot | ast.NotEq):
-        wanted = not outcome
-    else:
+    if not isinstance(test.ops[0], ast.Is | ast.Eq | ast.IsNot | ast.NotEq):
         return
+    wanted = outcome == isinstance(test.ops[0], ast.Is | ast.Eq)
     other = test.comparators[0]
     if isinstance(other, ast.Constant) and isinstance(test.left, ast.Name | ast.Attribute):
         constant = other.value
@@ -151,11 +147,12 @@ def _narrow_comparison(run: Run, test: ast.Compare, outcome: bool, frame: Frame)
 
 
 def _may_equal(atom: object, constant: object, wanted: bool) -> bool:
-    if isinstance(atom, _CONSTANTS):
+    if isinstance(atom, CONSTANTS):
         return (atom == constant) == wanted
-    if constant is None and isinstance(atom, Instance | FunctionValue | ClassValue | ModuleValue | Sequence):
-        return not wanted
-    return True
+    return not (constant is None and isinstance(atom, _NEVER_NONE) and wanted)
+
+
+_NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence)
 
 
 def _filter(run: Run, target: ast.expr, frame: Frame, keep: Callable[[object], bool]) -> None:
@@ -182,75 +179,65 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
     """A comparison: certain for constants, else either."""
     left = run.evaluate(node.left, frame)
     results: set[bool | None] = set()
-    for operator, comparator in zip(node.ops, node.comparators, strict=True):
+    for op, comparator in zip(node.ops, node.comparators, strict=True):
         right = run.evaluate(comparator, frame)
         own: Value = BOTTOM
         if special.has_own(left) or special.has_own(right):
-            own = special.comparison(run, operator, left, right, node, frame)
+            own = special.comparison(run, op, left, right, node, frame)
             if own and len(node.ops) == 1:
                 return own
-        results.add(truth(own) if own else compare_values(operator, left, right))
+        results.add(truth(own) if own else compare_values(op, left, right))
         left = right
     if results == {True}:
         return (True,)
     return (False,) if False in results else (True, False)
 
 
-def compare_values(operator: ast.cmpop, left: Value, right: Value) -> bool | None:
+def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
     """The outcome of comparing all pairs if they agree; ``None``: not known, or more than 16 pairs."""
     if len(left) * len(right) > 16 or not left or not right:
         return None
-    outcomes = {_compare_atoms(operator, a, b) for a in left for b in right}
+    outcomes = {_compare_atoms(op, a, b) for a in left for b in right}
     return outcomes.pop() if len(outcomes) == 1 else None
 
 
-def _compare_atoms(operator: ast.cmpop, left: object, right: object) -> bool | None:
-    if isinstance(operator, ast.In | ast.NotIn):
+def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
+    if isinstance(op, ast.In | ast.NotIn):
         found = _membership(left, right)
-        return found if found is None or isinstance(operator, ast.In) else not found
-    if isinstance(left, _CONSTANTS) and isinstance(right, _CONSTANTS):
-        return _compare_constants(operator, left, right)
-    if isinstance(operator, ast.Is | ast.IsNot | ast.Eq | ast.NotEq) and (left is None or right is None):
-        other = right if left is None else left
-        if isinstance(other, Instance | FunctionValue | ClassValue | ModuleValue | Sequence):
-            return isinstance(operator, ast.IsNot | ast.NotEq)
+        return found if found is None or isinstance(op, ast.In) else not found
+    if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
+        return _compare_constants(op, left, right)
+    with_none = isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq) and (left is None or right is None)
+    if with_none and isinstance(right if left is None else left, _NEVER_NONE):
+        return isinstance(op, ast.IsNot | ast.NotEq)
     return None
 
 
 def _membership(element: object, container: object) -> bool | None:
     if isinstance(container, str) and isinstance(element, str):
         return element in container
-    if isinstance(container, Dictionary) and isinstance(element, _CONSTANTS):
+    if isinstance(container, Dictionary) and isinstance(element, CONSTANTS):
         held, certain = container.held(element)
         return True if certain else None if held or container.is_open else False
-    if isinstance(container, Sequence) and isinstance(element, _CONSTANTS):
+    if isinstance(container, Sequence) and isinstance(element, CONSTANTS):
         exact = container.items.exact
         if exact is None or container.escaped:
             return None
         if any(len(item) == 1 and contains(item, element) for item in exact):
             return True
-        certain = all(isinstance(atom, _CONSTANTS) for item in exact for atom in item)
+        certain = all(isinstance(atom, CONSTANTS) for item in exact for atom in item)
         return False if certain and not any(contains(item, element) for item in exact) else None
     return None
 
 
-def _compare_constants(operator: ast.cmpop, left: object, right: object) -> bool | None:
-    if isinstance(operator, ast.Eq | ast.Is):
-        return bool(left == right)
-    if isinstance(operator, ast.NotEq | ast.IsNot):
-        return bool(left != right)
+def _compare_constants(op: ast.cmpop, left: object, right: object) -> bool | None:
     try:
-        if isinstance(operator, ast.Lt):
-            return bool(left < right)  # type: ignore[operator]
-        if isinstance(operator, ast.Gt):
-            return bool(left > right)  # type: ignore[operator]
-        if isinstance(operator, ast.LtE):
-            return bool(left <= right)  # type: ignore[operator]
-        return bool(left >= right)  # type: ignore[operator]
+        return bool(_COMPARED[type(op)](left, right))
     except TypeError:
         return None
 
 
-def is_unknown(value: Value) -> bool:
-    """Whether one of the alternatives is ``Unknown``."""
-    return any(type(atom) is Unknown for atom in value)
+_COMPARED: dict[type, Callable[[Any, Any], object]] = {
+    ast.Eq: operator.eq, ast.Is: operator.eq, ast.NotEq: operator.ne, ast.IsNot: operator.ne,
+    ast.Lt: operator.lt, ast.Gt: operator.gt, ast.LtE: operator.le, ast.GtE: operator.ge,
+}  # fmt: skip

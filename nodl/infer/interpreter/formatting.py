@@ -5,17 +5,18 @@ from __future__ import annotations
 import ast
 import re
 import string
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Sequences
+from contextlib import suppress
 from pathlib import PurePath
 
+from enclave_launch.boundary.light import Any
 from nodl.infer.interpreter import special
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
 from nodl.infer.values import (
     ANY,
-    BOTTOM,
     RESULT,
     Dictionary,
     External,
@@ -25,13 +26,13 @@ from nodl.infer.values import (
     Sequence,
     Unknown,
     Value,
-    join,
+    join_all,
     sole,
     unknown,
 )
 
 
-def as_texts(value: Value, convert: bool = True) -> list[TextAtom]:
+def as_texts(value: Value) -> list[TextAtom]:
     """The texts that formatting ``value`` may give."""
     texts = list(dict.fromkeys(_text_of_atom(atom) for atom in value))
     if not texts:
@@ -59,15 +60,8 @@ def _text_of_atom(atom: object) -> TextAtom:
 
 def text_value(texts: Iterable[TextAtom]) -> Value:
     """A value of ``texts``; a text that is one hole is simply unknown."""
-    result: Value = BOTTOM
-    for text in texts:
-        if isinstance(text, Text) and text.is_hole:
-            hole = text.pieces[0]
-            assert isinstance(hole, Hole)
-            result = join(result, unknown(hole.why))
-        else:
-            result = join(result, (text,))
-    return result
+    holes = ((text, text.pieces[0] if isinstance(text, Text) and text.is_hole else None) for text in texts)
+    return join_all(unknown(hole.why) if isinstance(hole, Hole) else (text,) for text, hole in holes)
 
 
 def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
@@ -103,16 +97,21 @@ def formatted(value: Value, spec: str | None) -> list[TextAtom]:
     """``format(value, spec)`` for constants; what depends on the rest is a hole."""
     if spec == "":
         return as_texts(value)
+    return _each_formatted(value, spec, lambda atom: format(atom, spec or ""))
+
+
+def _each_formatted(value: Value, spec: str | None, write: Callable[[Any], str]) -> list[TextAtom]:
     texts: list[TextAtom] = []
     for atom in value:
-        if spec is not None and isinstance(atom, str | int | float) and not _WIDE.search(spec):
-            try:
-                texts.append(format(atom, spec))
-                continue
-            except (ValueError, TypeError, OverflowError):
-                continue  # an error at run time, no text
-        texts.append(make_text((Hole("formatted text"),)))
-    return texts or [make_text((Hole("formatted text"),))]
+        if spec is None or not isinstance(atom, str | int | float) or _WIDE.search(spec):
+            texts.append(_FORMATTED)
+            continue
+        with suppress(ValueError, TypeError, OverflowError):  # an error at run time, no text
+            texts.append(write(atom))
+    return texts or [_FORMATTED]
+
+
+_FORMATTED = make_text((Hole("formatted text"),))
 
 
 def percent(left: Value, right: Value) -> Value:
@@ -157,16 +156,7 @@ def _percent_one(template: str, right: Value) -> list[TextAtom]:
 def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
     if match["type"] == "s" and not match["flags"]:
         return as_texts(value)
-    texts: list[TextAtom] = []
-    for atom in value:
-        if isinstance(atom, str | int | float) and not _WIDE.search(match["flags"]):
-            try:
-                texts.append(f"%{match['flags']}{match['type']}" % atom)
-                continue
-            except (TypeError, ValueError, OverflowError):
-                continue
-        texts.append(make_text((Hole("formatted text"),)))
-    return texts or [make_text((Hole("formatted text"),))]
+    return _each_formatted(value, match["flags"], lambda atom: f"%{match['flags']}{match['type']}" % atom)
 
 
 def _mapping_item(atom: object, key: str) -> Value:
@@ -190,19 +180,10 @@ def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
         if name == "":
             name = str(automatic)
             automatic += 1
-        value = _format_argument(name, args)
-        operands.append(
-            formatted(value, spec or "")
-            if not conversion and "{" not in (spec or "")
-            else [make_text((Hole("formatted text"),))]
-        )
+        value = (args.at(int(name)) if name.isdigit() else args.at(-1, name)) or ANY
+        plain = not conversion and "{" not in (spec or "")
+        operands.append(formatted(value, spec or "") if plain else [_FORMATTED])
     return concatenations(operands)
-
-
-def _format_argument(name: str, args: Arguments) -> Value:
-    if name.isdigit():
-        return args.at(int(name)) or ANY
-    return args.at(-1, name) or ANY
 
 
 def joined(separators: Value, items: Items) -> list[TextAtom]:

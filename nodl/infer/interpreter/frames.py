@@ -5,14 +5,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable
 
-from nodl.infer.values import (
-    BOTTOM,
-    FunctionValue,
-    LocalCells,
-    ModuleValue,
-    Value,
-    join,
-)
+from enclave_launch.boundary.light import NamedTuple
+from nodl.infer.values import BOTTOM, FunctionValue, LocalCells, ModuleValue, Value, join
 from nodl.source_ref import SourceRef
 
 
@@ -20,24 +14,8 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again",
-        "cells",
-        "closure",
-        "depth",
-        "early",
-        "forks",
-        "function",
-        "globals",
-        "is_class",
-        "is_comprehension",
-        "jump",
-        "loop_forks",
-        "module",
-        "nonlocals",
-        "raised",
-        "returned",
-        "unsettled",
-        "yielded",
+        "again", "cells", "closure", "depth", "early", "forks", "function", "globals", "is_class", "is_comprehension",
+        "jump", "loop_forks", "module", "nonlocals", "raised", "returned", "unsettled", "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -99,8 +77,8 @@ class Arguments:
         found = join(self.more if index >= 0 else BOTTOM, self.more_keywords)
         return found or None
 
-    def shifted(self, count: int = 1) -> Arguments:
-        return Arguments(self.positional[count:], self.keywords, self.more, self.more_keywords)
+    def shifted(self) -> Arguments:
+        return Arguments(self.positional[1:], self.keywords, self.more, self.more_keywords)
 
     def preceded(self, *first: Value) -> Arguments:
         return Arguments([*first, *self.positional], self.keywords, self.more, self.more_keywords)
@@ -109,15 +87,12 @@ class Arguments:
         return (*self.positional, *self.keywords.values(), self.more, self.more_keywords)
 
 
-class Call:
+class Call(NamedTuple):
     """A call as the models of libraries see it."""
 
-    __slots__ = ("args", "frame", "node")
-
-    def __init__(self, args: Arguments, node: ast.AST, frame: Frame) -> None:
-        self.args = args
-        self.node = node
-        self.frame = frame
+    args: Arguments
+    node: ast.AST
+    frame: Frame
 
     @property
     def source(self) -> SourceRef:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from nodl.infer.interpreter.binding import MISSING
-from nodl.infer.interpreter.calls import call_bound
+from nodl.infer.interpreter.calls import MISSING, call_bound
 from nodl.infer.interpreter.define import (
     foreign_bases,
     functions_of,
@@ -65,8 +64,7 @@ def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
 
 def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
     """``object.__new__(cls)``."""
-    site = (call.frame.module.source.path, getattr(call.node, "lineno", 0))
-    return run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls, site))
+    return run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls))
 
 
 def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter import special
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.conditions import compare_values, truth
+from nodl.infer.interpreter.define import linearized, program_classes
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
+    CONSTANTS,
     ClassValue,
     Dictionary,
     External,
@@ -21,7 +23,6 @@ from nodl.infer.values import (
     Value,
 )
 
-CONSTANTS = (str, int, float, bool, bytes, type(None))
 Outcome = bool | None  # it matches, it does not, or that is not known
 _KINDS = {"str": str, "int": int, "float": float, "bool": bool, "bytes": bytes}
 
@@ -71,8 +72,6 @@ def _any_of(run: Run, pattern: ast.MatchOr, value: Value, frame: Frame) -> Outco
 
 
 def _equal(run: Run, value: Value, other: Value, node: ast.AST, frame: Frame) -> Outcome:
-    from nodl.infer.interpreter.conditions import compare_values, truth
-
     own = special.comparison(run, ast.Eq(), value, other, node, frame)
     return truth(own) if own else compare_values(ast.Eq(), value, other)
 
@@ -165,9 +164,7 @@ def _class(run: Run, pattern: ast.MatchClass, value: Value, frame: Frame) -> Out
 def _positional_names(run: Run, cls: object) -> list[str]:
     if not isinstance(cls, ClassValue):
         return []
-    for base in linearized(cls):
-        if not isinstance(base, ClassValue):
-            continue
+    for base in program_classes(cls):
         listed = base.cells.get("__match_args__", ())
         if listed and isinstance(listed[0], Sequence) and listed[0].items.exact is not None:
             return [name for item in listed[0].items.exact for name in item if isinstance(name, str)]
@@ -212,7 +209,7 @@ def _any_class(atom: object, classes: Value) -> Outcome:
     return False if known else None
 
 
-_CONTAINERS = {"list": {"list"}, "tuple": {"tuple"}, "set": {"set"}, "frozenset": {"frozenset"}}
+_CONTAINERS = ("list", "tuple", "set", "frozenset", "dict")
 
 
 def _of_class(atom: object, cls: object) -> Outcome:
@@ -221,13 +218,8 @@ def _of_class(atom: object, cls: object) -> Outcome:
     name = cls.path.removeprefix("builtins.") if isinstance(cls, External) and "builtins." in cls.path else ""
     if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
         order = linearized(atom.cls)
-        if any(
-            base is cls
-            or (isinstance(base, External) and isinstance(cls, External) and base.path == cls.path)
-            for base in order
-        ):
-            return True
-        if name == "object":
+        paths = {base.path for base in order if isinstance(base, External)}
+        if name == "object" or cls in order or (isinstance(cls, External) and cls.path in paths):
             return True
         if all(isinstance(base, ClassValue) for base in order):
             return False
@@ -238,13 +230,8 @@ def _of_class(atom: object, cls: object) -> Outcome:
         return None
     if isinstance(atom, CONSTANTS):
         expected = _KINDS.get(name)
-        return isinstance(atom, expected) if expected else False if name in (*_CONTAINERS, "dict") else None
+        return isinstance(atom, expected) if expected else False if name in _CONTAINERS else None
+    known = name in _CONTAINERS or name in _KINDS
     if isinstance(atom, Sequence):
-        return (
-            name == atom.kind
-            if name in (*_CONTAINERS, *_KINDS, "dict") and atom.kind != "generator"
-            else None
-        )
-    if isinstance(atom, Dictionary):
-        return name == "dict" if name in (*_CONTAINERS, *_KINDS, "dict") else None
-    return None
+        return name == atom.kind if known and atom.kind != "generator" else None
+    return name == "dict" if known and isinstance(atom, Dictionary) else None

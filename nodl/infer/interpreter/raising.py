@@ -33,7 +33,7 @@ def throw(run: Run, error: type[BaseException] | str, text: str = "") -> None:
     run.risks += 1
     if is_certain(run):
         kind = error if isinstance(error, type) else getattr(builtins, error)
-        raised = Instance(External(f"builtins.{kind.__name__}"), ("", 0))
+        raised = Instance(External(f"builtins.{kind.__name__}"))
         raised.cells["text"] = (text,)
         raise Raised((raised,), _builtin_kinds(kind))
 

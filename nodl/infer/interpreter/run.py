@@ -11,10 +11,9 @@ import itertools
 from collections.abc import Callable
 from functools import partial
 
-from enclave_launch.boundary.light import Any, NamedTuple
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.interpreter.allocations import Allocations
-from nodl.infer.interpreter.decisions import Decisions
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy, Variables
 from nodl.infer.program import Program, SourceModule
@@ -40,6 +39,9 @@ from nodl.infer.values import (
     join_all,
 )
 from nodl.source_ref import SourceRef
+
+if TYPE_CHECKING:
+    from nodl.infer.paths import Decisions
 
 # What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
@@ -252,6 +254,10 @@ class Run(Allocations):
         if handler is None:
             return ANY
         return handler(self, atom, call)
+
+    def library_object(self, call: Call, path: str, kind: str = "") -> Instance:
+        """The object of the library class ``path`` that ``call`` makes; ``kind`` as in ``allocate``."""
+        return self.allocate(call.node, kind or path, lambda: Instance(External(path)))
 
     def attribute(self, owner: Value, name: str, node: ast.AST, frame: Frame) -> Value:
         readers = self.tables.attributes

@@ -23,6 +23,7 @@ from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Getter, 
 from nodl.infer.text import MAX_LENGTH
 from nodl.infer.values import (
     ANY,
+    CONSTANTS,
     ClassValue,
     Dictionary,
     External,
@@ -39,18 +40,9 @@ MAX_ELEMENTS = 2_000  # of one container
 MAX_NUMBER = 1 << 12  # as an argument: widths, counts
 MAX_TEXT = 1 << 14
 _LARGE = 1 << 256  # as a result
-CONSTANTS = (str, int, float, bool, bytes, type(None))
 _CALLABLE = (
-    FunctionValue,
-    BoundMethod,
-    Partial,
-    Getter,
-    ClassValue,
-    ClassMethod,
-    External,
-    NativeMethod,
-    ForeignMethod,
-)
+    FunctionValue, BoundMethod, Partial, Getter, ClassValue, ClassMethod, External, NativeMethod, ForeignMethod,
+)  # fmt: skip
 _IMMUTABLE = (re.Pattern, re.Match, PurePosixPath, string.Template)
 _ITERATORS: tuple[type, ...] = (
     GeneratorType, map, filter, zip, enumerate, reversed,
@@ -206,19 +198,10 @@ def _constant(found: Any) -> Value:
 def _from_sequence(run: Run, found: Any, call: Call, place: str) -> Value:
     if len(found) > MAX_ELEMENTS:
         raise NotConcrete
-    kind = (
-        "tuple"
-        if isinstance(found, tuple | range)
-        else "set"
-        if isinstance(found, set | frozenset)
-        else "list"
-    )
-    if kind == "set":
-        found = sorted(
-            found, key=lambda each: (type(each).__name__, repr(each))
-        )  # in the same order everywhere
-    parts = tuple(from_python(run, each, call, f"{place} {index}") for index, each in enumerate(found))
-    if kind == "tuple":
+    kind = "set" if isinstance(found, set | frozenset) else "list"
+    listed = in_order(found) if kind == "set" else found
+    parts = tuple(from_python(run, each, call, f"{place} {index}") for index, each in enumerate(listed))
+    if isinstance(found, tuple | range):
         return run.tuple_of(parts)
     obj = run.allocate(call.node, f"{kind}{place}", lambda: Sequence(kind, Items(parts)))
     if obj.summary:
@@ -226,9 +209,13 @@ def _from_sequence(run: Run, found: Any, call: Call, place: str) -> Value:
     return (obj,)
 
 
+def in_order(found: Iterable[Any]) -> list[Any]:
+    """The elements of a set, in the same order everywhere."""
+    return sorted(found, key=lambda each: (type(each).__name__, repr(each)))
+
+
 def _from_dictionary(run: Run, found: dict[Any, Any], call: Call, place: str) -> Value:
     obj = run.allocate(call.node, f"dict{place}", Dictionary)
-    assert isinstance(obj, Dictionary)
     if isinstance(found, collections.Counter):
         obj.kind = "Counter"
         obj.default = (External("builtins.int"),)
@@ -285,28 +272,25 @@ def compute(
         return ANY
 
 
-def _holds_opaque(given: Iterable[object], level: int = 0) -> bool:
+def _holds_opaque(given: Iterable[object]) -> bool:
     for each in given:
-        if isinstance(each, Opaque | Callback):
+        if isinstance(each, dict) and _holds_opaque(each.values()):
             return True
-        if isinstance(each, dict) and _holds_opaque(each.values(), level + 1):
+        if isinstance(each, list | tuple | collections.deque) and _holds_opaque(each):
             return True
-        if isinstance(each, list | tuple | collections.deque) and _holds_opaque(each, level + 1):
-            return True
-        if not isinstance(
-            each, (*CONSTANTS, *_IMMUTABLE, dict, list, tuple, set, frozenset, range, collections.deque)
-        ):
+        if not isinstance(each, _SEEN_THROUGH):
             return True  # an iterator, say, which may yield such
     return False
 
 
+_SEEN_THROUGH = (*CONSTANTS, *_IMMUTABLE, dict, list, tuple, set, frozenset, range, collections.deque)
+
+
 def _check_size(given: tuple[object, ...]) -> None:
     for each in given:
-        if isinstance(each, str | bytes) and len(each) > MAX_TEXT:
-            raise NotConcrete
-        if isinstance(each, int) and abs(each) > MAX_NUMBER:
-            raise NotConcrete
-        if isinstance(each, float) and abs(each) > 1e300:
+        large = isinstance(each, int) and abs(each) > MAX_NUMBER
+        large = large or (isinstance(each, float) and abs(each) > 1e300)
+        if large or (isinstance(each, str | bytes) and len(each) > MAX_TEXT):
             raise NotConcrete
 
 

@@ -6,21 +6,12 @@ service, below its name.
 
 from __future__ import annotations
 
-from nodl.infer.findings import FoundEndpoint, NodeRecord
+from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models.signatures import COMMON_CALLBACKS
 from nodl.infer.text import Text, concatenate
-from nodl.infer.values import (
-    ANY,
-    NONE,
-    External,
-    Instance,
-    Unknown,
-    Value,
-    join,
-    result_of,
-)
+from nodl.infer.values import ANY, NONE, External, Instance, Unknown, Value, join, result_of
 from nodl.node_interface import EndpointKind
 
 _CLASS_OF = {
@@ -38,10 +29,8 @@ def endpoint_object(
     run: Run, kind: EndpointKind, record: NodeRecord, names: Value, types: list[str], call: Call
 ) -> Value:
     """The object of a publisher, subscription, service or client that ``record`` made."""
-    site = (call.source.file, call.source.line)
     path = _CLASS_OF[kind]
-    made = run.allocate(call.node, f"{path} {id(record)}", lambda: Instance(External(path), site))
-    assert isinstance(made, Instance)
+    made = run.library_object(call, path, f"{path} {id(record)}")
     made.cells["record"] = (record,)
     run.state.store(made, "name", names)
     run.state.store(made, "types", join(made.cells.get("types", ()), tuple(types)))
@@ -54,10 +43,8 @@ def method(run: Run, receiver: Instance, name: str, call: Call) -> Value:
         _introspect(receiver, call)
         return NONE
     if name in COMMON_CALLBACKS:
-        callback = COMMON_CALLBACKS[name]
-        run.register_callback(
-            call.args.at(callback.argument.position, callback.argument.keyword) or ANY, None
-        )
+        where = COMMON_CALLBACKS[name].argument
+        run.register_callback(call.args.at(where.position, where.keyword) or ANY, None)
         return ANY
     run.escape(call.args, opened=False, objects=False)
     return result_of("rclpy")
@@ -76,4 +63,4 @@ def _introspect(receiver: Instance, call: Call) -> None:
         if isinstance(name, str | Text | Unknown):
             full = concatenate(name, EVENT) if isinstance(name, str | Text) else name
             for event_type in types or [""]:
-                record.add_endpoint(FoundEndpoint(EndpointKind.PUBLISHER, full, event_type, call.source))
+                record.add_endpoint(EndpointKind.PUBLISHER, full, event_type, call.source)

@@ -19,7 +19,7 @@ from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.values import BOOLEAN, NativeObject, Value, sole, unknown
 
 MAX_FILE_BYTES = 1 << 18
-_CONTENTS = "the contents of a file, read when the program runs"
+CONTENTS = "the contents of a file, read when the program runs"
 
 
 def _directory(find: Callable[..., str], as_path: bool) -> Model:
@@ -43,10 +43,10 @@ def opened(run: Run, path: object, mode: object, call: Call) -> Value:
     """``open(path, mode)``: the file for reading, as a real object."""
     place = _known_place(run, path)
     if place is None:
-        return unknown(_CONTENTS)
+        return unknown(CONTENTS)
     if not isinstance(mode, str) or set(mode) - set("rbt"):
         run.gap(call.node, call.frame, f"the program writes {place}, which it may read")
-        return unknown(_CONTENTS)
+        return unknown(CONTENTS)
     data = _read(run, place)
     if data is None:
         return unknown(f"the contents of {place}, which cannot be read")
@@ -62,7 +62,7 @@ def path_method(run: Run, path: PurePosixPath, name: str, call: Call) -> Value:
         place = _known_place(run, path)
         data = _read(run, place) if place is not None else None
         if data is None:
-            return unknown(_CONTENTS if place is None else f"the contents of {place}, which cannot be read")
+            return unknown(CONTENTS if place is None else f"the contents of {place}, which cannot be read")
         return (data.decode(),) if name == "read_text" else (data,)
     if name in ("exists", "is_file"):
         return _exists(run, path)
@@ -74,7 +74,7 @@ def path_method(run: Run, path: PurePosixPath, name: str, call: Call) -> Value:
 def _open(run: Run, call: Call) -> Value:
     mode, encoding = call.args.at(1, "mode") or ("r",), sole(call.args.at(3, "encoding") or ("utf-8",))
     if not isinstance(encoding, str) or encoding.lower() not in ("utf-8", "utf8"):
-        return unknown(_CONTENTS)
+        return unknown(CONTENTS)
     return opened(run, _real(call.args.at(0, "file")), sole(mode), call)
 
 

@@ -79,16 +79,9 @@ _CHANGEABLE = ("builtins.list", "builtins.dict", "builtins.set")
 
 
 # While these run, callbacks do.
-_WAITS = frozenset(
-    {
-        "spin",
-        "spin_once",
-        "spin_until_future_complete",
-        "spin_once_until_future_complete",
-        "sleep",
-        "wait_for_message",
-    }
-)
+_WAITS = frozenset({
+    "spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete", "sleep", "wait_for_message",
+})  # fmt: skip
 
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
@@ -114,13 +107,11 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         return _unbound_method(run, owner, name, call)
     if is_builtin_exception(path):
         run.escape(call.args, opened=False, objects=False)
-        return (Instance(External(path), (call.source.file, call.source.line)),)
+        return (Instance(External(path)),)
     if "(" in path and (name in NODE_METHODS):
         return call_native(run, NativeMethod(unknown(f"the result of {owner}")[0], name), call)
-    if "(" not in path:
-        run.understood.add(
-            call.node
-        )  # a function of a library that does not make interfaces, whatever its name
+    if "(" not in path:  # a function of a library that does not make interfaces, whatever its name
+        run.understood.add(call.node)
     if name in _WAITS and run.callbacks:
         run.settle(run)
     _hand_over(run, path, call)
@@ -247,11 +238,15 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
             record.gaps.setdefault((call.source, why))
         return ros.NODE_METHODS[name](run, record, call)
     if name in COMMON_CALLBACKS:
-        _common_callback(run, name, call)
+        ros.register(run, COMMON_CALLBACKS[name], call)
         return ANY
-    root = path.partition(".")[0]
-    run.escape(call.args, opened=root not in _TRUSTED, objects=root not in _KEEPS_OFF)
+    _escape_to(run, path, call)
     return unknown(f"the result of {path.rpartition('.')[2] or 'an unknown class'}.{name}()")
+
+
+def _escape_to(run: Run, path: str, call: Call) -> None:
+    """The arguments go to the library of ``path``."""
+    run.escape(call.args, opened=path.partition(".")[0] not in _TRUSTED, objects=not keeps_off(path))
 
 
 def _object_method(run: Run, receiver: Instance, name: str, call: Call) -> Value:
@@ -286,23 +281,17 @@ def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: 
 
 def _initialise_other_bases(run: Run, receiver: Instance, path: str, call: Call) -> None:
     """An unknown base class may pass the call on to the next one in the method resolution order."""
-    root = path.partition(".")[0]
-    run.escape(call.args, opened=root not in _TRUSTED, objects=root not in _KEEPS_OFF)
-    order = getattr(receiver.cls, "linear", None) or ()
-    foreign = [base for base in order if isinstance(base, External)]
-    paths = [base.path for base in foreign]
+    _escape_to(run, path, call)
+    paths = _foreign_bases(receiver)
     after = paths[paths.index(path) + 1 :] if path in paths else []
-    for other in after:
-        if is_node_class(other):
-            ros_nodes.initialise_node(run, receiver, other, call)
-            return
+    node_class = next(filter(is_node_class, after), None)
+    if node_class is not None:
+        ros_nodes.initialise_node(run, receiver, node_class, call)
 
 
-def _common_callback(run: Run, name: str, call: Call) -> None:
-    callback = COMMON_CALLBACKS[name]
-    value = ros.argument(call, callback.argument)
-    if value:
-        run.register_callback(value, callback.arity)
+def _foreign_bases(obj: Instance) -> list[str]:
+    order = getattr(obj.cls, "linear", None) or ()
+    return [base.path for base in order if isinstance(base, External)]
 
 
 def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
@@ -312,7 +301,7 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
         return _native_method(run, receiver, name, call)
     if isinstance(receiver, Unknown):
         if name in COMMON_CALLBACKS:
-            _common_callback(run, name, call)
+            ros.register(run, COMMON_CALLBACKS[name], call)
             return ANY
         if len(call.args.positional) + len(call.args.keywords) >= 2:
             record = ros_nodes.records_of(run, (receiver,), call)[0]
@@ -324,7 +313,7 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
 def _native_method(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
     if not concrete.is_usable(run, receiver):
         return lose(run, receiver)
-    if isinstance(receiver.object, PurePosixPath) and pure.is_io(name):
+    if isinstance(receiver.object, PurePosixPath) and name in pure.PATH_IO:
         return files.path_method(run, receiver.object, name, call)
     run.state.pulled += 1
     found = concrete.compute(run, getattr(receiver.object, name), call)
@@ -336,7 +325,7 @@ def _native_method(run: Run, receiver: NativeObject, name: str, call: Call) -> V
 
 def native_attribute(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
     """An attribute of a real object: a method of it, or a value."""
-    if isinstance(receiver.object, PurePosixPath) and pure.is_io(name):
+    if isinstance(receiver.object, PurePosixPath) and name in pure.PATH_IO:
         return (NativeMethod(receiver, name),)
     if name.startswith("_") or not hasattr(receiver.object, name):
         return unknown(f"attribute {name} of a {type(receiver.object).__name__}")
@@ -352,12 +341,10 @@ def native_attribute(run: Run, receiver: NativeObject, name: str, call: Call) ->
 
 # --- attributes ---------------------------------------------------------------------------------------------
 
-_PARAMETER_VALUES = frozenset(
-    {
-        "value", "string_value", "bool_value", "integer_value", "double_value", "string_array_value",
-        "integer_array_value", "double_array_value", "bool_array_value", "byte_array_value",
-    }
-)  # fmt: skip
+_PARAMETER_VALUES = frozenset({
+    "value", "string_value", "bool_value", "integer_value", "double_value", "string_array_value",
+    "integer_array_value", "double_array_value", "bool_array_value", "byte_array_value",
+})  # fmt: skip
 
 
 def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
@@ -377,10 +364,7 @@ def inherited(obj: Instance, path: str, name: str) -> Value | None:
         return (ForeignMethod(path, obj, name),)
     if (path, name) in stdlib.METHODS or name == "__init__":
         return (ForeignMethod(path, obj, name),)
-    others = [base for base in getattr(obj.cls, "linear", ()) or () if isinstance(base, External)]
-    if any(is_node_class(base.path) for base in others):
-        return None
-    return (ForeignMethod(path, obj, name),)
+    return None if any(map(is_node_class, _foreign_bases(obj))) else (ForeignMethod(path, obj, name),)
 
 
 def hooks_of(base: object) -> frozenset[str] | None:
@@ -389,9 +373,7 @@ def hooks_of(base: object) -> frozenset[str] | None:
         return None
     if is_node_class(base.path):
         return LIFECYCLE_HOOKS if ros_nodes.is_lifecycle(base.path) else frozenset()
-    if base.path in stdlib.HOOKS:
-        return stdlib.HOOKS[base.path]
-    return None
+    return stdlib.HOOKS.get(base.path)
 
 
 @functools.lru_cache(maxsize=4096)

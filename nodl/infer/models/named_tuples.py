@@ -41,16 +41,8 @@ class {name}(_tuple):
         return cls(*iterable)
 """
 _METHODS = (
-    "__getitem__",
-    "__iter__",
-    "__len__",
-    "__eq__",
-    "__add__",
-    "_asdict",
-    "_replace",
-    "_make",
-    "_fields",
-)
+    "__getitem__", "__iter__", "__len__", "__eq__", "__add__", "_asdict", "_replace", "_make", "_fields",
+)  # fmt: skip
 
 
 def made(run: Run, call: Call) -> Value:

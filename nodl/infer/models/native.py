@@ -38,13 +38,11 @@ from nodl.infer.values import (
 )
 
 # Methods of str whose result is computed outright when everything is constant.
-_PURE = frozenset(
-    {
-        "strip", "lstrip", "rstrip", "lower", "upper", "title", "capitalize", "replace", "removeprefix",
-        "removesuffix", "zfill", "ljust", "rjust", "center", "casefold", "swapcase", "startswith", "endswith",
-        "isdigit", "isalpha", "find", "rfind", "index", "count", "isidentifier", "islower", "isupper",
-    }
-)  # fmt: skip
+_PURE = frozenset({
+    "strip", "lstrip", "rstrip", "lower", "upper", "title", "capitalize", "replace", "removeprefix",
+    "removesuffix", "zfill", "ljust", "rjust", "center", "casefold", "swapcase", "startswith", "endswith",
+    "isdigit", "isalpha", "find", "rfind", "index", "count", "isidentifier", "islower", "isupper",
+})  # fmt: skip
 _SPLITS = frozenset({"split", "rsplit", "splitlines", "partition", "rpartition"})
 
 
@@ -127,8 +125,7 @@ def _real_method(run: Run, owner: Sequence, name: str, call: Call) -> Value | No
         return None
     after = list(real)
     if len(after) != len(before) or any(a is not b for a, b in zip(after, before, strict=True)):
-        if isinstance(real, set):
-            after = sorted(after, key=lambda each: (type(each).__name__, repr(each)))
+        after = concrete.in_order(after) if isinstance(real, set) else after
         parts = tuple(concrete.from_python(run, each, call) for each in after)
         run.state.store(owner, ITEMS, (Items(parts),))
     return found

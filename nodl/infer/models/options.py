@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.run import Run
-from nodl.infer.models.library_objects import library_instance
 from nodl.infer.text import Input, Text, input_of, make_text
 from nodl.infer.values import (
     ANY,
@@ -20,20 +19,19 @@ from nodl.infer.values import (
     Value,
     constant_strings,
     join,
+    join_all,
     sole,
     unknown,
 )
 
 PARSER = "argparse.ArgumentParser"
 NAMESPACE = "argparse.Namespace"
-_KEEP_TEXT = frozenset(
-    {"builtins.str", "builtins.int"}
-)  # types under which a well-written value stays as it is
+_KEEP_TEXT = frozenset({"builtins.str", "builtins.int"})  # types that leave a well-written value as it is
 
 
 def made_parser(run: Run, call: Call) -> Value:
     """``ArgumentParser(...)``: the object that collects the options declared on it."""
-    return (library_instance(run, call, PARSER),)
+    return (run.library_object(call, PARSER),)
 
 
 def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
@@ -80,7 +78,7 @@ def _argument_group(run: Run, parser: Instance, call: Call) -> Value:
 
 
 def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
-    namespace = library_instance(run, call, NAMESPACE)
+    namespace = run.library_object(call, NAMESPACE)
     run.state.store(namespace, "parser", (parser,))
     given = call.args.at(0, "args") or NONE
     if any(isinstance(atom, Sequence) for atom in given):
@@ -96,10 +94,8 @@ def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
 
 def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
     """What ``args.<name>`` may be; anything if no parser declares it or the program passes the arguments."""
-    found: Value = BOTTOM
-    for parser in namespace.cells.get("parser", BOTTOM):
-        if isinstance(parser, Instance):
-            found = join(found, parser.cells.get("dest " + name, BOTTOM))
+    parsers = (atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance))
+    found = join_all(parser.cells.get("dest " + name, BOTTOM) for parser in parsers)
     if "[given]" in namespace.cells:  # not what launch writes on the command line, but a list of the program
         known = tuple(atom for atom in found if not isinstance(atom, str | Text))
         return join(known, unknown(f"the option {name} in arguments that the program makes"))

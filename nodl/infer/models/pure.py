@@ -42,16 +42,8 @@ _ITERTOOLS = [
     "zip_longest",
 ]  # fmt: skip
 _PATHS = [
-    "basename",
-    "commonpath",
-    "commonprefix",
-    "dirname",
-    "isabs",
-    "join",
-    "normpath",
-    "split",
-    "splitext",
-]
+    "basename", "commonpath", "commonprefix", "dirname", "isabs", "join", "normpath", "split", "splitext",
+]  # fmt: skip
 _MATH = [
     "ceil", "floor", "sqrt", "pow", "fabs", "gcd", "lcm", "log", "log2", "log10", "sin", "cos", "tan", "atan2", "hypot",
     "radians", "degrees", "trunc", "isclose",
@@ -93,14 +85,6 @@ def _late(module: str, name: str) -> Function:
         return getattr(importlib.import_module(module), name)(*given, **named)
 
     return run
-
-
-def _chain(*columns: Any) -> Any:
-    return itertools.chain(*columns)
-
-
-def _from_iterable(columns: Any) -> Any:
-    return itertools.chain.from_iterable(columns)
 
 
 def _no_opaque(function: Function) -> Function:
@@ -169,13 +153,18 @@ def _dumps(value: Any, *, default: Any = None, **named: Any) -> str:
     return json.dumps(value, default=None if default is None else known, **named)
 
 
+_LATE = {
+    "configparser": ("ConfigParser",), "shlex": ("quote", "split"), "html": ("escape",),
+    "urllib.parse": ("quote", "unquote"), "ast": ("literal_eval",), "base64": ("b64encode", "b64decode"),
+    "textwrap": ("dedent", "indent", "shorten", "wrap", "fill"),
+}  # fmt: skip
 SHALLOW: dict[str, Function] = {
     **{f"builtins.{name}": getattr(builtins, name) for name in _BUILTINS},
     "builtins.range": _range,
     **{f"re.{name}": _pattern(getattr(re, name)) for name in _RE},
     **{f"itertools.{name}": getattr(itertools, name) for name in _ITERTOOLS if hasattr(itertools, name)},
-    "itertools.chain": _chain,
-    "itertools.chain.from_iterable": _from_iterable,
+    "itertools.chain": itertools.chain,
+    "itertools.chain.from_iterable": itertools.chain.from_iterable,
     "itertools.tee": _tee,
     **{
         f"{module}.{name}": getattr(posixpath, name) for module in ("os.path", "posixpath") for name in _PATHS
@@ -186,25 +175,10 @@ SHALLOW: dict[str, Function] = {
     "collections.Counter": collections.Counter,
     "collections.deque": collections.deque,
     "collections.OrderedDict": dict,
-    "pathlib.Path": PurePosixPath,
-    "pathlib.PosixPath": PurePosixPath,
-    "pathlib.PurePath": PurePosixPath,
-    "pathlib.PurePosixPath": PurePosixPath,
+    **{f"pathlib.{name}": PurePosixPath for name in ("Path", "PosixPath", "PurePath", "PurePosixPath")},
     "string.Template": string.Template,
     "string.capwords": string.capwords,
-    "configparser.ConfigParser": _late("configparser", "ConfigParser"),
-    "shlex.quote": _late("shlex", "quote"),
-    "shlex.split": _late("shlex", "split"),
-    "html.escape": _late("html", "escape"),
-    "urllib.parse.quote": _late("urllib.parse", "quote"),
-    "urllib.parse.unquote": _late("urllib.parse", "unquote"),
-    "ast.literal_eval": _late("ast", "literal_eval"),
-    "base64.b64encode": _late("base64", "b64encode"),
-    "base64.b64decode": _late("base64", "b64decode"),
-    **{
-        f"textwrap.{name}": _late("textwrap", name)
-        for name in ("dedent", "indent", "shorten", "wrap", "fill")
-    },
+    **{f"{module}.{name}": _late(module, name) for module, names in _LATE.items() for name in names},
 }
 # These look into what containers hold.
 DEEP: dict[str, Function] = {
@@ -214,42 +188,15 @@ DEEP: dict[str, Function] = {
     "json.dumps": _dumps,
     "json.loads": _json,
     "json.load": _json,
-    "yaml.safe_load": _yaml,
-    "yaml.load": _yaml,
-    "yaml.full_load": _yaml,
+    **dict.fromkeys(("yaml.safe_load", "yaml.load", "yaml.full_load"), _yaml),
     "copy.deepcopy": lambda value: value,
 }
-IMMUTABLE_ATTRIBUTES = frozenset({"pattern", "string", "lastindex", "lastgroup", "template", "delimiter"})
-_PATH_IO = frozenset(
-    {
-        "absolute",
-        "resolve",
-        "expanduser",
-        "exists",
-        "is_file",
-        "is_dir",
-        "read_text",
-        "read_bytes",
-        "write_text",
-        "write_bytes",
-        "stat",
-        "lstat",
-        "touch",
-        "mkdir",
-        "unlink",
-        "rename",
-        "replace",
-        "rglob",
-        "is_symlink",
-        "owner",
-        "samefile",
-        "open",
-        "glob",
-        "iterdir",
-    }
-)
-
-
+# Methods of a path that ask the file system.
+PATH_IO = frozenset({
+    "absolute", "resolve", "expanduser", "exists", "is_file", "is_dir", "read_text", "read_bytes", "write_text",
+    "write_bytes", "stat", "lstat", "touch", "mkdir", "unlink", "rename", "replace", "rglob", "is_symlink", "owner",
+    "samefile", "open", "glob", "iterdir",
+})  # fmt: skip
 # The size of a number makes no difference to their cost.
 ANY_SIZE = frozenset(
     f"builtins.{name}" for name in (
@@ -278,8 +225,3 @@ def constant_at(path: str) -> object:
     owner = {"string": string, "math": math, "re": re}.get(module)
     value = getattr(owner, name, None) if owner is not None and not name.startswith("_") else None
     return value if isinstance(value, str | int | float) else None
-
-
-def is_io(name: str) -> bool:
-    """A method of a path that asks the file system."""
-    return name in _PATH_IO

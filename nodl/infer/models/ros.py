@@ -6,7 +6,7 @@ import functools
 from collections.abc import Callable
 
 from nodl.builtin_interfaces import PARAMETER_SERVICES
-from nodl.infer.findings import FoundEndpoint, NodeRecord
+from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Call
@@ -23,11 +23,16 @@ from nodl.infer.models.ros_nodes import (
     strings_in,
 )
 from nodl.infer.models.signatures import (
+    ACTION_CLIENT,
+    CLIENT,
     ENDPOINT_CALLS,
     HELPERS,
     NODE_CALLBACKS,
     NODE_ENDPOINTS,
+    PUBLISHER,
+    SUBSCRIPTION,
     Argument,
+    CallbackArgument,
     EndpointCall,
     FixedEndpoint,
     Helper,
@@ -44,9 +49,9 @@ from nodl.infer.values import (
     constant_strings,
     external,
     join,
+    join_all,
     unknown,
 )
-from nodl.node_interface import EndpointKind
 
 _INTERFACE_FOLDERS = ("msg", "srv", "action")
 
@@ -67,12 +72,14 @@ def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call:
     for record in records:
         for name in names_of(names):
             for interface_type in types_of(types):
-                endpoint = FoundEndpoint(made.kind, name, interface_type, call.source, qos)
-                record.add_endpoint(endpoint)
+                record.add_endpoint(made.kind, name, interface_type, call.source, qos)
     for callback in made.callbacks:
-        value = argument(call, callback.argument)
-        if value:
-            run.register_callback(value, callback.arity)
+        register(run, callback, call)
+
+
+def register(run: Run, callback: CallbackArgument, call: Call) -> None:
+    """Register the callback that is given to the call, if one is."""
+    run.register_callback(argument(call, callback.argument) or BOTTOM, callback.arity)
 
 
 def names_of(value: Value) -> list[object]:
@@ -116,7 +123,7 @@ def _helper(run: Run, helper: Helper, call: Call) -> None:
                 if switch is not None and truth(switch) is True:
                     continue
             for name in _fixed_names(fixed, call):
-                record.add_endpoint(FoundEndpoint(fixed.kind, name, fixed.type, call.source))
+                record.add_endpoint(fixed.kind, name, fixed.type, call.source)
 
 
 def _fixed_names(fixed: FixedEndpoint, call: Call) -> Value:
@@ -133,20 +140,15 @@ def _endpoint_method(name: str) -> NodeMethod:
     def method(run: Run, record: NodeRecord, call: Call) -> Value:
         made = NODE_ENDPOINTS[name]
         add_endpoints(run, made, [record], call)
-        names = argument(call, made.name) or ANY
-        return endpoint_object(
-            run, made.kind, record, names, types_of(argument(call, made.type) or ANY), call
-        )
+        types = types_of(argument(call, made.type) or ANY)
+        return endpoint_object(run, made.kind, record, argument(call, made.name) or ANY, types, call)
 
     return method
 
 
 def _callback_method(name: str) -> NodeMethod:
     def method(run: Run, record: NodeRecord, call: Call) -> Value:
-        callback = NODE_CALLBACKS[name]
-        value = argument(call, callback.argument)
-        if value:
-            run.register_callback(value, callback.arity)
+        register(run, NODE_CALLBACKS[name], call)
         return external(f"rclpy.{name}()")
 
     return method
@@ -165,19 +167,14 @@ def _wait_until_active(run: Run, record: NodeRecord, call: Call) -> Value:
     for index, (keyword, default) in enumerate((("navigator", "bt_navigator"), ("localizer", "amcl"))):
         for name in as_texts(call.args.at(index, keyword) or (default,)):
             service = concatenate(name, "/get_state")
-            record.add_endpoint(
-                FoundEndpoint(
-                    EndpointKind.SERVICE_CLIENT, service, "lifecycle_msgs/srv/GetState", call.source
-                )
-            )
+            record.add_endpoint(CLIENT, service, "lifecycle_msgs/srv/GetState", call.source)
     return NONE
 
 
 def _manage_lifecycle(run: Run, record: NodeRecord, call: Call) -> Value:
     """``BasicNavigator`` calls every lifecycle manager that it finds while it runs."""
     name = unknown("the services of lifecycle managers that are found at run time")[0]
-    service_type = "nav2_msgs/srv/ManageLifecycleNodes"
-    record.add_endpoint(FoundEndpoint(EndpointKind.SERVICE_CLIENT, name, service_type, call.source))
+    record.add_endpoint(CLIENT, name, "nav2_msgs/srv/ManageLifecycleNodes", call.source)
     return NONE
 
 
@@ -206,11 +203,11 @@ def call_library(run: Run, path: str, call: Call) -> Value | None:
     if made is not None:
         assert made.node is not None
         add_endpoints(run, made, records_of(run, argument(call, made.node), call), call)
-        return instance_of(run, path, call)
+        return _object_of(run, path, call)
     helper = HELPERS.get(key)
     if helper is not None:
         _helper(run, helper, call)
-        return instance_of(run, path, call)
+        return _object_of(run, path, call)
     function = _FUNCTIONS.get(key)
     if function:
         run.understood.add(call.node)
@@ -229,10 +226,8 @@ def makes_interfaces(path: str) -> bool:
     return key in ENDPOINT_CALLS or key in HELPERS or key in _MAKING
 
 
-def instance_of(run: Run, path: str, call: Call) -> Value:
-    """The object that this call of the library's ``path`` gives; made twice it stands for all of them."""
-    site = (call.source.file, call.source.line)
-    return (run.allocate(call.node, "library", lambda: Instance(External(path), site)),)
+def _object_of(run: Run, path: str, call: Call) -> Value:
+    return (run.library_object(call, path, "library"),)
 
 
 def _init(run: Run, path: str, call: Call) -> Value:
@@ -247,9 +242,7 @@ def _init(run: Run, path: str, call: Call) -> Value:
 
 def _parameter(run: Run, path: str, call: Call) -> Value:
     found = ros_parameters.parameter_object(run, call, call.args.at(2, "value") or NONE)
-    instance = found[0]
-    assert isinstance(instance, Instance)
-    run.state.store(instance, "name", call.args.at(0, "name") or ANY)
+    run.state.store(found[0], "name", call.args.at(0, "name") or ANY)
     return found
 
 
@@ -258,17 +251,14 @@ def _parameter_client(run: Run, path: str, call: Call) -> Value:
     for record in records_of(run, call.args.at(0, "node"), call):
         for service, interface in PARAMETER_SERVICES.items():
             for text in text_value(concatenate(name, f"/{service}") for name in as_texts(remote)):
-                endpoint = FoundEndpoint(EndpointKind.SERVICE_CLIENT, text, interface, call.source)
-                record.add_endpoint(endpoint)
-    return instance_of(run, path, call)
+                record.add_endpoint(CLIENT, text, interface, call.source)
+    return _object_of(run, path, call)
 
 
 def _interface_by_name(run: Run, path: str, call: Call) -> Value:
     """``rosidl_runtime_py.utilities.get_message('std_msgs/msg/String')``."""
-    found: Value = BOTTOM
-    for name in constant_strings(call.args.at(0) or ANY):
-        found = join(found, external(name.replace("/", ".")))
-    return found or ANY
+    names = constant_strings(call.args.at(0) or ANY)
+    return join_all(external(name.replace("/", ".")) for name in names) or ANY
 
 
 def _image_transport(run: Run, path: str, call: Call) -> Value:
@@ -280,38 +270,28 @@ def _buffer_client(run: Run, path: str, call: Call) -> Value:
     names = call.args.at(1, "ns") or ANY
     for record in records_of(run, call.args.at(0, "node"), call):
         for name in names_of(names):
-            record.add_endpoint(
-                FoundEndpoint(
-                    EndpointKind.ACTION_CLIENT, name, "tf2_msgs/action/LookupTransform", call.source
-                )
-            )
-    return instance_of(run, path, call)
+            record.add_endpoint(ACTION_CLIENT, name, "tf2_msgs/action/LookupTransform", call.source)
+    return _object_of(run, path, call)
 
 
 def _node_class(run: Run, path: str, call: Call) -> Value:
     return create_node(run, LIFECYCLE_CLASS if is_lifecycle(path) else NODE_CLASS, call)
 
 
+_BY_NAME = tuple(("rosidl_runtime_py", f"get_{kind}") for kind in ("message", "service", "action"))
 _FUNCTIONS: dict[tuple[str, str], Callable[[Run, str, Call], Value]] = {
-    ("rclpy", "create_node"): _node_class,
-    ("rclpy", "Node"): _node_class,
-    ("rclpy", "LifecycleNode"): _node_class,
+    **{("rclpy", name): _node_class for name in ("create_node", "Node", "LifecycleNode")},
     ("nav2_simple_commander", "BasicNavigator"): lambda run, path, call: create_node(run, path, call),
     ("rclpy", "init"): _init,
     ("rclpy", "Parameter"): _parameter,
     ("rclpy", "AsyncParameterClient"): _parameter_client,
-    ("rosidl_runtime_py", "get_message"): _interface_by_name,
-    ("rosidl_runtime_py", "get_service"): _interface_by_name,
-    ("rosidl_runtime_py", "get_action"): _interface_by_name,
+    **dict.fromkeys(_BY_NAME, _interface_by_name),
     ("image_transport_py", "ImageTransport"): _image_transport,
     ("tf2_ros", "BufferClient"): _buffer_client,
 }
 
 
-_MAKING = frozenset(_FUNCTIONS) - {
-    ("rclpy", "init"), ("rclpy", "Parameter"),
-    ("rosidl_runtime_py", "get_message"), ("rosidl_runtime_py", "get_service"), ("rosidl_runtime_py", "get_action"),
-}  # fmt: skip
+_MAKING = frozenset(_FUNCTIONS) - {("rclpy", "init"), ("rclpy", "Parameter"), *_BY_NAME}
 
 
 CREATING_NAMES = frozenset(name for _, name in (*ENDPOINT_CALLS, *HELPERS, *_MAKING))
@@ -320,12 +300,12 @@ CREATING_NAMES = frozenset(name for _, name in (*ENDPOINT_CALLS, *HELPERS, *_MAK
 def image_transport_method(run: Run, record: NodeRecord, name: str, call: Call) -> Value:
     """``advertise`` publishes the image and one topic per transport plugin below it."""
     base = call.args.at(0, "base_topic") or ANY
-    kind = EndpointKind.PUBLISHER if name.startswith("advertise") else EndpointKind.SUBSCRIPTION
+    kind = PUBLISHER if name.startswith("advertise") else SUBSCRIPTION
     for text in names_of(base):
-        record.add_endpoint(FoundEndpoint(kind, text, "sensor_msgs/msg/Image", call.source))
+        record.add_endpoint(kind, text, "sensor_msgs/msg/Image", call.source)
         if isinstance(text, str):
             below = concatenate(text, "/compressed")
-            record.add_endpoint(FoundEndpoint(kind, below, "sensor_msgs/msg/CompressedImage", call.source))
+            record.add_endpoint(kind, below, "sensor_msgs/msg/CompressedImage", call.source)
     if name.startswith("subscribe"):
         run.register_callback(call.args.at(2, "callback") or BOTTOM, 1)
     return ANY

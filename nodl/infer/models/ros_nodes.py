@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from nodl.infer.findings import FoundEndpoint, NodeRecord
+from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.ros_arguments import ros_arguments
-from nodl.infer.models.ros_parameters import (
-    assign_parameters,
-)
+from nodl.infer.models.ros_parameters import assign_parameters
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -53,10 +51,9 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
     library = library_node(path)
     default: Value = (library.name,) if library else unknown("a node without a name")
     record.names = join(record.names, call.args.at(0, "node_name") or default)
-    namespace = call.args.at(1 if library else -1, "namespace")
     for fixed in library.endpoints if library else ():
-        record.add_endpoint(FoundEndpoint(fixed.kind, fixed.name, fixed.type, call.source))
-    record.namespaces = join(record.namespaces, namespace or NONE)
+        record.add_endpoint(fixed.kind, fixed.name, fixed.type, call.source)
+    record.namespaces = join(record.namespaces, call.args.at(1 if library else -1, "namespace") or NONE)
     record.lifecycle = record.lifecycle or is_lifecycle(path)
     local = call.args.at(-1, "cli_args")
     record.arguments = join(record.arguments, strings_in(run, local, call) if local else BOTTOM)
@@ -67,17 +64,13 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
         enabled = call.args.at(-1, "enable_communication_interface")
         record.communication_interface = enabled is None or truth(enabled) is not False
     overrides = call.args.at(-1, "parameter_overrides")
-    given = (
-        record.arguments if use_global == (False,) else join(record.arguments, run.findings.global_arguments)
-    )
-    _override_parameters(run, record, given)
+    of_all = BOTTOM if use_global == (False,) else run.findings.global_arguments
+    _override_parameters(run, record, join(record.arguments, of_all))
     if overrides:
         assign_parameters(run, record, overrides, call)
     if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
         for service, service_type in LOGGER_SERVICES.items():
-            record.add_endpoint(
-                FoundEndpoint(EndpointKind.SERVICE_SERVER, service, service_type, call.source)
-            )
+            record.add_endpoint(EndpointKind.SERVICE_SERVER, service, service_type, call.source)
 
 
 def _override_parameters(run: Run, record: NodeRecord, arguments: Value) -> None:
@@ -127,16 +120,12 @@ def record_of_instance(run: Run, instance: Instance, call: Call) -> NodeRecord:
     """The node record of ``instance``; if it has none, a new one, not yet marked as created."""
     if instance.node is None:
         instance.node = run.findings.add_node(NodeRecord(call.source))
-        instance.node.class_key = instance.cls
     return instance.node
 
 
 def create_node(run: Run, path: str, call: Call) -> Value:
     """``rclpy.create_node(...)`` or ``Node(...)`` used as it is."""
-    instance = run.allocate(
-        call.node, "node", lambda: Instance(External(path), (call.source.file, call.source.line))
-    )
-    assert isinstance(instance, Instance)
+    instance = run.library_object(call, path, "node")
     initialise_node(run, instance, path, call)
     return (instance,)
 

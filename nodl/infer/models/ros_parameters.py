@@ -24,6 +24,7 @@ from nodl.infer.values import (
     Value,
     constant_strings,
     join,
+    join_all,
     present,
     unknown,
 )
@@ -31,25 +32,21 @@ from nodl.infer.values import (
 PARAMETER_CLASS = "rclpy.parameter.Parameter"
 
 
-def parameter_object(run: Run, call: Call, value: Value, key: str = "parameter") -> Value:
+def parameter_object(run: Run, call: Call, value: Value, key: str = "parameter") -> tuple[Instance]:
     """An rclpy ``Parameter`` that holds ``value``; ``key`` tells those made by one call apart."""
-    instance = run.allocate(
-        call.node, key, lambda: Instance(External(PARAMETER_CLASS), (call.source.file, call.source.line))
-    )
+    instance = run.library_object(call, PARAMETER_CLASS, key)
     run.state.store(instance, "value", value)
     return (instance,)
 
 
-def _names_or_gap(run: Run, call: Call, position: int = 0) -> list[str]:
-    value = call.args.at(position, "name") or ANY
-    return constant_strings(value)
+def _names(call: Call) -> list[str]:
+    return constant_strings(call.args.at(0, "name") or ANY)
 
 
 def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    default = call.args.at(1, "value")
-    names = _names_or_gap(run, call)
+    names = _names(call)
     for name in names:
-        record.declare(name, _default_value(default))
+        record.declare(name, _default_value(call.args.at(1, "value")))
     return parameter_object(run, call, _inputs(run, record, names))
 
 
@@ -97,7 +94,7 @@ def _each(run: Run, value: Value, call: Call) -> list[Value]:
 
 
 def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    return parameter_object(run, call, _inputs(run, record, _names_or_gap(run, call)))
+    return parameter_object(run, call, _inputs(run, record, _names(call)))
 
 
 def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -112,7 +109,6 @@ def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
 def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value:
     """A dictionary of the parameters below a prefix, under the rest of their names."""
     found = run.allocate(call.node, "by prefix", Dictionary)
-    assert isinstance(found, Dictionary)
     for prefix in constant_strings(call.args.at(0, "prefix") or ANY):
         start = f"{prefix}." if prefix else ""
         everything = Input(f"{start}**", record)
@@ -128,12 +124,9 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
 
 
 def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
-    names = _names_or_gap(run, call)
-    other = call.args.at(1, "alternative_value") or BOTTOM
-    default: Value = BOTTOM
-    for atom in other:
-        if isinstance(atom, Instance):
-            default = join(default, atom.cells.get("value", BOTTOM))
+    names = _names(call)
+    others = (a for a in call.args.at(1, "alternative_value") or BOTTOM if isinstance(a, Instance))
+    default = join_all(other.cells.get("value", BOTTOM) for other in others)
     for name in names:
         record.declare(name, _default_value(default or None))
     return parameter_object(run, call, _inputs(run, record, names))

@@ -5,15 +5,15 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable
 
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.interpreter.define import program_classes
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.methods import Getter, Partial, PartialMethod
 from nodl.infer.models import builtin, options
+from nodl.infer.models.files import CONTENTS
 from nodl.infer.models.iterables import MAX_RANGE
-from nodl.infer.models.library_objects import library_instance
 from nodl.infer.models.reflection import import_dynamic
 from nodl.infer.text import Input, concatenations, make_text
 from nodl.infer.values import (
@@ -32,6 +32,7 @@ from nodl.infer.values import (
     Value,
     constant_strings,
     join,
+    join_all,
     present,
     sole,
     unknown,
@@ -96,23 +97,15 @@ def _partial_method(run: Run, call: Call) -> Value:
     return (PartialMethod(made),) if isinstance(made, Partial) else ANY
 
 
-def _method_caller(run: Run, call: Call) -> Value:
-    return (Getter("methodcaller", tuple(call.args.positional), tuple(call.args.keywords.items())),)
-
-
-def _attribute_getter(run: Run, call: Call) -> Value:
-    return (Getter("attrgetter", tuple(call.args.positional), ()),)
-
-
-def _item_getter(run: Run, call: Call) -> Value:
-    return (Getter("itemgetter", tuple(call.args.positional), ()),)
+def _getter(kind: str) -> Model:
+    return lambda run, call: (Getter(kind, tuple(call.args.positional), tuple(call.args.keywords.items())),)
 
 
 def _thread(run: Run, call: Call) -> Value:
     """``Thread(target=f, args=(...))``: calls ``f`` with these arguments, some time later."""
     target = call.args.at(1, "target") or NONE
     _register_with(run, target, call.args.keywords.get("args"), call.args.keywords.get("kwargs"), call)
-    return (library_instance(run, call, "threading.Thread"),)
+    return (run.library_object(call, "threading.Thread"),)
 
 
 def _register_with(run: Run, target: Value, args: Value | None, kwargs: Value | None, call: Call) -> None:
@@ -134,20 +127,13 @@ def _timer(run: Run, call: Call) -> Value:
     return ANY
 
 
-def _submit(run: Run, pool: Instance, call: Call) -> Value:
-    rest = Items(tuple(call.args.positional[1:]))
-    run.register_callback(
-        (Partial(call.args.at(0) or ANY, rest.exact or (), tuple(call.args.keywords.items())),), 0
-    )
-    return ANY
-
-
 def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
     _thread(run, call)
     return NONE
 
 
-def _reduce(run: Run, call: Call) -> Value:
+def _registered(run: Run, call: Call) -> Value:
+    """The library calls what it is given, and leaves containers alone."""
     run.escape(call.args, opened=False)
     return ANY
 
@@ -157,13 +143,12 @@ def _reduce(run: Run, call: Call) -> Value:
 
 def _default_dict(run: Run, call: Call) -> Value:
     obj = run.allocate(call.node, "dict", Dictionary)
-    assert isinstance(obj, Dictionary)
     obj.default = join(obj.default, tuple(atom for atom in call.args.at(0) or BOTTOM if atom is not None))
     return (obj,)
 
 
 def _simple_namespace(run: Run, call: Call) -> Value:
-    instance = library_instance(run, call, "types.SimpleNamespace")
+    instance = run.library_object(call, "types.SimpleNamespace")
     for name, value in call.args.keywords.items():
         run.state.store(instance, name, value)
     return (instance,)
@@ -183,14 +168,10 @@ def _copy(run: Run, call: Call) -> Value:
 
 def _chain(run: Run, call: Call) -> Value:
     columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
+    items = Items(None, join_all(column.any_element() for column in columns))
     if all(column.exact is not None for column in columns):
-        return run.sequence(
-            call.node, "list", Items(tuple(item for column in columns for item in column.exact or ()))
-        )
-    result: Value = BOTTOM
-    for column in columns:
-        result = join(result, column.any_element())
-    return run.sequence(call.node, "list", Items(None, result))
+        items = Items(tuple(item for column in columns for item in column.exact or ()))
+    return run.sequence(call.node, "list", items)
 
 
 def _product(run: Run, call: Call) -> Value:
@@ -207,11 +188,9 @@ def _product(run: Run, call: Call) -> Value:
 
 def _field_names(atom: object) -> list[str] | None:
     """The fields of an object of a dataclass of the program."""
-    for base in (
-        linearized(atom.cls) if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue) else ()
-    ):
-        if isinstance(base, ClassValue) and base.fields is not None:
-            return [name for name, _ in base.fields]
+    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
+        listed = (base.fields for base in program_classes(atom.cls) if base.fields is not None)
+        return next(([name for name, _ in fields] for fields in listed), None)
     return None
 
 
@@ -241,19 +220,10 @@ def _as_dictionary(run: Run, call: Call) -> Value:
     return (found,)
 
 
-def _register(run: Run, call: Call) -> Value:
-    run.escape(call.args, opened=False)
-    return ANY
-
-
 def _patched(run: Run, call: Call) -> Value:
     run.gap(call.node, call.frame, "unittest.mock replaces something while the program runs")
     run.escape(call.args)
     return ANY
-
-
-def _file_contents(run: Run, call: Call) -> Value:
-    return unknown("the contents of a file, read when the program runs")
 
 
 FUNCTIONS: dict[str, Model] = {
@@ -261,17 +231,13 @@ FUNCTIONS: dict[str, Model] = {
     "os.getenv": _environment,
     "os.environ.get": _environment,
     "os.environ.setdefault": _set_default_environment,
-    "os.environ.update": _change_environment,
-    "os.environ.pop": _change_environment,
-    "os.putenv": _change_environment,
+    **dict.fromkeys(("os.environ.update", "os.environ.pop", "os.putenv"), _change_environment),
     "os.path.join": _path_join,
     "os.path.basename": _base_name,
     "functools.partial": _partial,
     "functools.partialmethod": _partial_method,
-    "operator.methodcaller": _method_caller,
-    "operator.attrgetter": _attribute_getter,
-    "operator.itemgetter": _item_getter,
-    "functools.reduce": _reduce,
+    **{f"operator.{kind}": _getter(kind) for kind in ("methodcaller", "attrgetter", "itemgetter")},
+    "functools.reduce": _registered,
     "threading.Thread": _thread,
     "threading.Timer": _timer,
     "multiprocessing.Process": _thread,
@@ -287,14 +253,9 @@ FUNCTIONS: dict[str, Model] = {
     "itertools.product": _product,
     "random.choice": builtin.FUNCTIONS["builtins.next"],
     "importlib.import_module": import_dynamic,
-    "atexit.register": _register,
-    "unittest.mock.patch": _patched,
-    "unittest.mock.patch.object": _patched,
-    "unittest.mock.patch.dict": _patched,
-    "unittest.mock.patch.multiple": _patched,
-    "yaml.safe_load": _file_contents,
-    "yaml.load": _file_contents,
-    "json.load": _file_contents,
+    "atexit.register": _registered,
+    **{f"unittest.mock.patch{method}": _patched for method in ("", ".object", ".dict", ".multiple")},
+    **dict.fromkeys(("yaml.safe_load", "yaml.load", "json.load"), lambda run, call: unknown(CONTENTS)),
 }
 
 METHODS: dict[tuple[str, str], Method] = {
@@ -304,32 +265,22 @@ METHODS: dict[tuple[str, str], Method] = {
 }
 
 
-def _field(run: Run, obj: Instance, name: str) -> Value:
-    return unknown(f"the attribute {name}, which nothing analysed sets")
-
-
 OPEN_ATTRIBUTES: dict[str, Callable[[Run, Instance, str], Value]] = {
     options.NAMESPACE: options.namespace_attribute,
-    "types.SimpleNamespace": _field,
+    "types.SimpleNamespace": lambda run, obj, name: unknown(
+        f"the attribute {name}, which nothing analysed sets"
+    ),
 }
 
 # Methods of a subclass that the base class calls.
 HOOKS: dict[str, frozenset[str]] = {
-    "builtins.object": frozenset(),
-    "builtins.dict": frozenset(),
-    "builtins.list": frozenset(),
-    "builtins.str": frozenset(),
-    "builtins.int": frozenset(),
-    "builtins.Exception": frozenset(),
-    "enum.Enum": frozenset(),
-    "enum.IntEnum": frozenset(),
-    "enum.StrEnum": frozenset(),
-    "enum.Flag": frozenset(),
+    **{
+        f"builtins.{name}": frozenset()
+        for name in ("object", "dict", "list", "tuple", "str", "int", "Exception")
+    },
+    **{f"enum.{name}": frozenset() for name in ("Enum", "IntEnum", "StrEnum", "Flag")},
+    **{f"typing.{name}": frozenset() for name in ("NamedTuple", "Generic", "Protocol")},
     "abc.ABC": frozenset(),
-    "typing.NamedTuple": frozenset(),
-    "builtins.tuple": frozenset(),
-    "typing.Generic": frozenset(),
-    "typing.Protocol": frozenset(),
     "threading.Thread": frozenset({"run"}),
     "multiprocessing.Process": frozenset({"run"}),
 }
